@@ -1,6 +1,6 @@
 """How long the studio takes from a key press on a slider to what is seen, in a headless Chromium.
 
-    python benchmarks/studio.py [HAMMER] [--times N]
+    python benchmarks/studio.py [HAMMER] [--times N] [--ratio 2]
 
 The keys are pressed four times a second. Times are taken in the browser, from the time stamp of the key to
 the first task after the picture was handed over.
@@ -35,10 +35,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("hammer", nargs="?", default="hendriks-1983")
     parser.add_argument("--times", type=int, default=40)
+    parser.add_argument("--ratio", type=float, default=1.0, help="pixel ratio of the screen")
     given = parser.parse_args()
     with browser() as tab:
         page = tab()
-        page.size(1280, 720)
+        page.size(1280, 720, ratio=given.ratio)
         begun = time.perf_counter()
         with studio(given.hammer) as running:
             page.open(running.address)

@@ -6,7 +6,16 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images" / "studio"
 VIEWS = ("motion", "sketch", "map", "forces", "phase", "strobe", "loops", "energy", "line")
+STORIES = ("one-dot", "figure-6", "buzz", "second-dot-lost", "strange", "hung-up")
 STATE = "#rate=1250&pulses=9"
+TIMES = (3.9e-4, 1.6e-3, 6.2e-3, 2.5e-3, 1.16e-2, 3.3e-3)
+"""Where the time stands in a story, s."""
+SECTION = "window.studio.studio.frames.strobe"
+SETTLED = "!window.studio.studio.busy && !window.studio.studio.stale"
+COMPLETE = (
+    "window.studio?.studio?.frames.strobe?.verdict && window.studio.studio.frames.line"
+    " && window.studio.studio.frames.map?.detail === 'full'"
+)
 
 
 def main() -> None:
@@ -18,27 +27,48 @@ def main() -> None:
     IMAGES.mkdir(parents=True, exist_ok=True)
     with studio("hendriks-1983") as running, browser() as tab:
         page = tab()
-        page.size(1280, 720)
+
+        def rest(milliseconds: int = 1500) -> None:
+            page.run(f"new Promise((done) => setTimeout(done, {milliseconds}))")
+
+        page.size(1440, 900)
         page.open(running.address + STATE)
-        page.wait("window.studio?.studio?.frames.strobe?.verdict && window.studio.studio.frames.line")
+        page.wait(COMPLETE)
+        # The opening, at a time at which the armature is on its way.
+        page.run("window.studio.studio.setCursor(2.62e-3)")
+        rest()
+        page.picture(IMAGES / "light.png")
+        for k, name in enumerate(STORIES):
+            page.run(f"document.querySelectorAll('.story')[{k}].click()")
+            page.wait(SETTLED)
+            rest(3000)
+            page.wait(f"{SECTION}.serial === window.studio.studio.serial")
+            page.wait(f"{SECTION}.verdict || {SECTION}.reason")
+            page.run(f"window.studio.studio.setCursor({TIMES[k]})")
+            rest()
+            page.picture(IMAGES / f"story-{name}.png", ".stage")
+        page.run("document.querySelector('.notice .shut').click()")
+        page.open("about:blank")
+        page.open(running.address + STATE)
+        page.wait(COMPLETE)
         # A pinned run behind one with thicker forms.
         page.run("window.studio.studio.pin()")
         page.run("document.querySelector('[data-key=\"forms thickness\"]').focus()")
         for _ in range(40):
             page.press("ArrowRight")
-        page.wait("!window.studio.studio.busy && !window.studio.studio.stale")
-        page.wait(
-            "window.studio.studio.frames.strobe.verdict && window.studio.studio.frames.map.detail === 'full'"
-        )
-        page.wait("window.studio.studio.frames.line.serial > window.studio.studio.frames.dots.serial - 2")
+        page.wait(SETTLED)
+        page.wait(COMPLETE)
+        rest(2500)
         page.run("window.studio.studio.setCursor(1.15e-3)")
-        page.run("new Promise((done) => setTimeout(done, 1500))")
-        page.picture(IMAGES / "light.png")
         page.size(1920, 1080, dark=True)
-        page.run("new Promise((done) => setTimeout(done, 800))")
+        rest(800)
         page.picture(IMAGES / "dark.png")
-        page.size(1500, 900)
-        page.run("new Promise((done) => setTimeout(done, 800))")
+        page.size(390, 844, ratio=2)
+        rest(800)
+        page.run("scrollTo(0, 0)")
+        page.picture(IMAGES / "phone.png")
+        page.size(1500, 1000)
+        rest(800)
         for view in VIEWS:
             page.picture(IMAGES / f"{view}.png", f".view-{view}")
     for path in IMAGES.glob("*.png"):

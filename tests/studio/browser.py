@@ -93,17 +93,28 @@ class Page:
         self.call("Page.navigate", url=address)
         self.wait("document.readyState === 'complete'")
 
-    def size(self, width: int, height: int, dark: bool = False) -> None:
-        """Set the size of the window and the colours that its user prefers."""
+    def size(
+        self, width: int, height: int, dark: bool = False, ratio: float = 1.0, still: bool = True
+    ) -> None:
+        """Set the size of the window, its pixel ratio, and what its user prefers of colours and motion."""
         self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width,
             height=height,
-            deviceScaleFactor=1,
+            deviceScaleFactor=ratio,
             mobile=False,
         )
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.call("Emulation.setEmulatedMedia", features=[scheme])
+        self.prefer(
+            {
+                "prefers-color-scheme": "dark" if dark else "light",
+                "prefers-reduced-motion": "reduce" if still else "no-preference",
+            }
+        )
+
+    def prefer(self, preferences: dict[str, str]) -> None:
+        """Set media features, such as what the user prefers."""
+        features = [{"name": name, "value": value} for name, value in preferences.items()]
+        self.call("Emulation.setEmulatedMedia", features=features)
 
     def picture(self, path: Path, selector: str | None = None) -> None:
         """Write what is seen, all of it or one element, as PNG."""
@@ -114,9 +125,10 @@ class Page:
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png", **clip)["data"]))
 
     def box(self, selector: str) -> dict[str, float]:
-        """Return place and size of an element."""
+        """Scroll to an element where it is not in sight, and return its place and size."""
         return self.run(
-            f"(() => {{ const b = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
+            f"(() => {{ const found = document.querySelector({json.dumps(selector)});"
+            " found.scrollIntoViewIfNeeded(); const b = found.getBoundingClientRect();"
             " return {x: b.x, y: b.y, width: b.width, height: b.height}; })()"
         )
 

@@ -10,6 +10,7 @@ from printhammer.studio.bounds import LARGEST_FILE, LARGEST_MESSAGE
 from printhammer.studio.frames import frame, refusal
 from printhammer.studio.states.records import MOST_COLUMNS, QUANTITIES
 from printhammer.studio.states.state import ProtocolError, read_state
+from printhammer.studio.workers.order import ASKED
 
 if TYPE_CHECKING:
     from printhammer.studio.states.shelf import Shelf
@@ -45,6 +46,7 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
         "texts": {"state"},
         "drop": {"name", "text", "columns"},
     }
+    contents |= {kind: {"state"} for kind in ASKED}
     if not isinstance(kind, str) or kind not in contents:
         raise ProtocolError(f"kind is expected to be one of {', '.join(contents)}")
     if set(message) != {"kind", "serial", *contents[kind]}:
@@ -53,6 +55,12 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
         )
     if kind in ("open", "page"):
         return kind, serial, message.get("state")
+    if kind in ASKED:
+        # A pin of a link may hold anything, and is no reason to end the connection.
+        try:
+            return kind, serial, read_state(message["state"], shelf)
+        except ProtocolError as error:
+            return kind, serial, str(error)
     if "state" in contents[kind]:
         return kind, serial, read_state(message["state"], shelf)
     pair = (message["name"], message["text"])

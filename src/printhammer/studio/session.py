@@ -1,8 +1,9 @@
 """One page and what is computed for it: the latest state wins, and nothing waits for what takes longer.
 
-Questions are answered in this process, by a thread that does nothing else. States go to workers, which are
-processes: curves and dots first, then, side by side, the map and what else is shown in detail. A worker that
-is told that its state is no longer the latest, and does not come back, is ended; one that compiles is left to
+What a hammer is and what a file holds is answered in this process, by a thread that does nothing else.
+Questions about states that are not shown, and states themselves, go to workers, which are processes: of a
+state curves and dots first, then, side by side, the map and what else is shown in detail. A worker that is
+told that its state is no longer the latest, and does not come back, is ended; one that compiles is left to
 it, since that will be needed, and another one serves the newer state meanwhile.
 """
 
@@ -22,7 +23,7 @@ from printhammer.studio.pictures.keys import KEYS, kernel_key
 from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import ProtocolError, State
 from printhammer.studio.workers.crew import PATIENT, Crew
-from printhammer.studio.workers.order import Order
+from printhammer.studio.workers.order import ASKED, Order
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,6 +40,7 @@ _TICK: Final = 0.02
 _TOLD: Final = 1.0
 _LATE: Final = 0.25
 _SPARE: Final = 5.0
+_MOST_QUESTIONS: Final = 16
 
 
 class Session:
@@ -65,13 +67,14 @@ class Session:
         self._latest: tuple[int, State] | None = None
         self._accepted: tuple[int, State] | None = None
         self._questions: list[tuple[str, int, Any]] = []
+        self._asked: list[tuple[str, int, Any]] = []
         self._closed = False
         self._served: dict[str, int] = {}
         self._told: dict[str, float] = {}
         # What the page shows, and what it has in its last form, by view.
         self._shown: dict[str, Any] = {}
         self._whole: dict[str, Any] = {}
-        works: dict[str, Callable[[], None]] = {"questions": self._answers}
+        works: dict[str, Callable[[], None]] = {"questions": self._answers, "asked": self._answers_of_states}
         works |= {role: lambda role=role: self._serve(role) for role in _VIEWS}  # type: ignore[misc]
         self._threads = [
             threading.Thread(target=self._run, args=(work,), name=f"studio-{name}", daemon=True)
@@ -92,10 +95,10 @@ class Session:
         with self._change:
             if kind == "state":
                 self._latest = (serial, content)
-            elif len(self._questions) < 16:
-                self._questions.append((kind, serial, content))
+            elif len(questions := self._asked if kind in ASKED else self._questions) < _MOST_QUESTIONS:
+                questions.append((kind, serial, content))
             else:
-                raise ProtocolError("more than 16 questions wait for their answer")
+                raise ProtocolError(f"more than {_MOST_QUESTIONS} questions wait for their answer")
             self._change.notify_all()
 
     def close(self) -> None:
@@ -137,6 +140,17 @@ class Session:
                 reason = f"this could not be answered, {type(error).__name__}: {error}"
                 data = refusal(serial, reason)
             self._tell(data)
+
+    def _answers_of_states(self) -> None:
+        with self._change:
+            self._change.wait_for(lambda: self._closed or self._asked)
+            if self._closed:
+                return
+            kind, serial, content = self._asked.pop(0)
+        if isinstance(content, str):
+            self._tell(refusal(serial, content))
+        else:
+            self._safely(Order("asked", serial, content, (kind,), {}))
 
     def _serve(self, role: str) -> None:
         """Wait for a state that a role has not served yet, and have it served."""
@@ -186,7 +200,9 @@ class Session:
         role, serial = order.role, order.serial
 
         def newer() -> bool:
-            return self._closed or self._latest is None or self._latest[0] != serial
+            # A question is no state that another one could take the place of.
+            later = role != "asked" and (self._latest is None or self._latest[0] != serial)
+            return self._closed or later
 
         try:
             key = kernel_key(order.state)
@@ -196,6 +212,8 @@ class Session:
             return
 
         def wanted() -> bool:
+            if role == "asked":
+                return not self._closed
             # A coarse map is to arrive also while a slider moves, and newer states come.
             waiting = self._waiting(role)
             return not self._closed and waiting is not None and waiting[0] == serial
@@ -296,8 +314,10 @@ class Session:
             return False
 
     def _give_up(self, order: Order, why: str) -> None:
-        if order.role == "curves":
-            self._tell(refusal(order.serial, f"the curves {why}"))
+        if order.role in ("curves", "asked"):
+            what = "the curves" if order.role == "curves" else "what was asked"
+            self._tell(refusal(order.serial, f"{what} {why}"))
+            return
         for view in order.views:
             if self._whole.get(view) != KEYS[view](order.state):
                 self._note(order, view, whole=True)

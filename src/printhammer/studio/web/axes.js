@@ -50,7 +50,9 @@ export function axes(pen, width, height, x, y, margin = MARGIN) {
     if (x.whole && !Number.isInteger(tick)) continue;
     const place = X(tick / x.factor);
     line(pen, place, box.y, place, box.y + box.h);
-    pen.fillText(digits(Number(tick.toPrecision(6))), place, box.y + box.h + 4);
+    const text = digits(Number(tick.toPrecision(6)));
+    // The last one ends within the picture.
+    pen.fillText(text, Math.min(place, width - 0.5 * pen.measureText(text).width - 1), box.y + box.h + 4);
   }
   pen.textAlign = "right";
   pen.textBaseline = "middle";
@@ -171,19 +173,25 @@ export function key(pen, box, entries) {
   pen.restore();
 }
 
+/** Return a text in lines that are no wider than some pixels, with the font of a pen. */
+export function broken(pen, text, width) {
+  const lines = [""];
+  for (const word of text.split(" ")) {
+    const longer = lines.at(-1) ? `${lines.at(-1)} ${word}` : word;
+    if (lines.at(-1) && pen.measureText(longer).width > width) lines.push(word);
+    else lines[lines.length - 1] = longer;
+  }
+  return lines;
+}
+
 /** Tell in the middle of a view why it is empty, in lines that fit. */
 export function refusal(pen, width, height, reason) {
-  const lines = [""];
-  const most = Math.max(Math.floor((width - 24) / 6), 8);
-  for (const word of reason.split(" ")) {
-    if (lines.at(-1) && lines.at(-1).length + word.length + 1 > most) lines.push("");
-    lines[lines.length - 1] += (lines.at(-1) ? " " : "") + word;
-  }
   pen.save();
   pen.font = FONT;
   pen.fillStyle = colours().ink;
   pen.textAlign = "center";
   pen.textBaseline = "middle";
+  const lines = broken(pen, reason, width - 24);
   lines.forEach((text, k) => pen.fillText(text, width / 2, height / 2 + 15 * (k - (lines.length - 1) / 2)));
   pen.restore();
 }

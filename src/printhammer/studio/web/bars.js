@@ -1,11 +1,14 @@
 // What each firing did: energies of the dots, and the line that they print.
-import { axes, extent, line, refusal } from "./axes.js";
+import { axes, broken, extent, line, refusal } from "./axes.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, shown, unitOf } from "./units.js";
 
+const SIDES = [52, 52]; // the margins of the motion, below which the dots lie
+
 /** Energy that each dot put into the pack, and what the pack kept. */
 export function energyView(body, studio) {
+  let where = null;
   const paint = (pen, width, height) => {
     const frame = studio.frames.dots;
     if (!frame) return;
@@ -14,8 +17,11 @@ export function energyView(body, studio) {
     const unit = unitOf("J");
     const of = (name) => digits(energy[name] * unit.factor, 3);
     const most = Math.max(...dots.map((dot) => dot.loading_work ?? 0), 1e-12);
-    const margin = { left: 46, right: 10, top: 38, bottom: 32 };
+    pen.font = FONT;
+    const words = broken(pen, `coil ${of("coil_work")}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")} ${unit.name}`, width - 12);
+    const margin = { left: 46, right: 10, top: 24 + 14 * words.length, bottom: 32 };
     const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30, whole: true }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
+    where = plane;
     const wide = Math.min((plane.box.w / dots.length) * 0.36, 16);
     dots.forEach((dot, k) => {
       const middle = plane.X(k + 1);
@@ -32,7 +38,7 @@ export function energyView(body, studio) {
     pen.textBaseline = "top";
     pen.fillStyle = c.ink;
     let place = 6;
-    pen.fillText(`coil ${of("coil_work")}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")} ${unit.name}`, 6, 20);
+    words.forEach((text, k) => pen.fillText(text, 6, 20 + 14 * k));
     for (const [colour, text] of [[c.x, "into the pack"], [c.pack, "kept by it"]]) {
       pen.fillStyle = colour;
       pen.fillRect(place, 6, 9, 9);
@@ -43,86 +49,129 @@ export function energyView(body, studio) {
     }
     pen.restore();
   };
-  return barsOf(body, studio, "Energy of each dot", paint, () => dotTable(studio, { loading_work: "J", net_loss: "J" }));
+  const view = barsOf(body, studio, "Energy of each dot", paint, () => dotTable(studio, { loading_work: "J", net_loss: "J" }));
+  const timeAt = (x) => {
+    const dot = where && studio.frames.dots?.dots[Math.round(where.x(x)) - 1];
+    return dot ? dot.fired_at + (dot.flight_time ?? 0) : null;
+  };
+  return { ...view, timeAt };
 }
 
-/** The dots as they come out on paper that moves past the hammer: place by arrival, size by force. */
+/** The dots of the burst, each below its touch, and the text as it is printed. */
 export function lineView(body, studio) {
   const paint = (pen, width, height) => {
     const [frame, motion] = [studio.frames.dots, studio.frames.motion];
     if (!frame || !motion) return;
-    if (studio.store.state.line.trim()) {
-      if (studio.frames.line) printed(pen, width, height, studio.frames.line);
-      return;
-    }
-    const c = colours();
-    const { dots, quality } = frame;
-    const first = dots.find((dot) => dot.struck);
-    const [force, flight] = [first?.peak_force ?? 1, first?.flight_time ?? 0];
-    const period = 1 / studio.store.state.rate;
-    const slots = Math.max(Math.round(dots.at(-1).fired_at / period) + 1, 1);
-    const pitch = Math.min((width - 30) / slots, 40);
-    const left = (width - pitch * slots) / 2 + pitch / 2;
-    const middle = 0.42 * height;
+    const text = studio.store.state.line.trim();
+    const strip = text ? Math.min(Math.max(0.34 * height, 54), 90) : height;
+    burst(pen, width, strip, frame, motion, studio, !text);
+    if (!text || !studio.frames.line) return;
     pen.save();
-    pen.font = FONT;
-    pen.strokeStyle = c.faint;
-    pen.lineWidth = 1;
-    for (let slot = 0; slot < slots; slot += 1) line(pen, left + slot * pitch, middle - 20, left + slot * pitch, middle + 20);
-    dots.forEach((dot) => {
-      if (!dot.struck) {
-        cross(pen, left + (dot.fired_at / period) * pitch, middle, c.lost);
-        return;
-      }
-      const place = left + ((dot.fired_at + dot.flight_time - flight) / period) * pitch;
-      const part = Math.min(dot.peak_force / force, 1.6);
-      pen.fillStyle = c.ink;
-      pen.globalAlpha = Math.min(0.25 + 0.75 * part, 1);
-      pen.beginPath();
-      pen.arc(place, middle, Math.max(0.34 * pitch * Math.sqrt(part), 1.5), 0, 2 * Math.PI);
-      pen.fill();
-      pen.globalAlpha = 1;
-      if (dot.extra_contacts) {
-        pen.strokeStyle = c.lost;
-        pen.lineWidth = 1.5;
-        pen.beginPath();
-        pen.arc(place, middle, 0.5 * pitch + 2, 0, 2 * Math.PI);
-        pen.stroke();
-      }
-    });
-    pen.fillStyle = c.ink;
-    pen.textAlign = "center";
-    const told = [
-      `${quality.struck} of ${quality.fired} dots struck, ${quality.extra} extra contacts`,
-      quality.struck ? `force ${shown(quality.force_low, "N", 3)} to ${shown(quality.force_high, "N", 3)}` : "",
-      quality.struck ? `flight time ${shown(quality.flight_low, "s", 4)} to ${shown(quality.flight_high, "s", 4)}` : "",
-    ];
-    told.forEach((text, k) => pen.fillText(text, width / 2, 0.42 * height + 44 + 16 * k));
+    pen.translate(0, strip);
+    printed(pen, width, height - strip, studio.frames.line);
     pen.restore();
   };
-  return barsOf(body, studio, "The line as it is printed", paint, () => (studio.store.state.line.trim() ? lineTable(studio.frames.line) : dotTable(studio, { flight_time: "s", peak_force: "N" })));
+  const view = barsOf(body, studio, "The line as it is printed", paint, () => (studio.store.state.line.trim() ? lineTable(studio.frames.line) : dotTable(studio, { flight_time: "s", peak_force: "N" })));
+  const timeAt = (x) => {
+    const t = studio.frames.motion?.data.t;
+    if (!t) return null;
+    const [low, high] = studio.window ?? [t[0], t[t.length - 1]];
+    const part = (x - SIDES[0]) / (body.clientWidth - SIDES[0] - SIDES[1]);
+    return part >= 0 && part <= 1 ? low + part * (high - low) : null;
+  };
+  return { ...view, cursor: view.draw, timeAt };
+}
+
+/** The dots of a burst on the time axis of the motion: place by touch, area by force. */
+function burst(pen, width, height, { dots, quality }, motion, studio, worded) {
+  const c = colours();
+  const { t } = motion.data;
+  const [low, high] = studio.window ?? [t[0], t[t.length - 1]];
+  const [left, right] = SIDES;
+  const X = (time) => left + ((time - low) / (high - low)) * (width - left - right);
+  const first = dots.find((dot) => dot.struck);
+  const [force, flight] = [first?.peak_force ?? 1, first?.flight_time ?? 0];
+  const gaps = dots.slice(1).map((dot, k) => X(dot.fired_at) - X(dots[k].fired_at));
+  const pitch = Math.min(...gaps, 44);
+  const words = worded
+    ? [`${quality.struck} of ${quality.fired} dots struck, ${quality.extra} extra contacts`, quality.struck ? `force ${shown(quality.force_low, "N", 3)} to ${shown(quality.force_high, "N", 3)}` : "", quality.struck ? `flight time ${shown(quality.flight_low, "s", 4)} to ${shown(quality.flight_high, "s", 4)}` : ""]
+    : [];
+  const middle = 0.5 * (height - 15 * words.length);
+  const reach = Math.min(pitch, middle * 1.5);
+  pen.save();
+  pen.beginPath();
+  pen.rect(left - 4, 0, width - left - right + 8, height);
+  pen.clip();
+  pen.font = FONT;
+  pen.strokeStyle = c.faint;
+  pen.lineWidth = 1;
+  // Where dots would be if each flew as long as the first.
+  for (const dot of dots) line(pen, X(dot.fired_at + flight), middle - 0.6 * reach, X(dot.fired_at + flight), middle + 0.6 * reach);
+  line(pen, left, middle, width - right, middle);
+  // While the time is within the burst, what comes later is not printed yet.
+  const now = studio.cursor > low && studio.cursor < high ? studio.cursor : Infinity;
+  for (const dot of dots) {
+    if (!dot.struck) { cross(pen, X(dot.fired_at + flight), middle, c.lost); continue; }
+    const touched = dot.fired_at + dot.flight_time;
+    const part = Math.min(dot.peak_force / force, 1.6);
+    pen.fillStyle = c.ink;
+    pen.strokeStyle = c.muted;
+    pen.beginPath();
+    pen.arc(X(touched), middle, Math.max(0.34 * reach * Math.sqrt(part), 1.5), 0, 2 * Math.PI);
+    if (touched <= now) {
+      pen.globalAlpha = Math.min(0.25 + 0.75 * part, 1);
+      pen.fill();
+      pen.globalAlpha = 1;
+    } else pen.stroke();
+    if (dot.extra_contacts) {
+      pen.strokeStyle = c.lost;
+      pen.lineWidth = 1.5;
+      pen.beginPath();
+      pen.arc(X(touched), middle, 0.5 * reach + 2, 0, 2 * Math.PI);
+      pen.stroke();
+      pen.lineWidth = 1;
+    }
+  }
+  if (now < high) {
+    pen.strokeStyle = c.muted;
+    pen.setLineDash([2, 3]);
+    line(pen, X(now), 0, X(now), middle + 0.7 * reach);
+    pen.setLineDash([]);
+  }
+  pen.restore();
+  pen.save();
+  pen.font = FONT;
+  pen.fillStyle = c.ink;
+  pen.textAlign = "center";
+  words.forEach((text, k) => pen.fillText(text, width / 2, height - 6 - 15 * (words.length - 1 - k)));
+  pen.restore();
 }
 
 /** Draw a printed text: where dots are wanted, and how they came out. */
 function printed(pen, width, height, frame) {
   const c = colours();
+  if (frame.reason) { refusal(pen, width, height, frame.reason); return; }
   pen.save();
   pen.font = FONT;
-  pen.fillStyle = c.ink;
   pen.textAlign = "center";
-  if (frame.reason) {
-    pen.restore();
-    refusal(pen, width, height, frame.reason);
-    return;
-  }
   const { data } = frame;
+  const faults = Object.entries(frame.faults).map(([name, count]) => `${count} ${name}`).join(", ");
+  const words = [
+    `${frame.good} of ${frame.wanted} dots within limits${faults ? `: ${faults}` : ""}`,
+    ...(frame.force ? [`force ${digits(100 * frame.force[0], 3)} to ${digits(100 * frame.force[1], 3)} % of the single pulse's`, `off by ${shown(frame.placement[0], "m", 3)} to ${shown(frame.placement[1], "m", 3)} along the line`] : []),
+  ];
+  // On one line where they fit, so that the text is as large as it can be.
+  const joined = words.join("; ");
+  const lines = pen.measureText(joined).width < width - 16 ? [joined] : words.flatMap((each) => broken(pen, each, width - 16));
+  const room = height - 14 * lines.length - 10;
   const [left, right] = extent(data["wanted x"]);
   const [top, bottom] = extent(data["wanted y"]);
-  const scale = Math.min((width - 40) / (right - left + 2 * frame.wire), (height - 76) / (bottom - top + 2 * frame.wire));
+  const scale = Math.max(Math.min((width - 40) / (right - left + 2 * frame.wire), (room - 8) / (bottom - top + 2 * frame.wire)), 0);
   const X = (x) => width / 2 + (x - 0.5 * (left + right)) * scale;
-  const Y = (y) => 0.5 * (height - 52) + (y - 0.5 * (top + bottom)) * scale;
+  const Y = (y) => 0.5 * room + (y - 0.5 * (top + bottom)) * scale;
   const radius = Math.max(0.5 * frame.wire * scale, 1);
   const dot = (x, y) => { pen.beginPath(); pen.arc(X(x), Y(y), radius, 0, 2 * Math.PI); };
+  pen.fillStyle = c.ink;
   for (let k = 0; k < data.x.length; k += 1) {
     if (Number.isFinite(data.x[k])) {
       pen.globalAlpha = Math.min(Math.max(data.darkness[k], 0.05), 1);
@@ -141,12 +190,7 @@ function printed(pen, width, height, frame) {
   for (let k = 0; k < data["extra x"].length; k += 1) { dot(data["extra x"][k], data["extra y"][k]); pen.fill(); }
   pen.globalAlpha = 1;
   pen.fillStyle = c.ink;
-  const faults = Object.entries(frame.faults).map(([name, count]) => `${count} ${name}`).join(", ");
-  pen.fillText(`${frame.good} of ${frame.wanted} dots within limits${faults ? `: ${faults}` : ""}`, width / 2, height - 38);
-  if (frame.force) {
-    pen.fillText(`force ${digits(100 * frame.force[0], 3)} to ${digits(100 * frame.force[1], 3)} % of the single pulse's`, width / 2, height - 24);
-    pen.fillText(`off by ${shown(frame.placement[0], "m", 3)} to ${shown(frame.placement[1], "m", 3)} along the line`, width / 2, height - 10);
-  }
+  lines.forEach((text, k) => pen.fillText(text, width / 2, height - 8 - 14 * (lines.length - 1 - k)));
   pen.restore();
 }
 

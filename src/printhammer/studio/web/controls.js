@@ -1,15 +1,15 @@
-// The controls: one row for each constant, with unit, range, hint and reset.
+// The controls: one row for each constant, with unit, range, hint and reset, in groups that can be searched.
 import { element } from "./dom.js";
-import { digits, shown, unitOf } from "./units.js";
+import { choiceRow, sliderRow, textRow } from "./rows.js";
 import { waveformEditor } from "./waveform.js";
 
-const STEPS = 1000;
 const TITLES = { armature: "Armature and geometry", magnet: "Magnet", spring: "Spring", pack: "Pack", backstop: "Backstop", coil: "Coil" };
 
 /** Build the controls for a hammer; returns how they follow the state. */
 export function buildControls(holder, studio) {
   const rows = [];
-  holder.replaceChildren();
+  const search = element("input", { type: "search", placeholder: "search the controls", "aria-label": "search the controls", class: "search" });
+  holder.replaceChildren(search);
   const { described } = studio;
   const add = (group, options) => {
     const row = sliderRow(options, studio);
@@ -19,31 +19,38 @@ export function buildControls(holder, studio) {
 
   const drive = group(holder, "Drive", true);
   add(drive, {
-    id: "rate", name: "rate", hint: "Firings per second.", unit: "Hz", low: 50, high: 5000, log: true,
+    id: "rate", name: "rate", hint: "Firings per second; a time between them is written 1/660us.", unit: "Hz", low: 50, high: 5000, log: true,
     get: (state) => state.rate, set: (value) => ({ rate: value }), reset: () => ({ rate: 1200 }),
   });
   add(drive, {
     id: "pulses", name: "pulses", hint: "Number of firings.", unit: "1", low: 1, high: studio.limits.pulses, whole: true,
     get: (state) => state.pulses, set: (value) => ({ pulses: value }), reset: () => ({ pulses: 9 }),
   });
-  const pattern = textRow("pattern", "Which slots are fired, such as 1101; empty: all pulses.", (state) => state.pattern, (value) => (/^[01]*1[01]*$|^$/.test(value) ? { pattern: value.slice(0, studio.limits.pulses) } : null), studio);
+  const most = studio.limits.pulses;
+  const pattern = textRow({
+    name: "pattern", hint: `Which slots are fired, such as 1101, at most ${most}; empty: all pulses.`, wanted: `0 and 1, at least one 1, at most ${most} in all`,
+    get: (state) => state.pattern, set: (value) => (/^[01]*1[01]*$|^$/.test(value) && value.length <= most ? { pattern: value } : null),
+  }, studio);
   drive.append(pattern.element);
   rows.push(pattern);
   const overlap = choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio);
   drive.append(overlap.element);
   rows.push(overlap);
 
-  const line = textRow("line", "Text that is printed, nine wires high, slot by slot at this rate; empty: the dots of the burst.", (state) => state.line, (value) => ({ line: value.slice(0, studio.limits.line) }), studio);
+  const line = textRow({
+    name: "line", hint: `Text that is printed, nine wires high, slot by slot at this rate, at most ${studio.limits.line} characters; empty: the dots of the burst.`, wanted: `at most ${studio.limits.line} characters`,
+    get: (state) => state.line, set: (value) => (value.length <= studio.limits.line ? { line: value } : null),
+  }, studio);
   drive.append(line.element);
   rows.push(line);
-
-  const pulse = group(holder, "Pulse", true);
-  rows.push(waveformEditor(pulse, studio, sliderRow));
 
   if (described.combined.length) {
     const paper = group(holder, "Paper", true);
     for (const control of described.combined) add(paper, { ...control, id: control.key, name: control.key, hint: control.meaning, ...moving(control, studio) });
   }
+  const pulse = group(holder, "Pulse", true);
+  rows.push(waveformEditor(pulse, studio, sliderRow));
+
   const sections = new Map();
   for (const constant of described.constants) {
     if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, false));
@@ -65,7 +72,39 @@ export function buildControls(holder, studio) {
       get: (state) => state[end], set: (value) => ({ [end]: value }), reset: () => ({ [end]: start }),
     });
   }
+  searched(holder, search);
   return () => { for (const row of rows) row.follow(studio.store.state); };
+}
+
+/** Show only the rows in whose name, key, meaning or source all words of the search occur. */
+function searched(holder, search) {
+  const none = holder.appendChild(element("p", { class: "none", hidden: true }, "no control is called so"));
+  let open = null;
+  search.addEventListener("input", () => {
+    const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const groups = [...holder.querySelectorAll("details")];
+    open ??= groups.map((each) => each.open);
+    let left = 0;
+    groups.forEach((each, k) => {
+      const title = each.querySelector("summary").textContent.toLowerCase();
+      let count = 0;
+      for (const row of each.querySelectorAll("[data-words]")) {
+        row.hidden = !words.every((word) => row.dataset.words.includes(word) || title.includes(word));
+        count += Number(!row.hidden);
+      }
+      left += count;
+      each.hidden = words.length > 0 && count === 0;
+      each.open = words.length ? count > 0 : open[k];
+    });
+    none.hidden = left > 0;
+    if (!words.length) open = null;
+  });
+  search.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    event.stopPropagation();
+    search.value = "";
+    search.dispatchEvent(new Event("input"));
+  });
 }
 
 /** A control that moves several constants: its value is that of the first, less where that one starts. */
@@ -100,71 +139,4 @@ function group(holder, title, open) {
   const body = element("div", { class: "rows" });
   holder.append(element("details", { open }, element("summary", {}, title), body));
   return body;
-}
-
-/** A slider with a number beside it; options: id, name, hint, unit (SI), low, high, log, whole, get, set, reset. */
-function sliderRow(options, studio) {
-  const { id, name, unit, low, high, log, whole } = options;
-  const value = (part) => (log ? low * (high / low) ** part : low + part * (high - low));
-  const part = (number) => (log ? Math.log(number / low) / Math.log(high / low) : (number - low) / (high - low));
-  const round = (number) => (whole ? Math.round(number) : Number(number.toPrecision(6)));
-  const label = `control-${id.replace(/\W/g, "-")}`;
-  const slider = element("input", { type: "range", min: 0, max: STEPS, step: whole ? STEPS / (high - low) : 1, id: label, "data-key": id });
-  const box = element("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": `${name}, number`, "data-number": id });
-  const sign = element("span", { class: "unit" });
-  const reset = element("button", { type: "button", class: "reset", title: "reset", "aria-label": `reset ${name}` }, "↺");
-  let seen = "";
-  const change = (number) => {
-    const patch = options.set(round(Math.min(Math.max(number, low), high)));
-    if (patch) studio.store.set(patch, id);
-  };
-  slider.addEventListener("input", () => change(value(slider.value / STEPS)));
-  box.addEventListener("change", () => {
-    const number = Number(box.value.replace(",", ".")) / unitOf(unit).factor;
-    if (Number.isFinite(number)) change(number);
-    seen = "";
-    follow(studio.store.state);
-  });
-  reset.addEventListener("click", () => studio.store.set(options.reset(), `reset ${id}`));
-  const row = element("div", { class: "row" }, element("label", { for: label, title: options.title ?? options.hint }, name), slider, box, sign, reset);
-  hinted(row, options.hint, studio);
-
-  function follow(state) {
-    const number = options.get(state);
-    const now = `${number} ${unitOf(unit).name}`;
-    if (now === seen) return;
-    seen = now;
-    slider.value = String(Math.round(part(number) * STEPS));
-    slider.setAttribute("aria-valuetext", shown(number, unit));
-    if (document.activeElement !== box) box.value = digits(number * unitOf(unit).factor, whole ? 6 : 5);
-    sign.textContent = unitOf(unit).name;
-    sign.title = unitOf(unit).name;
-    const start = options.value ?? null;
-    row.classList.toggle("changed", start !== null && Math.abs(number - start) > 1e-9 * Math.abs(start));
-  }
-  return { element: row, follow };
-}
-
-function textRow(name, hint, get, set, studio) {
-  const box = element("input", { type: "text", id: `control-${name}`, class: "wide", spellcheck: "false", autocomplete: "off" });
-  box.addEventListener("input", () => {
-    const patch = set(box.value.trim());
-    box.setAttribute("aria-invalid", String(!patch));
-    if (patch) studio.store.set(patch, name);
-  });
-  const row = element("div", { class: "row" }, element("label", { for: box.id, title: hint }, name), box);
-  hinted(row, hint, studio);
-  return { element: row, follow: (state) => { if (document.activeElement !== box) box.value = get(state); } };
-}
-
-function choiceRow(name, hint, choices, get, set, studio) {
-  const box = element("select", { id: `control-${name}`, class: "wide" }, ...choices.map((choice) => element("option", { value: choice }, choice)));
-  box.addEventListener("change", () => studio.store.set(set(box.value)));
-  const row = element("div", { class: "row" }, element("label", { for: box.id, title: hint }, name), box);
-  hinted(row, hint, studio);
-  return { element: row, follow: (state) => { box.value = get(state); } };
-}
-
-function hinted(row, hint, studio) {
-  for (const kind of ["pointerenter", "focusin"]) row.addEventListener(kind, () => studio.hint(hint));
 }

@@ -2,7 +2,7 @@
 import uPlot from "./vendor/uPlot.js";
 import { axes, before, curve, extent, inside, key, line, MARGIN, ticks, widened } from "./axes.js";
 import { colours, FONT } from "./theme.js";
-import { digits, timeUnit, unitOf } from "./units.js";
+import { digits, shown, timeUnit, unitOf } from "./units.js";
 
 const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
@@ -29,7 +29,7 @@ export function forcesView(body, studio) {
   return curveView(body, studio, {
     label: "Forces against time",
     series: () => FORCES.map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
-    scales: (frame) => ({ x: widened(...FORCES.slice(1).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
+    scales: (frame) => ({ x: widened(...FORCES.reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
     under: () => {},
   });
 }
@@ -73,7 +73,21 @@ function places(pen, plane, box, frame) {
   pen.strokeStyle = c.drive;
   pen.lineWidth = 1;
   for (const fired of frame.fired) line(pen, plane.X(fired), box.y + box.h, plane.X(fired), box.y + box.h - 6);
+  spacing(pen, plane, box, frame.fired, c);
   pen.restore();
+}
+
+/** Write between the first two firings how far they are apart, where there is room. */
+function spacing(pen, plane, box, fired, c) {
+  if (fired.length < 2) return;
+  const [from, to] = [plane.X(fired[0]), plane.X(fired[1])];
+  const text = shown(fired[1] - fired[0], "s", 4);
+  if (to - from < pen.measureText(text).width + 12 || to > box.x + box.w || from < box.x) return;
+  pen.fillStyle = c.drive;
+  pen.textAlign = "center";
+  pen.textBaseline = "bottom";
+  pen.fillText(text, 0.5 * (from + to), box.y + box.h - 7);
+  line(pen, from + 1, box.y + box.h - 4, to - 1, box.y + box.h - 4);
 }
 
 function ghosts(pen, plane, studio) {
@@ -232,10 +246,12 @@ function splitsOf(low, high, length, space, factor) { return ticks(low * factor,
 
 function shownIn(u, si) { return si === "s" ? timeUnit(u.scales.t.max - u.scales.t.min) : unitOf(si); }
 
-/** Return the displacement of a motion at a time, between the points next to it. */
-export function displacementAt(frame, time) {
-  const { t, x } = frame.data;
+/** Return a quantity of a motion at a time, between the points next to it. */
+export function valueAt(frame, values, time) {
+  const { t } = frame.data;
   const k = Math.min(before(t, time), t.length - 2);
   const part = t[k + 1] > t[k] ? Math.min(Math.max((time - t[k]) / (t[k + 1] - t[k]), 0), 1) : 0;
-  return x[k] + part * (x[k + 1] - x[k]);
+  return values[k] + part * (values[k + 1] - values[k]);
 }
+
+export const displacementAt = (frame, time) => valueAt(frame, frame.data.x, time);

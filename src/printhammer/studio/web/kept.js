@@ -25,7 +25,7 @@ export function show(holder, { state, frames, hammer, limits, shapes, units, off
   studio.store.keep(["views"]);
   studio.parts.page.classList.add("read-only");
   studio.parts.page.querySelector(".side").inert = true;
-  studio.parts.bar.querySelector(".honesty").before(element("strong", { class: "saved" }, `read only, saved ${saved} UTC`));
+  studio.parts.bar.querySelector("h1").after(element("strong", { class: "saved" }, `read only, saved ${saved} UTC`));
   for (const part of studio.parts.bar.querySelectorAll("select:not([aria-label=units]), .undo, .redo, .open")) part.disabled = true;
 }
 

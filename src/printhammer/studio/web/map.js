@@ -1,22 +1,52 @@
 // The frequency-time map: colours of displacement, and a cursor that sets the rate.
 import { axes, line, refusal } from "./axes.js";
 import { surface } from "./pen.js";
-import { colours, FONT } from "./theme.js";
-import { shown, timeUnit } from "./units.js";
+import { colours, FONT, SMALL } from "./theme.js";
+import { digits, shown, timeUnit, unitOf } from "./units.js";
 
 // Cividis (J. R. Nunez, C. R. Anderton, R. S. Renslow, PLoS ONE 13 (2018) e0199239), every fourth colour.
 const CIVIDIS = "00224e00255400285b002b62002e6a0030700533711235701a386f213b6e273e6e2d416d32436d36466c3b496c3f4c6c434e6c47516c4b546c4f576c535a6d565c6d5a5f6e5e626e61656f656870686a716c6d726f70737273747676767979777d7c78807f788482798885788c8878908b78938e789791779b94769f9775a39a74a79d73aba072afa471b4a76fb8aa6ebcae6cc0b16ac4b468c8b866cdbb63d1bf61d5c25edac65bdec958e2cd54e7d150ebd44bf0d846f5dc41f9e03afee434";
 const CONTACT = [[253, 190, 133], [166, 54, 3]];
 const SHADES = 64;
 const GAP = 65535;
-const MARGIN = { left: 54, right: 12, top: 8, bottom: 32 };
+const MARGIN = { left: 54, right: 12, top: 26, bottom: 32 };
+const LOST = [192, 57, 43];
+const MARK = 4; // columns of the mark of a lost dot
+
+const little = (r, g, b) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
+const borderOf = ({ low, high, front }) => (front === null ? GAP : Math.round(Math.min(Math.max(((front - low) / (high - low)) * (GAP - 1), 1), GAP)));
+
+/**
+ * Return the dots that are lost in a map: for each its row and column, and of the lowest rate the number of the first.
+ * A touch that is shorter than a column of the map is not seen here.
+ */
+export function lostDots(frame) {
+  const [rows, columns] = frame.data.codes.shape;
+  const { codes } = frame.data;
+  const border = borderOf(frame);
+  const slots = frame.pattern ? [...frame.pattern].flatMap((mark, k) => (mark === "1" ? [k] : [])) : [...Array(frame.pulses).keys()];
+  const found = { list: [], first: null };
+  if (frame.front === null || frame.detail !== "full") return found;
+  for (let row = 0; row < rows; row += 1) {
+    const rate = frame.rates[0] + (row / (rows - 1)) * (frame.rates[1] - frame.rates[0]);
+    const from = row * columns;
+    if (codes[from + columns - 1] === GAP) continue;
+    slots.forEach((slot, k) => {
+      const begin = Math.ceil((slot / rate / frame.end) * (columns - 1));
+      const end = k + 1 < slots.length ? Math.ceil((slots[k + 1] / rate / frame.end) * (columns - 1)) : columns;
+      for (let at = Math.max(begin, 1); at < end; at += 1) if (codes[from + at] >= border && codes[from + at - 1] < border) return;
+      found.list.push([row, begin, k]);
+      found.first ??= { rate, dot: k + 1 };
+    });
+  }
+  return found;
+}
 
 /** Return 65536 colours: cividis from backstop to pack, orange to brown inside the pack, grey where unknown. */
 function palette(low, high, front, dark) {
   const table = new Uint32Array(65536);
-  const border = front === null ? GAP : Math.round(Math.min(Math.max(((front - low) / (high - low)) * (GAP - 1), 1), GAP));
+  const border = borderOf({ low, high, front });
   const stops = CIVIDIS.length / 6;
-  const little = (r, g, b) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
   // It is made anew for every place of the pack: a stretch of codes at a time, not a code.
   for (let at = 0; at < stops; at += 1) {
     const colour = parseInt(CIVIDIS.slice(6 * at, 6 * at + 6), 16);
@@ -37,6 +67,7 @@ export function mapView(body, studio) {
   let colourOf = null;
   let colourKey = "";
   let plane = null;
+  let lost = { list: [], first: null };
 
   function render(frame) {
     const [rows, columns] = frame.data.codes.shape;
@@ -51,6 +82,8 @@ export function mapView(body, studio) {
       const [from, to] = [row * columns, (rows - 1 - row) * columns];
       for (let k = 0; k < columns; k += 1) out[to + k] = colourOf[codes[from + k]];
     }
+    lost = lostDots(frame);
+    for (const [row, column] of lost.list) out.fill(little(...LOST), (rows - 1 - row) * columns + column, (rows - 1 - row) * columns + Math.min(column + MARK, columns));
     image.getContext("2d").putImageData(pixels, 0, 0);
   }
 
@@ -65,6 +98,7 @@ export function mapView(body, studio) {
     const y = { low: frame.rates[0], high: frame.rates[1], label: "firing rate, Hz", factor: 1 };
     plane = axes(pen, width, height, x, y, MARGIN);
     const { box } = plane;
+    scale(pen, box, frame, c);
     pen.imageSmoothingEnabled = false;
     pen.drawImage(image, box.x, box.y, box.w, box.h);
     pen.save();
@@ -91,6 +125,39 @@ export function mapView(body, studio) {
     pen.restore();
   }
 
+  /** The scale of colours above the map: backstop, front of the pack and platen, or what there is. */
+  function scale(pen, box, frame, c) {
+    const [wide, border] = [Math.floor(box.w), frame.front === null ? null : borderOf(frame) / (GAP - 1)];
+    const [top, thick] = [15, 7];
+    for (let k = 0; k < wide; k += 2) {
+      const colour = colourOf[Math.round((k / wide) * (GAP - 1))];
+      pen.fillStyle = `rgb(${colour & 255},${(colour >> 8) & 255},${(colour >> 16) & 255})`;
+      pen.fillRect(box.x + k, top, Math.min(2, wide - k), thick);
+    }
+    pen.save();
+    pen.font = SMALL;
+    pen.fillStyle = c.muted;
+    pen.textBaseline = "bottom";
+    const unit = unitOf("m");
+    const write = (align, x, text) => { pen.textAlign = align; pen.fillText(text, x, top - 1); };
+    write("left", box.x, digits(frame.low * unit.factor, 3));
+    write("right", box.x + box.w, shown(frame.high, "m", 3));
+    if (border !== null && border > 0.2 && border < 0.75) write("center", box.x + border * box.w, `pack ${digits(frame.front * unit.factor, 3)}`);
+    if (lost.list.length) {
+      pen.textBaseline = "middle";
+      pen.fillStyle = c.panel;
+      pen.globalAlpha = 0.85;
+      pen.fillRect(box.x + box.w - 62, box.y + 2, 60, 13);
+      pen.globalAlpha = 1;
+      pen.fillStyle = `rgb(${LOST})`;
+      pen.fillRect(box.x + box.w - 58, box.y + 6, 8, 4);
+      pen.fillStyle = c.ink;
+      pen.textAlign = "right";
+      pen.fillText("lost dot", box.x + box.w - 6, box.y + 8.5);
+    }
+    pen.restore();
+  }
+
   /** Tell how many rates are grey from somewhere on, and why. */
   function failures(pen, box, c, { failed, data: { codes } }) {
     const text = `${failed} of ${codes.shape[0]} runs failed: grey from there`;
@@ -110,7 +177,7 @@ export function mapView(body, studio) {
   canvas.setAttribute("aria-label", "Frequency-time map: firing rate");
   canvas.setAttribute("aria-orientation", "vertical");
   const tip = body.appendChild(document.createElement("div"));
-  tip.className = "tip";
+  tip.className = "tip pointed";
 
   const choose = (event) => {
     if (!plane) return;
@@ -139,12 +206,22 @@ export function mapView(body, studio) {
     const bounds = canvas.getBoundingClientRect();
     if (!frame || !plane) return;
     const [time, rate] = [plane.x(event.clientX - bounds.left), plane.y(event.clientY - bounds.top)];
+    const x = valueAt(time, rate);
+    tip.textContent = x === null ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
+  }
+
+  /** Return the displacement at a time and a rate, m, or null where the map does not know it. */
+  function valueAt(time, rate) {
+    const frame = studio.frames.map;
+    if (!frame || frame.reason) return null;
     const [rows, columns] = frame.data.codes.shape;
     const row = Math.round(((rate - frame.rates[0]) / (frame.rates[1] - frame.rates[0])) * (rows - 1));
-    const column = Math.round((time / frame.end) * (columns - 1));
-    const code = row >= 0 && row < rows && column >= 0 && column < columns ? frame.data.codes[row * columns + column] : GAP;
-    const x = frame.low + (code / (GAP - 1)) * (frame.high - frame.low);
-    tip.textContent = code === GAP ? "" : `${shown(rate, "Hz")}, ${shown(time, "s")}: ${shown(x, "m")}`;
+    const place = (time / frame.end) * (columns - 1);
+    const column = Math.min(Math.floor(place), columns - 2);
+    if (row < 0 || row >= rows || place < 0 || place > columns - 1) return null;
+    const [from, to] = frame.data.codes.subarray(row * columns + column, row * columns + column + 2);
+    if (from === GAP || to === GAP) return null;
+    return frame.low + ((from + (place - column) * (to - from)) / (GAP - 1)) * (frame.high - frame.low);
   }
 
   let told = null;
@@ -166,6 +243,9 @@ export function mapView(body, studio) {
     draw: () => { if (studio.frames.map && !studio.frames.map.reason) render(studio.frames.map); refresh(); },
     cursor: area.draw,
     paint,
+    lost: () => lost,
+    valueAt,
+    timeAt: (x) => (plane && x >= plane.box.x && x <= plane.box.x + plane.box.w ? plane.x(x) : null),
     table: () => {
       const frame = studio.frames.map;
       if (!frame || frame.reason) return null;

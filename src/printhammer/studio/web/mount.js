@@ -11,12 +11,11 @@ import { marksFor } from "./marks.js";
 import { layout } from "./panels.js";
 import { loopsView, phaseView, strobeView } from "./planes.js";
 import { sketchView } from "./sketch.js";
-import { fromText, START, Store, toText, VIEWS } from "./state.js";
+import { bare, fromText, pinsOf, START, Store, toText, VIEWS } from "./state.js";
 import { readColours } from "./theme.js";
 import { setSystem, setUnits } from "./units.js";
 
 const MAKERS = { motion: motionView, sketch: sketchView, map: mapView, forces: forcesView, phase: phaseView, strobe: strobeView, loops: loopsView, energy: energyView, line: lineView };
-const MOST_GHOSTS = 4;
 const LARGEST_TABLE = 50e6; // bytes of a measured table
 const SHOWN = ["motion", "dots", "map", "strobe", "line"]; // frames that views are drawn from
 const DROPPED = "dropped ";
@@ -35,6 +34,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   let follow = () => {};
   let writing = 0;
   let begun = false;
+  let before = null;
   const asked = new Map();
   const dropped = new Map(); // names by the texts of hammers that were dropped
 
@@ -53,7 +53,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     studio.busy = true;
     studio.stale = false;
     const now = studio.changedAt ?? performance.now();
-    studio.sentAt.set(message("state", { state: studio.store.state }), now);
+    studio.sentAt.set(message("state", { state: bare(studio.store.state) }), now);
     studio.changedAt = null;
     marks.sent();
     for (const serial of studio.sentAt.keys()) if (serial < studio.serial - 64) studio.sentAt.delete(serial);
@@ -138,13 +138,6 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     channel.port2.postMessage(0);
   }
 
-  studio.pin = () => {
-    if (!studio.frames.motion) return;
-    studio.ghosts = [...studio.ghosts, { motion: studio.frames.motion, state: studio.store.state }].slice(-MOST_GHOSTS);
-    studio.say(`pinned, ${studio.ghosts.length} of ${MOST_GHOSTS}`);
-    redrawAll();
-  };
-  studio.unpin = () => { studio.ghosts = []; studio.overlay = null; redrawAll(); studio.say("pins taken away"); };
   const redrawAll = () => { for (const name of studio.store.state.views) studio.views[name]?.draw(); };
   studio.units = (system) => { setSystem(system); follow(); redrawAll(); };
   studio.theme = () => { readColours(element.querySelector(".studio")); redrawAll(); follow(); };
@@ -190,7 +183,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     if (begun && text === toText(studio.store.state)) return;
     if (text.length > LONGEST) { studio.say(`the link has ${text.length} characters, expected at most ${LONGEST}`, true); text = ""; }
     const frame = await studio.ask("open", { state: fromText(text) });
-    await take(frame);
+    await take({ ...frame, state: { ...frame.state, pins: pinsOf(text) } });
   };
   studio.preset = (patch) => studio.store.set(patch);
 
@@ -235,9 +228,14 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   studio.store.listeners.add((state) => {
     const wanted = state.text || state.hammer;
     if (wanted !== studio.loaded) { load(state, false); return; }
-    if (begun) studio.notes = "";
-    studio.changedAt ??= globalThis.event?.timeStamp ?? performance.now();
-    studio.sendState();
+    // Pins are the page's own.
+    const same = Boolean(before) && Object.keys(state).every((key) => key === "pins" || state[key] === before[key]);
+    before = state;
+    if (!same) {
+      if (begun) studio.notes = "";
+      studio.changedAt ??= globalThis.event?.timeStamp ?? performance.now();
+      studio.sendState();
+    }
     follow();
     for (const view of shownViews()) view.update("state");
     studio.layout.show(state.views);
@@ -278,12 +276,12 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     },
     receive: (buffer) => {
       const frame = decode(buffer);
-      if (SHOWN.includes(frame.kind)) studio.buffers[frame.kind] = buffer;
-      if (asked.has(frame.serial)) {
+      if (asked.has(frame.serial) && frame.kind !== "progress") {
         asked.get(frame.serial)(frame);
         asked.delete(frame.serial);
         return;
       }
+      if (SHOWN.includes(frame.kind)) studio.buffers[frame.kind] = buffer;
       if ((frame.kind === "motion" && !frame.ahead) || frame.kind === "refusal") {
         studio.busy = false;
         if (studio.stale) studio.sendState();

@@ -62,5 +62,5 @@ async function refused() {
   }
 }
 // So that the keys work from the start.
-studio.studio.parts.grid.focus();
+studio.studio.parts.grid.focus({ preventScroll: true });
 connect();

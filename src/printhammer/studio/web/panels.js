@@ -1,10 +1,18 @@
 // The page: a bar, the controls, the views in a grid, and a line for hints.
+import { captionOf, pictureText } from "./captions.js";
 import { element as make } from "./dom.js";
 import { copy, csvOf, pngOf, save, savePage, svgOf } from "./exports.js";
+import { findRow } from "./finds.js";
 import { HELP } from "./keys.js";
-import { VIEWS } from "./state.js";
+import { pinRow } from "./pins.js";
+import { readoutOf } from "./readout.js";
+import { bare, DEEPEST, VIEWS } from "./state.js";
+import { storyRow } from "./stories.js";
+import { tourOf } from "./tour.js";
 
-const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Force-displacement loops", energy: "Energy per dot", line: "Printed line" };
+const TITLES = { motion: "Motion", sketch: "Actuator", map: "Frequency-time map", forces: "Forces", phase: "Phase plane", strobe: "Strobe", loops: "Loops of force", energy: "Energy per dot", line: "Printed line" };
+/** The views of the opening, the large ones. */
+const OPENING = ["sketch", "motion", "line"];
 const PRESETS = {
   "single pulse": { pulses: 1, pattern: "" }, "two pulses": { pulses: 2, pattern: "", rate: 1000 }, "burst of nine": { pulses: 9, pattern: "", rate: 1200 },
   "fast burst": { pulses: 9, pattern: "", rate: 1800 }, "letters": { pattern: "1101011100101", rate: 1200 }, "long train": { pulses: 40, pattern: "", rate: 1000 },
@@ -20,7 +28,7 @@ export function layout(studio, makers) {
   const dialog = make("dialog", { "aria-label": "text" });
   const file = make("input", { type: "file", hidden: true, accept: ".toml,.csv,.txt,.tsv,.json", onchange: () => { for (const each of file.files) studio.drop(each); file.value = ""; } });
   const text = async (kind, action) => {
-    const frame = await studio.ask("texts", { state: studio.store.state });
+    const frame = await studio.ask("texts", { state: bare(studio.store.state) });
     if (frame.kind === "refusal") studio.say(frame.reason, true);
     else action(frame.texts[kind]);
   };
@@ -37,19 +45,45 @@ export function layout(studio, makers) {
   out.append(...Object.keys(leaving).map((name) => make("option", { value: name }, name)));
   out.addEventListener("change", () => { leaving[out.value]?.(); out.value = ""; });
 
+  const undo = button("undo", "Undo (Ctrl+Z)", () => studio.undo(), { class: "undo" });
+  const redo = button("redo", "Redo (Ctrl+Shift+Z)", () => studio.redo(), { class: "redo" });
+  studio.undo = () => { if (studio.store.past.length) studio.store.undo(); else studio.say(`nothing to undo; the last ${DEEPEST} steps are kept`); };
+  studio.redo = () => { if (studio.store.future.length) studio.store.redo(); else studio.say("nothing to redo"); };
+  /** Tell how far back and forth it goes. */
+  const limits = () => {
+    for (const [each, list, text] of [[undo, studio.store.past, "Undo (Ctrl+Z)"], [redo, studio.store.future, "Redo (Ctrl+Shift+Z)"]]) {
+      each.setAttribute("aria-disabled", String(!list.length));
+      each.title = list.length ? `${text}: ${list.length} step${list.length === 1 ? "" : "s"}` : `${text}: nothing`;
+    }
+  };
+  studio.store.listeners.add(limits);
+
   const controls = make("div", { class: "controls" });
   const hint = make("div", { class: "hint", "aria-live": "polite" });
   const status = make("div", { class: "status", role: "status" });
   const grid = make("main", { class: "grid", tabindex: -1 });
   const chooser = make("div", { class: "chooser", role: "group", "aria-label": "views" });
   const bar = make("header", { class: "bar" },
-    make("h1", {}, "printhammer studio"), hammers, honesty, presets, button("undo", "Undo (Ctrl+Z)", () => studio.store.undo(), { class: "undo" }), button("redo", "Redo (Ctrl+Shift+Z)", () => studio.store.redo(), { class: "redo" }),
-    button("pin", "Pin this run as a ghost (P)", studio.pin, { class: "pin" }), button("unpin", "unpin: take all pins away (U)", studio.unpin),
+    make("h1", {}, "printhammer studio"), hammers, presets, undo, redo,
+    button("pin", "Pin this run, to compare others with it (P)", () => studio.pin(), { class: "pin" }), button("unpin", "unpin: take all pins away (U)", () => studio.unpin()),
     out, button("open", "Open a hammer file or a measured CSV", () => file.click()), make("span", { class: "space" }), chooser, units,
     button("◐", "Light or dark (T)", () => studio.toggleTheme(), { class: "theme" }), button("?", "Keys (?)", () => studio.help(), { class: "help" }), file);
-  const page = make("div", { class: "studio" }, bar, make("aside", { class: "side", "aria-label": "controls" }, controls, hint), grid, status, dialog);
+  const sheet = make("button", { type: "button", class: "sheet", "aria-expanded": "false", onclick: () => sheet.setAttribute("aria-expanded", String(side.classList.toggle("open"))) }, "Controls");
+  const side = make("aside", { class: "side", "aria-label": "controls" }, sheet, honesty, controls, hint);
+  const stories = storyRow(studio);
+  const tour = tourOf(studio, stories);
+  const strip = make("nav", { class: "strip", "aria-label": "stories from the paper" }, make("span", { class: "what" }, "From the paper"), ...stories.buttons, make("button", { type: "button", class: "story tour", onclick: tour.begin }, "Tour, two minutes"), make("span", { class: "space" }), findRow(studio));
+  const stage = make("div", { class: "stage" }, stories.note, tour.element, pinRow(studio), grid);
+  const page = make("div", { class: "studio" }, bar, strip, side, stage, status, dialog);
+  studio.element.classList.add("studio-place");
   studio.element.replaceChildren(page);
+  onRatio(() => studio.theme());
+  matchMedia("(forced-colors: active)").addEventListener("change", () => studio.theme());
 
+  studio.search = () => {
+    side.classList.add("open");
+    controls.querySelector(".search")?.focus();
+  };
   studio.toggleTheme = () => {
     const dark = getComputedStyle(page).getPropertyValue("--dark").trim() === "1";
     page.dataset.theme = dark ? "light" : "dark";
@@ -61,14 +95,18 @@ export function layout(studio, makers) {
   };
 
   const panels = {};
+  const captions = {};
+  const opening = grid.appendChild(make("div", { class: "opening" }));
+  // From above to below: what moves, its curve, what it prints.
   for (const name of VIEWS) {
     const body = make("div", { class: "body" });
-    const leave = make("select", { class: "leave", "aria-label": `save ${TITLES[name]}` }, ...["save …", "PNG", "SVG", "CSV"].map((kind, k) => make("option", { value: k ? kind : "" }, kind)));
+    const caption = captions[name] = make("p", { class: "caption", id: `caption-${name}` });
+    const leave = make("select", { class: "leave", "aria-label": `save ${TITLES[name]}` }, ...["save", "PNG", "SVG", "CSV"].map((kind, k) => make("option", { value: k ? kind : "" }, kind)));
     const panel = make("section", { class: `panel view-${name}`, "aria-label": TITLES[name], hidden: true },
-      make("h2", {}, make("span", {}, TITLES[name]), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), body);
-    grid.append(panel);
+      make("h2", {}, make("span", {}, TITLES[name]), leave, button("⤢", `Enlarge ${TITLES[name]}`, () => enlarge(name), { class: "enlarge" })), caption, body);
+    (OPENING.includes(name) ? opening : grid).append(panel);
     panels[name] = panel;
-    studio.views[name] = makers[name](body, studio);
+    studio.views[name] = withReadout(name, makers[name](body, studio), body, studio);
     leave.addEventListener("change", () => { leaveView(name, leave.value, body); leave.value = ""; });
     chooser.append(make("button", { type: "button", "aria-pressed": "false", title: TITLES[name], "aria-label": `${VIEWS.indexOf(name) + 1} ${TITLES[name]}`, "data-view": name, onclick: () => toggle(name) }, String(VIEWS.indexOf(name) + 1)));
   }
@@ -105,14 +143,56 @@ export function layout(studio, makers) {
       if (kind === "drop") for (const each of event.dataTransfer.files) studio.drop(each);
     });
   }
+  let telling = 0;
+  /** Say anew what the views tell, once they are drawn; for those who do not see the pictures too. */
+  const tell = () => {
+    telling ||= setTimeout(() => {
+      telling = 0;
+      for (const name of studio.store.state.views) {
+        const [text, whole] = [captionOf(name, studio), pictureText(name, studio)];
+        if (captions[name].textContent !== text) captions[name].textContent = text;
+        const picture = panels[name].querySelector('[role="img"]');
+        if (picture) picture.setAttribute("aria-label", `${TITLES[name]}: ${whole}`);
+        else panels[name].querySelector("canvas").setAttribute("aria-description", whole);
+      }
+    }, 60);
+  };
+  studio.element.addEventListener("painted", tell);
   let shown = "";
   const show = (views) => {
     if (views.join() === shown) return;
     shown = views.join();
     for (const [name, panel] of Object.entries(panels)) panel.hidden = !views.includes(name);
     for (const each of chooser.children) each.setAttribute("aria-pressed", String(views.includes(each.dataset.view)));
+    const others = views.filter((view) => !OPENING.includes(view)).length;
+    const whole = others > 0 && views.length - others === OPENING.length;
+    grid.classList.toggle("with-opening", whole);
+    grid.style.setProperty("--rows", String(Math.ceil(others / 2)));
+    grid.style.setProperty("--beside", String(Math.min(others, 2)));
     grid.dataset.count = String(views.length);
     keepFocus();
   };
   return { page, bar, controls, hint, status, grid, dialog, hammers, honesty, layout: { show, enlarge } };
+}
+
+/** Return a view that tells below its picture what is there at the time of the cursor. */
+function withReadout(name, view, body, studio) {
+  const tip = body.appendChild(make("div", { class: "tip readout" }));
+  const read = () => {
+    const text = readoutOf(name, studio, body.clientWidth > 440);
+    if (tip.textContent !== text) tip.textContent = text;
+  };
+  if (view.timeAt) {
+    body.addEventListener("pointermove", (event) => {
+      const bounds = body.querySelector("canvas").getBoundingClientRect();
+      const time = view.timeAt(event.clientX - bounds.left, event.clientY - bounds.top);
+      if (time !== null) studio.setCursor(time);
+    });
+  }
+  return { ...view, cursor: () => { view.cursor(); read(); }, update: (what) => { view.update(what); read(); } };
+}
+
+/** Do something whenever the screen has another pixel ratio, as on another monitor. */
+function onRatio(action) {
+  matchMedia(`(resolution: ${globalThis.devicePixelRatio || 1}dppx)`).addEventListener("change", () => { action(); onRatio(action); }, { once: true });
 }

@@ -87,6 +87,9 @@ export function surface(element, paint, label) {
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
       canvas.width = Math.round(width * ratio);
       canvas.height = Math.round(height * ratio);
+      // As large as it is drawn, also where the element ends between two pixels.
+      canvas.style.width = `${width}px`;
+      canvas.style.height = `${height}px`;
     }
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);

@@ -1,14 +1,29 @@
 // Phase plane, force-displacement loops and strobe section.
-import { axes, before, curve, dots, extent, inside, key, refusal, widened } from "./axes.js";
+import { axes, before, broken, curve, dots, extent, inside, key, refusal, widened } from "./axes.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { digits, unitOf } from "./units.js";
 
 const SETTLING = 100; // firings in which a train settles, drawn apart
 
-function planeView(body, studio, label, kinds, paint, table) {
+const NEAR = 40; // pixels from the pointer to a curve that is meant
+
+/** A view of a plane; `points` are the places on the pixels of a motion, by which the pointer sets the time. */
+function planeView(body, studio, label, kinds, paint, table, points = null) {
   const area = surface(body, paint, label);
+  const timeAt = (x, y) => {
+    const [t, places] = [studio.frames.motion?.data.t, points?.()];
+    if (!t || !places) return null;
+    let [best, least] = [null, NEAR];
+    for (let k = 0; k < t.length; k += 1) {
+      const [X, Y] = places(k);
+      const away = Math.hypot(X - x, Y - y);
+      if (away < least) [best, least] = [t[k], away];
+    }
+    return best;
+  };
   return {
+    ...(points ? { timeAt } : {}),
     update: (what) => kinds.includes(what) && area.draw(),
     draw: area.draw,
     cursor: kinds.includes("motion") ? area.draw : () => {},
@@ -29,12 +44,14 @@ function velocityAxis(low, high) {
 
 /** Velocity against displacement, with the states at the firings. */
 export function phaseView(body, studio) {
+  let where = null;
   return planeView(body, studio, "Phase plane with the states at the firings", ["motion"], (pen, width, height) => {
     const frame = studio.frames.motion;
     if (!frame) return;
     const c = colours();
     const { x, v, t } = frame.data;
     const plane = axes(pen, width, height, displacementAxis(...widened(...extent(x))), velocityAxis(...widened(...extent(v))));
+    where = (k) => [plane.X(x[k]), plane.Y(v[k])];
     inside(pen, plane);
     pen.lineWidth = 1.1;
     for (const ghost of studio.ghosts) {
@@ -55,12 +72,13 @@ export function phaseView(body, studio) {
   }, () => {
     const frame = studio.frames.motion;
     return frame && { "time [s]": frame.data.t, "displacement [m]": frame.data.x, "velocity [m/s]": frame.data.v };
-  });
+  }, () => where);
 }
 
 /** Force of pack and backstop against displacement, while they are touched. */
 export function loopsView(body, studio) {
   const stop = (frame) => frame.data["F backstop"].map((force, k) => force + frame.data["F damping"][k]);
+  let where = null;
   return planeView(body, studio, "Force-displacement loops of pack and backstop", ["motion"], (pen, width, height) => {
     const frame = studio.frames.motion;
     if (!frame) return;
@@ -72,6 +90,7 @@ export function loopsView(body, studio) {
     const [low, high] = widened(...extent(backstop, ...extent(pack, 0, 1e-9)));
     const { front, backstop: place } = frame.places;
     const plane = axes(pen, width, height, displacementAxis(...widened(...extent(x))), { low, high, label: `force, ${unit.name}`, factor: unit.factor });
+    where = (k) => [plane.X(x[k]), plane.Y(Math.max(pack[k], backstop[k]))];
     inside(pen, plane);
     pen.lineWidth = 1.2;
     for (const ghost of studio.ghosts) {
@@ -94,7 +113,7 @@ export function loopsView(body, studio) {
   }, () => {
     const frame = studio.frames.motion;
     return frame && { "displacement [m]": frame.data.x, "pack force [N]": frame.data["F pack"], "backstop force [N]": stop(frame) };
-  });
+  }, () => where);
 }
 
 /** The states at the firings of an endless train, with the verdict. */
@@ -111,7 +130,10 @@ export function strobeView(body, studio) {
     const around = ([low, high], least) => (high - low < least ? [0.5 * (low + high - least), 0.5 * (low + high + least)] : [low, high]);
     const spread = studio.frames.motion ? [extent(studio.frames.motion.data.x), extent(studio.frames.motion.data.v)] : [[0, 1e-4], [0, 1]];
     const [xe, ve] = [around(extent(xs), 0.3 * (spread[0][1] - spread[0][0])), around(extent(vs), 0.3 * (spread[1][1] - spread[1][0]))];
-    const margin = { left: 46, right: 10, top: 22, bottom: 32 };
+    pen.font = FONT;
+    const told = strobeText(frame);
+    const lines = broken(pen, told, width - 12);
+    const margin = { left: 46, right: 10, top: 8 + 14 * lines.length, bottom: 32 };
     const plane = axes(pen, width, height, displacementAxis(...widened(...xe)), velocityAxis(...widened(...ve)), margin);
     inside(pen, plane);
     const settled = Math.min(SETTLING, xs.length);
@@ -126,8 +148,6 @@ export function strobeView(body, studio) {
     pen.fillStyle = c.ink;
     pen.textAlign = "left";
     pen.textBaseline = "top";
-    const told = strobeText(frame);
-    const lines = pen.measureText(told).width < width - 12 ? [told] : told.split(/, (?=exponent)/);
     lines.forEach((text, k) => pen.fillText(text, 6, 5 + 14 * k));
     pen.restore();
   }, () => {

@@ -1,6 +1,6 @@
 // The actuator to scale along its stroke, with the armature moving: play, slow motion, scrub.
 import { line } from "./axes.js";
-import { displacementAt } from "./curves.js";
+import { displacementAt, valueAt } from "./curves.js";
 import { surface } from "./pen.js";
 import { colours, FONT } from "./theme.js";
 import { shown, unitOf } from "./units.js";
@@ -26,10 +26,32 @@ export function sketchView(body, studio) {
     const [low, high] = span();
     const next = studio.cursor + ((now - last) / 1000) * Number(speed.value);
     last = now;
+    if (next > high && once) {
+      toggle();
+      studio.setCursor(low);
+      return;
+    }
     studio.setCursor(next > high || next < low ? low : next);
     timer = requestAnimationFrame(step);
   }
+  // It plays once through as soon as there is something to see, unless motion is not wanted, or until something is done.
+  let [opening, once] = [!matchMedia("(prefers-reduced-motion: reduce)").matches, false];
+  const HALTS = ["pointerdown", "keydown", "wheel"];
+  function begin() {
+    opening = false;
+    toggle();
+    once = true;
+  }
+  function halt(event) {
+    // The key and the button of the play itself do that.
+    if (event.key === " " || event.target === play) return;
+    for (const kind of HALTS) removeEventListener(kind, halt, true);
+    opening = false;
+    if (once && timer) toggle();
+  }
+  if (opening) for (const kind of HALTS) addEventListener(kind, halt, { capture: true, passive: true });
   function toggle() {
+    once = false;
     if (timer) {
       cancelAnimationFrame(timer);
       timer = 0;
@@ -58,9 +80,12 @@ export function sketchView(body, studio) {
     const way = high - low || 1e-4;
     const [left, right] = [0.34 * width, 0.9 * width];
     const X = (x) => left + ((x - low) / way) * (right - left);
-    const [middle, tall] = [0.5 * height, Math.min(0.22 * height, 70)];
+    // Between the readings above and the ruler below there is room for the platen and its name.
+    const [top, bottom] = [20, height - 34];
+    const middle = 0.5 * (top + bottom);
+    const tall = Math.min(Math.max((0.5 * (bottom - top) - 15) / 1.3, 8), 90);
     const x = displacementAt(frame, studio.cursor);
-    const driven = frame.data.drive[Math.min(Math.round((studio.cursor / (frame.data.t.at(-1) || 1)) * frame.data.t.length), frame.data.t.length - 1)];
+    const driven = valueAt(frame, frame.data.drive, studio.cursor);
     // What is left of an exponential decay is told as nothing.
     const current = Math.abs(driven) < 1e-4 * (frame.peak || 1) ? 0 : driven;
     pen.save();
@@ -100,7 +125,12 @@ export function sketchView(body, studio) {
     area.draw();
   }
   return {
-    update: (what) => what === "motion" && cursor(), draw: area.draw, cursor, paint, toggle,
+    update: (what) => {
+      if (what !== "motion") return;
+      cursor();
+      if (opening) begin();
+    },
+    draw: area.draw, cursor, paint, toggle,
     table: () => studio.frames.motion && { "time [s]": studio.frames.motion.data.t, "displacement [m]": studio.frames.motion.data.x },
   };
 }

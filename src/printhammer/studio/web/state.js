@@ -4,7 +4,9 @@ export const VIEWS = ["motion", "sketch", "map", "forces", "phase", "strobe", "l
 const NUMBERS = ["rate", "pulses", "low", "high"];
 const TEXTS = ["hammer", "text", "pattern", "overlap", "line"];
 const JOINED = 700; // ms within which changes of one control are one step of the history
-const DEEPEST = 200;
+export const DEEPEST = 200; // steps of the history
+
+export const MOST_PINS = 4;
 
 export const START = Object.freeze({
   hammer: "", text: "", constants: {}, waveform: null, rate: 1200, pulses: 9, pattern: "", overlap: "add",
@@ -39,6 +41,12 @@ export class Store {
     this.tell();
   }
 
+  /** Change what is no step of the history, such as pins. */
+  amend(patch) {
+    this.state = Object.freeze({ ...this.state, ...patch });
+    this.tell();
+  }
+
   /** Begin with a state, without a past. */
   begin(state) {
     this.past = [];
@@ -53,7 +61,8 @@ export class Store {
   step(from, to) {
     if (!from.length) return;
     to.push(this.state);
-    this.state = from.pop();
+    const { pins } = this.state;
+    this.state = Object.freeze({ ...from.pop(), ...(pins ? { pins } : {}) });
     this.last = { control: null, at: 0 };
     this.tell();
   }
@@ -67,8 +76,21 @@ export function toText(state) {
   for (const name of [...TEXTS, ...NUMBERS]) if (state[name] !== START[name]) found.set(name, state[name]);
   for (const [key, value] of Object.entries(state.constants)) found.set(key, value);
   if (state.waveform) found.set("waveform", JSON.stringify(state.waveform));
+  if (state.pins?.length) found.set("pins", JSON.stringify(state.pins.map(({ name, state: pinned }) => ({ name, state: Object.fromEntries(Object.entries(pinned).filter(([key, value]) => JSON.stringify(value) !== JSON.stringify(START[key]))) }))));
   if (state.views.join() !== VIEWS.join()) found.set("views", state.views.join("-"));
   return found.toString();
+}
+
+/** Return a state without what only the page keeps: what the server is told. */
+export function bare({ pins: _pins, ...state }) { return state; }
+
+/** Return the pins of a text; what is none is left out. */
+export function pinsOf(text) {
+  let list = [];
+  try { list = JSON.parse(new URLSearchParams(text).get("pins") ?? "[]"); } catch { /* none */ }
+  if (!Array.isArray(list)) return [];
+  const fine = list.filter((pin) => typeof pin?.name === "string" && typeof pin.state === "object" && pin.state !== null && !Array.isArray(pin.state));
+  return fine.slice(0, MOST_PINS).map(({ name, state }) => ({ name: name.slice(0, 40), state: { ...bare(START), ...bare(state) } }));
 }
 
 /** Return what a text tells, as it stands there: the server says what of it can be taken. */
@@ -76,6 +98,7 @@ export function fromText(text) {
   const told = {};
   const constants = {};
   for (const [key, value] of new URLSearchParams(text)) {
+    if (key === "pins") continue;
     if (TEXTS.includes(key)) told[key] = value;
     else if (key === "views") told.views = value.split("-");
     else if (key === "waveform") told.waveform = parsed(value);

@@ -15,7 +15,7 @@ export function waveformEditor(group, studio, sliderRow) {
   const reset = element("button", { type: "button", class: "reset", title: "reset", "aria-label": "reset pulse" }, "↺");
   const holder = element("div", { class: "pulse" });
   const rows = element("div");
-  group.append(element("div", { class: "row" }, element("label", { for: "control-shape" }, "shape"), choice, reset), holder, rows);
+  group.append(element("div", { class: "row text choice", "data-words": "shape pulse waveform" }, element("label", { for: "control-shape" }, "shape"), choice, reset), holder, rows);
   let made = null;
   let list = [];
   let plane = null;

@@ -12,6 +12,7 @@ from printhammer.studio.frames import nothing, refusal
 from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, try_map
 from printhammer.studio.pictures.engine import dots_frame, motion_frame
 from printhammer.studio.pictures.printed import line_frame
+from printhammer.studio.pictures.questions import QUESTIONS
 from printhammer.studio.pictures.section import AT_ONCE, LATER, VERDICT_WORK, check_strobe, strobe_frame
 from printhammer.studio.work import GivenUp, Patience
 
@@ -97,9 +98,19 @@ def _section(order: Order, desk: Desk) -> None:
     desk.tell(strobe_frame(state, serial, LATER[-1], judged=True), "strobe")
 
 
+def asked(order: Order, desk: Desk) -> None:
+    """Send the answer to a question about a state."""
+    for kind in order.views:
+        try:
+            desk.tell(QUESTIONS[kind](order.state, order.serial), kind)
+        except InputError as error:
+            desk.tell(refusal(order.serial, str(error)), "refusal")
+
+
 ROLES: Final[dict[str, Callable[[Order, Any], None]]] = {
     "curves": curves,
     "map": frequency_map,
     "detail": detail,
+    "asked": asked,
 }
 """The jobs by their names."""

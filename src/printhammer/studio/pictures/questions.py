@@ -1,0 +1,53 @@
+"""What the page asks about states that it does not show: pins, and rates that are searched for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.errors import InputError
+from printhammer.studio.frames import frame
+from printhammer.studio.pictures.engine import dots_frame, motion_frame
+from printhammer.studio.pictures.section import LATER, check_strobe, exponent_so_far, strobe_frame
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.studio.states.state import State
+
+SCREENED: Final = 200
+"""Firings over whose later half an exponent is taken, where many rates are looked through."""
+
+
+def curves(state: State, serial: int) -> bytes:
+    """Return the curves of the single run."""
+    return motion_frame(state, serial)[0]
+
+
+def dots(state: State, serial: int) -> bytes:
+    """Return what the firings of the single run did."""
+    return dots_frame(serial, motion_frame(state, serial)[1])
+
+
+def exponent(state: State, serial: int) -> bytes:
+    """Return the largest exponent of an endless train over some firings, or None where there is none."""
+    try:
+        check_strobe(state)
+    except InputError as error:
+        # A rate at which a train ends is no end to a search.
+        return frame("exponent", serial, exponent=None, reason=str(error))
+    return frame("exponent", serial, exponent=exponent_so_far(state, SCREENED), reason="")
+
+
+def verdict(state: State, serial: int) -> bytes:
+    """Return the strobe section of an endless train with its verdict."""
+    check_strobe(state)
+    return strobe_frame(state, serial, LATER[-1], judged=True)
+
+
+QUESTIONS: Final[dict[str, Callable[[State, int], Any]]] = {
+    "curves": curves,
+    "dots": dots,
+    "exponent": exponent,
+    "verdict": verdict,
+}
+"""Questions by their kind, `ASKED`; each raises `InputError` where the state describes no run."""

@@ -1,0 +1,174 @@
+"""Values at the cursor, findings, pins: in a browser, with the hammer of the paper."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from tests.studio.browser import Page
+from tests.studio.server import Studio, frames, say, studio
+
+import printhammer as ph
+
+STATE = "window.studio.studio.store.state"
+
+
+@pytest.fixture(scope="module")
+def paper() -> Iterator[Studio]:
+    with studio("hendriks-1983") as started:
+        yield started
+
+
+@pytest.fixture
+def opened(paper: Studio, opened_browser: Any) -> Iterator[Page]:
+    page = opened_browser()
+    page.size(1440, 900)
+    page.open(paper.address)
+    page.wait("window.studio?.studio?.frames.map?.detail === 'full' && window.studio.studio.frames.strobe")
+    page.wait("window.studio.studio.frames.dots")
+    yield page
+    assert page.complaints == []
+    page.call("Page.close")
+
+
+def readout(page: Page, view: str) -> str:
+    return page.run(f"document.querySelector('.view-{view} .readout').textContent")
+
+
+@pytest.mark.slow
+def test_every_plot_reads_at_the_same_time(opened: Page) -> None:
+    assert readout(opened, "motion") == ""
+    box = opened.box(".view-motion canvas")
+    opened.mouse("mouseMoved", box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"], held=False)
+    opened.wait("window.studio.studio.cursor > 0")
+    opened.wait("document.querySelector('.view-phase .readout').textContent")
+    time = opened.run("window.studio.studio.cursor")
+    for view in ("motion", "forces", "phase", "loops", "map", "strobe", "energy", "line"):
+        assert any(sign.isdigit() for sign in readout(opened, view)), view
+    place = readout(opened, "phase").split(" µm")[0]
+    assert place in readout(opened, "motion")
+    hammer = ph.load("hendriks-1983")
+    run = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=1200, pulses=9))
+    assert float(place) == pytest.approx(1e6 * float(run.at([time])[0][0]), abs=0.2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("view", ["phase", "loops", "map", "energy", "line", "forces"])
+def test_the_pointer_in_any_plot_sets_the_time(opened: Page, view: str) -> None:
+    selector = f".view-{view} .u-over" if view == "forces" else f".view-{view} canvas"
+    box = opened.box(selector)
+    for part in (0.3, 0.45, 0.6, 0.75):
+        for high in (0.25, 0.5, 0.8):
+            x, y = box["x"] + part * box["width"], box["y"] + high * box["height"]
+            opened.mouse("mouseMoved", x, y, held=False)
+    opened.wait("window.studio.studio.cursor > 0")
+    opened.wait("document.querySelector('.view-motion .readout').textContent")
+
+
+@pytest.mark.slow
+def test_the_rate_where_a_dot_is_lost_is_found(opened: Page) -> None:
+    """One click for the second dot; the run at that rate has lost it, just below it has not."""
+    opened.run("document.querySelector('.find-lost').click()")
+    opened.wait(f"{STATE}.rate !== 1200")
+    rate = opened.run(f"{STATE}.rate")
+    hammer = ph.load("hendriks-1983")
+
+    def struck(rate: float) -> bool:
+        return ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=rate, pulses=9)).dots[1].struck
+
+    assert 1505 < rate < 1520
+    assert not struck(rate)
+    assert struck(rate - 0.1)
+
+
+@pytest.mark.slow
+def test_the_next_strange_rate_is_found(opened: Page) -> None:
+    opened.run("window.studio.studio.store.set({ rate: 1000, low: 900, high: 1200 })")
+    opened.run("document.querySelector('.find-strange').click()")
+    opened.wait(f"{STATE}.rate !== 1000", 120)
+    rate = opened.run(f"{STATE}.rate")
+    section = "window.studio.studio.frames.strobe"
+    opened.wait(f"{section}.rate === {rate} && {section}.verdict")
+    assert opened.run("window.studio.studio.frames.strobe.verdict.verdict") == "strange"
+
+
+@pytest.mark.slow
+def test_pins_have_names_and_stay_in_the_address(opened: Page) -> None:
+    opened.run("window.studio.studio.pin()")
+    opened.run("window.studio.studio.store.set({ rate: 1500 })")
+    opened.wait("!window.studio.studio.busy")
+    opened.run("window.studio.studio.pin()")
+    opened.run("window.studio.studio.store.set({ rate: 1400 })")
+    opened.wait("window.studio.studio.ghosts.length === 2")
+    opened.run(
+        "(() => { const box = document.querySelector('.chip input'); box.value = 'as <b>built</b>';"
+        " box.dispatchEvent(new Event('change')); })()"
+    )
+    opened.wait("document.querySelector('.apart').textContent.includes('at most')")
+    opened.wait("location.hash.includes('pins')")
+    opened.call("Page.reload")
+    opened.wait("window.studio?.studio?.ghosts.length === 2")
+    names = opened.run("window.studio.studio.ghosts.map((ghost) => ghost.name)")
+    assert names == ["as <b>built</b>", "1500 Hz"]
+    fired = opened.run("window.studio.studio.ghosts.map((ghost) => ghost.motion.fired[1])")
+    assert fired == pytest.approx([1 / 1200, 1 / 1500])
+    opened.wait("document.querySelector('.apart').textContent.includes('at most')")
+    opened.run("document.querySelector('.chip button').click()")
+    opened.wait(f"{STATE}.rate === 1200")
+    assert opened.run(f"{STATE}.pins.length") == 2
+    opened.run("window.studio.studio.unpin()")
+    opened.wait("window.studio.studio.ghosts.length === 0")
+    opened.run("document.querySelector('.undo').click()")
+    opened.wait(f"{STATE}.rate === 1400")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "pins",
+    [
+        "[1]", "{", "[[]]", json.dumps([{"name": "x", "state": {"rate": 1e99}}]),
+        json.dumps([{"name": "x" * 1000, "state": {"__proto__": 1, "views": ["zzz"]}}] * 9),
+        json.dumps([{"name": "<img src=x onerror=alert(1)>", "state": {"waveform": [1]}}]),
+    ],
+)  # fmt: skip
+def test_pins_of_a_hostile_link_harm_nothing(paper: Studio, opened_browser: Any, pins: str) -> None:
+    page = opened_browser()
+    page.open("about:blank")
+    page.size(1280, 720)
+    page.run(f"window.name = {json.dumps(pins)}; 1")
+    page.open(paper.address + "#pins=" + page.run("encodeURIComponent(window.name)"))
+    page.wait("window.studio?.studio?.frames.motion")
+    page.wait("!window.studio.studio.busy")
+    page.run("window.studio.studio.store.set({ rate: 1300 })")
+    page.wait("!window.studio.studio.busy && window.studio.studio.frames.motion.fired[1] < 1 / 1290")
+    assert page.run("document.querySelectorAll('.chip').length") <= 4
+    assert page.run("window.studio.studio.ghosts.length") == 0
+    assert page.complaints == []
+    page.call("Page.close")
+
+
+def test_questions_about_other_states_are_answered_or_refused(paper: Studio) -> None:
+    with paper.connect() as socket:
+        for kind, told in (("curves", "motion"), ("dots", "dots"), ("exponent", "exponent")):
+            say(socket, kind, 7, state=paper.state(hammer="hendriks-1983"))
+            assert frames(socket, told)[-1][0]["serial"] == 7
+        say(socket, "curves", 8, state={"rate": "fast"})
+        assert "state" in frames(socket, "refusal")[-1][0]["reason"]
+        say(socket, "dots", 9, state=paper.state(hammer="hendriks-1983"))
+        frames(socket, "dots")
+
+
+@pytest.mark.slow
+def test_the_actuator_reads_the_current_of_its_time(opened: Page) -> None:
+    """Points of a curve are not evenly spaced in time."""
+    hammer = ph.load("hendriks-1983")
+    drive = ph.PulseTrain(hammer.waveform, rate=1200, pulses=9)
+    for time in (1.1e-4, 9.6e-4, 6.002e-3):
+        drawn = opened.run(
+            "(() => { const texts = []; const pen = new Proxy({}, { get: (_t, name) => name === 'fillText' ?"
+            " (text) => texts.push(text) : () => ({ width: 10 }), set: () => true });"
+            f" window.studio.studio.cursor = {time}; window.studio.studio.views.sketch.paint(pen, 500, 200);"
+            " return texts.find((text) => / A$/.test(text)); })()"
+        )
+        current = float(drive.value([time])[0])
+        assert float(drawn.split()[-2]) == pytest.approx(current, rel=0.02, abs=2e-3)
