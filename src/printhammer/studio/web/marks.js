@@ -3,7 +3,7 @@ const LATE = 250; // ms that a view may be behind before that is worth a mark
 
 const CURVES = ["motion", "sketch", "forces", "phase", "loops"];
 const OWN = ["map", "line", "strobe"];
-const ROLES = { curves: [...CURVES, "energy"], map: ["map"], detail: ["line", "strobe"] };
+const ROLES = { curves: [...CURVES, "energy"], map: ["map"], detail: ["line", "strobe"], asked: [] };
 const OF_FRAMES = { dots: ["energy"], map: ["map"], line: ["line"], strobe: ["strobe"] };
 
 /** Marks for views, each an element that `panel` finds by its name. */

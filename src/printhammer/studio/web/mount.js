@@ -90,7 +90,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   /** Tell what long work is under way, in the place of what is told else. */
   function progress({ role, what, seconds }) {
     if (what) {
-      const text = `${what}: ${Math.round(seconds)} s so far, mostly some 10 to 60 s`;
+      const text = `${what}: ${Math.round(seconds)} s so far`;
       marks.progress(role, text);
       studio.progress = { role };
       studio.parts.status.textContent = text;
