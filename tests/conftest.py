@@ -26,11 +26,24 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 # Long files, and those that compile laws of their own, begin first: the workers then end together. Two that
 # compile the same laws stand far apart, so that the second one finds the machine code.
-FIRST = """
-test_examples test_docs test_constant_flow_differences test_orbits_closed_forms test_impact_print_hammer
-test_ensemble test_backstop test_sweep test_burst test_registry test_tangent_finite_differences test_results
-test_report test_motion test_pulses test_strobe
-""".split()
+FIRST = [
+    "test_examples",
+    "test_docs",
+    "test_constant_flow_differences",
+    "test_orbits_closed_forms",
+    "test_impact_print_hammer",
+    "test_ensemble",
+    "test_backstop",
+    "test_sweep",
+    "test_burst",
+    "test_registry",
+    "test_tangent_finite_differences",
+    "test_results",
+    "test_report",
+    "test_motion",
+    "test_pulses",
+    "test_strobe",
+]
 
 
 def pytest_configure(config: pytest.Config) -> None:
