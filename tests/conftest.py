@@ -34,7 +34,6 @@ FIRST = [
     "test_orbits_closed_forms",
     "test_impact_print_hammer",
     "test_ensemble",
-    "test_backstop",
     "test_sweep",
     "test_burst",
     "test_registry",
@@ -44,6 +43,7 @@ FIRST = [
     "test_motion",
     "test_pulses",
     "test_strobe",
+    "test_backstop",
 ]
 
 
