@@ -9,6 +9,8 @@ PEERS ?= $(BIN)
 RUNTIME := $(VENV)/runtime.stamp
 TESTING := $(VENV)/test.stamp
 EVERYTHING := $(VENV)/dev.stamp
+# Each worker would compile every test file anew, and each program that a test starts every module.
+unexport PYTHONDONTWRITEBYTECODE
 CODE := src tests $(wildcard benchmarks examples docs)
 
 .DEFAULT_GOAL := help

@@ -1,6 +1,7 @@
 """Measured tables of the pages: made by scripts, shown by pages, stale when code or hammer has changed."""
 
 import ast
+import functools
 import importlib
 import re
 import runpy
@@ -49,6 +50,7 @@ def pages() -> dict[str, list[tuple[str, str]]]:
     }
 
 
+@functools.cache
 def imported(path: Path) -> set[str]:
     """Return what a file imports of the package when it runs, as paths."""
     tree = ast.parse(path.read_text("utf-8"))

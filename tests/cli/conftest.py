@@ -1,14 +1,19 @@
 import re
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import typer.main
 
 import printhammer as ph
 from printhammer.cli.main import main
 
 COMPILING = re.compile(r"^compiling |: the machine code there is for ")
+
+# Typer makes the commands of all verbs anew at every call, which takes longer than most calls here.
+_commands = cache(typer.main.get_command)
 
 
 class Outcome(NamedTuple):
@@ -18,8 +23,9 @@ class Outcome(NamedTuple):
 
 
 @pytest.fixture
-def cli(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
     """Run the command line in this process."""
+    monkeypatch.setattr(typer.main, "get_command", _commands)
 
     def call(*arguments: object) -> Outcome:
         with pytest.raises(SystemExit) as end:

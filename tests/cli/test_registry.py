@@ -36,13 +36,14 @@ NEEDED = {
     "reconstruct ship": ("a.jsonl", "b.jsonl"),
 }
 # Examples that take more than a few seconds.
-LONG = {"bifurcation", "continue", "orbits", "energy", "feedback", "tune", "sweep"}
+LONG = {"basins", "bifurcation", "continue", "orbits", "energy", "feedback", "tune", "sweep"}
 LONG |= {f"reconstruct {verb}" for verb in ("judge", "front", "predictions", "schemes", "family")}
 # Examples that are part of other tests, or take minutes.
 ELSEWHERE = {
     "paper": "takes minutes; test_paper.py writes the whole report",
     "studio": "ends with Ctrl-C only, in test_studio.py",
     "bench": "takes minutes; test_bench.py",
+    "warm": "test_warm.py runs it",
     "reconstruct search": "takes a minute; the other examples of reconstruct begin with a shorter one",
     "reconstruct base-rates": "takes minutes; test_reconstruct.py, with claims at no cost",
     "reconstruct ship": "judges all claims, which takes minutes; test_reconstruct.py, with the stated ones",

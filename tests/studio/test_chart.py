@@ -96,7 +96,7 @@ def test_descending_rates_are_refused() -> None:
 
 def test_runs_that_fail_are_soon_done() -> None:
     # So strong a current drives the armature away from where the law of the magnet holds.
-    pulse = {"shape": "half-sine", "amplitude": -90.0, "width": 4e-4}
+    pulse = {"shape": "rectangle", "amplitude": -90.0, "width": 4e-4, "rise": 1e-5, "decay": 2e-5}
     away = of(waveform=pulse)
     try_map(away, None)
     heading, data = unframe(map_frame(away, 1, (8, 16), lambda: False))

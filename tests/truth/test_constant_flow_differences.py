@@ -3,6 +3,7 @@
 Central differences of runs of tolerance 1e-13, extrapolated after Richardson, touches faster than 1 mm/s.
 """
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -113,11 +114,13 @@ def test_quantities_with_firing_times_of_their_own() -> None:
 
 
 PARTS = [
-    ("", "preload", "dashpot-pull", "elastomer", "trapezoid"),
+    ("", "preload", "dashpot-pull", "elastomer-pull", "trapezoid"),
     ("inverse-root", "linear", "power", "rigid", "single"),
     ("", "linear", "power", "hertz-no-pull", "half-sine"),
-    ("", "linear", "curve", "elastomer-pull", "sampled"),
+    ("", "linear", "curve", "elastomer", "sampled"),
 ]
+# Many touches, and laws that other slow tests have compiled: machine code is faster, even so.
+COMPILED = PARTS[0]
 
 
 @pytest.mark.slow
@@ -128,7 +131,7 @@ def test_quantities_with_other_parts(case: tuple[str, str, str, str, str], tmp_p
     hammer = hammer_of(magnet, spring, pack, backstop, tmp_path)
     drive = drive_of(magnet, name)
     state = hammers.STOP + 20e-6, 0.3
-    with interpreted():
+    with nullcontext() if case == COMPILED else interpreted():
         end = before_slow_touches(hammer, drive, 0.9e-3, state)
         compare_quantities(hammer, drive, end, state)
 

@@ -261,6 +261,7 @@ def closed_orbit(exact: Hammer, period: float, state: np.ndarray) -> tuple[np.nd
     return state, np.linalg.eigvals(slope)
 
 
+@pytest.mark.slow
 def test_an_orbit_doubles_its_period_where_the_closed_form_does(hammer: "ph.Hammer") -> None:
     branch = ph.continuation(hammer, "period", ("1.450 ms", "1.457 ms"), period="1.452 ms")
     (event,) = branch.events

@@ -62,10 +62,14 @@ def kind_of(magnet: str) -> str:
     return "current" if magnet else "force"
 
 
-@pytest.mark.parametrize(("pack", "backstop"), PAIRS, ids=lambda name: name or "none")
+# A chequerboard: each pack with half of the backstops, each backstop with half of the packs.
+QUICK = [(p, b) for p, b in PAIRS if (list(PACKS).index(p) + list(BACKSTOPS).index(b)) % 2 == 0]
+
+
+@pytest.mark.parametrize(("pack", "backstop"), QUICK, ids=lambda name: name or "none")
 def test_pairs_of_contacts(pack: str, backstop: str, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Each pack with each backstop, the other parts and the drives in turn."""
-    turn = PAIRS.index((pack, backstop))
+    """The other parts and the drives in turn; the slow product has every pair."""
+    turn = QUICK.index((pack, backstop))
     magnet = ["inverse-root", "", "table"][turn % 3]
     spring = list(SPRINGS)[turn % 2]
     hammer = hammer_of(magnet, spring, pack, backstop, tmp_path_factory.getbasetemp())
@@ -76,7 +80,7 @@ def test_pairs_of_contacts(pack: str, backstop: str, tmp_path_factory: pytest.Te
 
 def test_the_pairs_meet_every_drive() -> None:
     names = set()
-    for turn in range(len(PAIRS)):
+    for turn in range(len(QUICK)):
         kind = kind_of(["inverse-root", "", "table"][turn % 3])
         chosen = list(drives(kind))
         names.add(chosen[turn % len(chosen)])
@@ -104,10 +108,8 @@ def test_all_combinations_of_parts(
     chosen = list(drives(kind_of(magnet)).values())
     for backstop in BACKSTOPS:
         turn = ALL.index((magnet, spring, pack, backstop))
-        hammer = hammer_of(magnet, spring, pack, backstop, folder)
         with interpreted():
-            for shift in (0, 5):
-                check(hammer, chosen[(turn + shift) % len(chosen)])
+            check(hammer_of(magnet, spring, pack, backstop, folder), chosen[turn % len(chosen)])
 
 
 COMPILED = [

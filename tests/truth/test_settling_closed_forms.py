@@ -53,10 +53,10 @@ def test_one_touch_of_a_damped_backstop(damping: float) -> None:
     idle = ph.PulseTrain(Rectangle(amplitude=0.0, width=1e-6, rise=0.0, decay=0.0, quantity="force"))
     with interpreted():
         motion = ph.simulate(hammer, idle, duration=1e-3, state=(STOP + 20e-6, -v_in))
+        wear = wear_of(motion)
     z = damping / stiffness * v_in
     y = brentq(lambda y: z - math.log1p(z) + y + math.log1p(-y), 1e-12, min(z, 1.0 - 1e-12), xtol=1e-15)
     v_out = y * stiffness / damping
-    wear = wear_of(motion)
     assert wear.touches == 1
     assert wear.impulse == pytest.approx(MASS * (v_in + v_out), rel=1e-8)
     assert wear.loss == pytest.approx(0.5 * MASS * (v_in**2 - v_out**2), rel=1e-8)

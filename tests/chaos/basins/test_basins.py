@@ -247,6 +247,7 @@ def test_entropy_of_what_is_no_plane_is_refused(labels: np.ndarray, box: int, sa
         basin_entropy(labels, box=box)
 
 
+@pytest.mark.slow
 def test_near_a_doubling_no_cell_is_left_and_the_orbit_has_its_own_period() -> None:
     hammer = ph.load("hendriks-1983")
     # The multiplier is -0.990: states two firings apart agree a thousand firings before those one apart do.

@@ -14,13 +14,14 @@ from printhammer.report import build
 
 @pytest.fixture
 def quick_report(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have the verb write a report with few claims and one figure; the whole of it takes a while."""
+    """Have the verb write a report with few claims and one empty figure; the whole of it takes a while."""
     whole = report.write_report
 
     def few(hammer, out, **options):
         return whole(hammer, out, claims=["geometry", "settle_out", "print_force"], figures=[2], **options)
 
     monkeypatch.setattr(report, "write_report", few)
+    monkeypatch.setattr(PaperFigure, "draw", lambda *_arguments, **_options: Figure())
 
 
 @pytest.mark.usefixtures("quick_report")

@@ -55,7 +55,7 @@ def test_a_current_outside_a_table_is_a_status(tmp_path: Path) -> None:
     rise = Trapezoid(amplitude=8.0, rise=1e-3, width=1e-3, fall=1e-4)
     with hammers.interpreted():
         motion = ph.simulate(hammer, ph.PulseTrain(rise), duration=4e-3)
+        assert np.isfinite(motion.x).all()
     assert motion.status in {"range left", "step underflow"}
-    assert np.isfinite(motion.x).all()
     assert motion.end <= 3.5 / 8.0 * 1e-3 * (1.0 + 1e-3)
     assert motion.end >= 3.5 / 8.0 * 1e-3 * (1.0 - 2e-2)
