@@ -73,7 +73,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   };
   studio.hint = (text) => { studio.parts.hint.textContent = text; };
   studio.say = (text, bad = false) => {
-    if (studio.progress) studio.afterwards = [text, bad];
+    studio.said = [text, bad];
     if (studio.progress && !bad) return;
     studio.parts.status.textContent = text;
     studio.parts.status.title = text;
@@ -97,7 +97,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       studio.parts.status.classList.remove("bad");
     } else if (studio.progress?.role === role) {
       studio.progress = null;
-      studio.say(...(studio.afterwards ?? ["ready"]));
+      studio.say(...(studio.said ?? ["ready"]));
     }
   }
 
