@@ -21,6 +21,7 @@ from printhammer.kernel.schemes_1983 import (
 from printhammer.parts import absent
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.base import ROLES
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import PreloadSpring
@@ -38,9 +39,7 @@ SCHEMES = {"trapezoid": 2, "runge-kutta-4": 4}
 
 
 def made_of(mass: float = MASS, **parts: Any) -> SimpleNamespace:
-    return SimpleNamespace(
-        mass=mass, **{role: parts.get(role) for role in ("magnet", "spring", "pack", "backstop")}
-    )
+    return SimpleNamespace(mass=mass, **{role: parts.get(role) for role in ROLES})
 
 
 WHOLE = made_of(magnet=MAGNET, spring=SPRING, pack=PACK, backstop=STOP)

@@ -20,7 +20,9 @@ def motion() -> ph.Motion:
 def test_dataset(motion: ph.Motion) -> None:
     data = motion.to_xarray()
     np.testing.assert_array_equal(data["t"], motion.t)
-    units = {"t": "s", "x": "m", "v": "m/s", "current": "A", **{f"force_{name}": "N" for name in FORCES}}
+    assert motion.hammer.damping is None
+    forces = [name for name in FORCES if name != "drag"]
+    units = {"t": "s", "x": "m", "v": "m/s", "current": "A", **{f"force_{name}": "N" for name in forces}}
     assert {name: data[name].attrs["units"] for name in units} == units
     np.testing.assert_array_equal(data["x"], motion.x)
     np.testing.assert_array_equal(data["force_pack"], motion.force["pack"])

@@ -15,6 +15,7 @@ from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.base import ROLES
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
@@ -33,9 +34,7 @@ WAVEFORM = Rectangle(amplitude=0.9266, width=352e-6, rise=10.7e-6, decay=24.3e-6
 
 def made_of(mass: float = MASS, **parts: Any) -> SimpleNamespace:
     """A hammer of some parts, as the reference sees one."""
-    return SimpleNamespace(
-        mass=mass, **{role: parts.get(role) for role in ("magnet", "spring", "pack", "backstop")}
-    )
+    return SimpleNamespace(mass=mass, **{role: parts.get(role) for role in ROLES})
 
 
 WHOLE = made_of(magnet=MAGNET, spring=SPRING, pack=PACK, backstop=STOP)
