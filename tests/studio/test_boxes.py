@@ -251,3 +251,14 @@ def test_forces_hold_their_total(page: Page) -> None:
     assert ends[1] > 0.0
     assert min(rows) >= 8.0
     assert max(rows) <= 400.0
+
+
+@pytest.mark.slow
+def test_a_hammer_without_a_pulse_goes_back_to_the_one_it_opens_with(page: Page) -> None:
+    page.run("window.studio.studio.choose('bouncing-ball').then(() => 1)")
+    opened = page.wait(f"{STATE}.hammer === 'bouncing-ball' && {STATE}.waveform")
+    typed(page, "[data-number='waveform.amplitude']", "0.25")
+    assert page.run(f"{STATE}.waveform.amplitude") == 0.25
+    page.run("document.querySelector('[aria-label=\"reset pulse\"]').click()")
+    assert page.run(f"{STATE}.waveform") == opened
+    assert page.complaints == []

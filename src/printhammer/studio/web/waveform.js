@@ -30,7 +30,8 @@ export function waveformEditor(group, studio, sliderRow) {
     wanted.quantity = before.quantity ?? studio.quantity();
     studio.store.set({ waveform: wanted });
   });
-  reset.addEventListener("click", () => studio.store.set({ waveform: null }));
+  // A hammer without a pulse of its own goes back to the one that it opens with.
+  reset.addEventListener("click", () => studio.store.set({ waveform: studio.described.waveform ? null : studio.described.start.waveform ?? null }));
 
   const area = surface(holder, (pen, width, height) => {
     const frame = studio.frames.motion;
@@ -112,7 +113,7 @@ export function waveformEditor(group, studio, sliderRow) {
     return sliderRow({
       id: `waveform.${name}`, name, hint: `waveform.${name}: ${meaning}.`, title: meaning, unit: unit === "A" && wave.quantity === "force" ? "N" : unit,
       low: unit === "s" ? (positive ? 1e-6 : 0) : -most, high: most, value: own,
-      get: () => current()[name], set: (value) => ({ waveform: { ...current(), [name]: value } }), reset: () => ({ waveform: { ...current(), [name]: own } }),
+      get: () => current()?.[name] ?? own, set: (value) => ({ waveform: { ...current(), [name]: value } }), reset: () => ({ waveform: { ...current(), [name]: own } }),
     }, studio);
   }
   return { follow, draw: area.draw };
