@@ -96,7 +96,8 @@ def test_a_visit(page: Page, running: Studio) -> None:
     kept = state(page)
 
     # Reload from the address.
-    page.wait(f"location.hash.includes('rate={rate:g}')")
+    # The address of before the pin holds the same rate.
+    page.wait(f"location.hash.includes('rate={rate:g}') && location.hash.includes('pins=')")
     page.call("Page.reload")
     page.wait("window.studio?.studio?.frames.map?.detail === 'full'")
     assert state(page) == kept
