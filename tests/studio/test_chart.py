@@ -102,3 +102,9 @@ def test_runs_that_fail_are_soon_done() -> None:
     heading, data = unframe(map_frame(away, 1, (8, 16), lambda: False))
     assert heading["failed"] == 8
     assert (data["codes"] == GAP).any()
+
+
+def test_where_nothing_moves_there_are_codes_all_the_same() -> None:
+    x = np.array([[0.0, 0.0, np.nan]], np.float32)
+    high = float(np.nextafter(np.float32(0.0), np.float32(1.0)))
+    assert codes_of(x, 0.0, high).tolist() == [[0, 0, 65535]]

@@ -35,6 +35,7 @@ GAP: Final = 65535
 
 _RATES_OF_PIECE: Final = 64
 _TRIED: Final = 9
+_STEEPEST: Final = 1e38
 
 
 def try_map(state: State, known: State | None) -> State:
@@ -136,7 +137,9 @@ def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: O
 
 def codes_of(x: Any, low: float, high: float) -> Any:
     """Return displacements as whole numbers from 0 (low) to 65534 (high), 65535 where they are not known."""
-    scaled = (x - np.float32(low)) * np.float32((GAP - 1) / (high - low))
+    # Where nothing moves the ends are next to each other.
+    steep = np.float32(min((GAP - 1) / (high - low), _STEEPEST))
+    scaled = np.minimum(x - np.float32(low), np.float32(high - low)) * steep
     np.clip(scaled, 0.0, GAP - 1, out=scaled)
     unknown = np.isnan(scaled)
     scaled[unknown] = GAP
