@@ -8,7 +8,10 @@ they call nothing but `math`:
 ========  ===================================================================================================
 role      functions
 ========  ===================================================================================================
-magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``
+magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``; for a coil driven by a voltage also
+          ``magnet_linkage(c, x, current)``, ``magnet_emf(c, x, current)``,
+          ``magnet_inductance(c, x, current)`` and ``magnet_current(c, x, linkage, inductance)``
+coil      none: its circuit is the kernel's, `printhammer.kernel.model.circuit`
 spring    ``spring_force(c, x)``, ``spring_energy(c, x)``
 pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pack_unloading(c, x, v, q)``,
           ``pack_switch(c, x, v)``
@@ -42,6 +45,7 @@ from printhammer.parts.base import (
     PARTS,
     ROLES,
     BackstopPart,
+    CoilPart,
     DampingPart,
     MagnetPart,
     PackPart,
@@ -59,6 +63,7 @@ __all__ = [
     "PARTS",
     "ROLES",
     "BackstopPart",
+    "CoilPart",
     "DampingPart",
     "MagnetPart",
     "PackPart",
