@@ -124,7 +124,8 @@ def test_part_is_whole(part: Part) -> None:
     assert module.__doc__ is not None
     assert all(word in module.__doc__ for word in ("Source:", "Validity:", "Weakness:", "Packed constants:"))
     found = functions(module, part.role)
-    assert found
+    # The circuit of a coil is the kernel's own.
+    assert found or part.role == "coil"
     for name, function in found.items():
         assert len(inspect.signature(function).parameters) == ARGUMENTS[name]  # type: ignore[arg-type]
     for name, note in quantities(kind).items():
@@ -152,6 +153,7 @@ def test_machine_code_agrees_with_python(part: Part) -> None:
 
     c = np.array(part.packed(5e-5))
     values = {"x": 2.3e-4, "current": 0.4, "v": -0.7, "q": 2e5, "peak": 2.9e-4, "w": 3e-3, "v_in": -0.5}
+    values |= {"linkage": 3e-3, "inductance": 2e-3}
     for function in functions(import_module(part.module), part.role).values():
         names = [name for name in inspect.signature(function).parameters if name != "c"]  # type: ignore[arg-type]
         arguments = [values[name] for name in names]
