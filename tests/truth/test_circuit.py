@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from tests.circuits import Device, Phase, Run, integrate
+from tests.hammers import interpreted
 
 import printhammer as ph
 from printhammer.drive.waveforms.drivers import Bridge, Capacitor, Chopper, PeakAndHold, Rail
 from printhammer.drive.waveforms.shapes import Waveform
-from tests.circuits import Device, Phase, Run, integrate
-from tests.hammers import interpreted
 
 TIGHT = 1e-13
 R, L = 10.0, 20e-3
