@@ -138,7 +138,7 @@ def test_part_is_whole(part: Part) -> None:
     found = functions(module, part.role)
     assert found
     for name, function in found.items():
-        assert len(inspect.signature(function).parameters) == ARGUMENTS[name]
+        assert len(inspect.signature(function).parameters) == ARGUMENTS[name]  # type: ignore[arg-type]
     for name, note in quantities(kind).items():
         assert to_si(1.0, note.si, note.si) == 1.0
         assert note.meaning
@@ -177,9 +177,9 @@ def test_machine_code_agrees_with_python(part: Part) -> None:
         "v_in": -0.5,
     }
     for function in functions(import_module(part.module), part.role).values():
-        names = [name for name in inspect.signature(function).parameters if name != "c"]
+        names = [name for name in inspect.signature(function).parameters if name != "c"]  # type: ignore[arg-type]
         arguments = [values[name] for name in names]
-        compiled = compile_law(function, numba.njit)
+        compiled = compile_law(function, numba.njit)  # type: ignore[arg-type]
         assert compiled(c, *arguments) == pytest.approx(function(c, *arguments), rel=1e-14)  # type: ignore[operator]
 
 
