@@ -90,9 +90,9 @@ def fit_solenoid(path: str | Path, *, turns: float, current: float | None = None
         "solenoid",
         np.concatenate([gap, gap]),
         np.log(np.concatenate([force, linkage])),
-        (("gap", "m"), ("ln(force / N), ln(linkage / Wb)", "1")),
+        (("gap", "m"), ("logarithm", "1")),
         np.repeat([0, 1], rows),
-        ("force", "linkage"),
+        ("ln(force / N)", "ln(linkage / Wb)"),
         np.concatenate([table.lines, table.lines]),
     )
     enough(data, len(CONSTANTS) + _SPARE, "the constants of the magnetic circuit and their errors")
