@@ -50,7 +50,6 @@ DIMENSIONS: dict[str, str] = {
     "Wb": "a flux linkage",
     "H": "an inductance",
     "F": "a capacitance",
-    "Wb": "a flux linkage",
     "degC": "a temperature",
     "K": "a difference of temperatures",
     "1": "a pure number",
