@@ -3,8 +3,8 @@ The impact oscillator with damping
 ==================================
 
 S. W. Shaw and P. J. Holmes (J. Sound Vib. 90 (1983) 129) solved a mass on a spring
-with viscous damping, a sinusoidal force and a rigid stop. Its orbits with one impact in a
-period lose their stability in a doubling of the period; beyond others lies chaos.
+with viscous damping, a sinusoidal force and a rigid stop. Its orbits with one impact in
+a period lose their stability in a doubling of the period; beyond others lies chaos.
 """
 
 import math
