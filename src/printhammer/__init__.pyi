@@ -11,6 +11,7 @@ from .chaos.exponents.recurrence import recurrence as recurrence
 from .chaos.exponents.zero_one import zero_one as zero_one
 from .chaos.impacts.sections import section as section
 from .chaos.impacts.train import impact_train as impact_train
+from .chaos.orbits.manifolds import manifolds as manifolds
 from .chaos.orbits.search import orbits as orbits
 from .chaos.strobe.points import strobe as strobe
 from .control.feedback.comparison import feedback as feedback

@@ -269,7 +269,8 @@ def test_the_drag_of_a_damped_hammer_is_among_the_forces(page: Page) -> None:
     names = (
         "(() => { window.words = []; const pen = new Proxy({}, { get: (_t, name) => name === 'measureText' ?"
         " (() => ({ width: 10 })) : (...all) => { if (name === 'fillText') window.words.push(all[0]); },"
-        " set: () => true }); window.studio.studio.views.forces.paint(pen, 600, 400); return window.words; })()"
+        " set: () => true }); window.studio.studio.views.forces.paint(pen, 600, 400);"
+        " return window.words; })()"
     )
     assert "drag" not in page.run(names)
     page.run("window.studio.studio.choose('duffing-holmes').then(() => 1)")

@@ -17,6 +17,7 @@ from printhammer.chaos.exponents.zero_one import ZeroOne, zero_one
 from printhammer.chaos.impacts.sections import Section, section, sections
 from printhammer.chaos.impacts.train import ImpactTrain, impact_train
 from printhammer.chaos.orbits.collection import Orbits
+from printhammer.chaos.orbits.manifolds import Manifolds, manifolds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbit, orbits
 from printhammer.chaos.strobe.points import Strobe, strobe, strobes
@@ -33,6 +34,7 @@ __all__ = [
     "LossCurve",
     "Lyapunov",
     "LyapunovChart",
+    "Manifolds",
     "Orbit",
     "Orbits",
     "QuenchMap",
@@ -49,6 +51,7 @@ __all__ = [
     "impact_train",
     "lyapunov",
     "lyapunovs",
+    "manifolds",
     "orbit",
     "orbits",
     "quench_map",

@@ -24,6 +24,7 @@ PLOTS: Final = {
     "LeastWorkRates": "control.energy.plot_rates",
     "Lyapunov": "chaos.lyapunov.plot",
     "LyapunovChart": "chaos.lyapunov.plot_chart",
+    "Manifolds": "chaos.manifolds.plot",
     "Motion": "motion.plot",
     "Orbit": "chaos.orbits.plot_orbit",
     "Orbits": "chaos.orbits.plot",
