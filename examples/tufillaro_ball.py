@@ -4,7 +4,7 @@ A ball that doubles its period
 
 N. B. Tufillaro, T. Abbott and J. Reilly (*An Experimental Approach to Nonlinear
 Dynamics and Chaos*, 1992) let a ball bounce on the cone of a loudspeaker, at 60 Hz.
-They print the amplitudes at which its period doubles.
+Of the amplitudes at which its period doubles seven digits are quoted.
 """
 
 import math

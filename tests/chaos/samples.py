@@ -43,6 +43,10 @@ CHAOS: dict[str, Callable[[ph.Hammer], Result]] = {
     ),
     "Branch": branch,
     "Branches": lambda hammer: Branches((branch(hammer),)),
+    "CorrelationDimension": lambda _hammer: ph.correlation_dimension(np.sqrt(2.0) * np.arange(400.0) % 1.0),
+    "FiniteTime": lambda hammer: ph.finite_time(
+        ph.lyapunov(hammer, period=PERIOD, firings=20, transient=2), lengths=(1, 2)
+    ),
     "ImpactTrain": lambda hammer: ph.impact_train(ph.section(hammer, period=PERIOD, touches=12)),
     "Lyapunov": lambda hammer: ph.lyapunov(hammer, period=PERIOD, firings=20, transient=2),
     "LyapunovChart": lambda hammer: lyapunovs(hammer, [1.2e-3, PERIOD], firings=10, transient=0),

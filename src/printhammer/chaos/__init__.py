@@ -11,6 +11,8 @@ from printhammer.chaos.continuation.events import BranchEvent
 from printhammer.chaos.continuation.regimes import Branches, regimes
 from printhammer.chaos.continuation.stability_chart import LossCurve, StabilityChart, stability_chart
 from printhammer.chaos.exponents.chart import LyapunovChart, lyapunovs
+from printhammer.chaos.exponents.correlation import CorrelationDimension, correlation_dimension
+from printhammer.chaos.exponents.finite_time import FiniteTime, finite_time
 from printhammer.chaos.exponents.lyapunov import Lyapunov, lyapunov
 from printhammer.chaos.exponents.recurrence import Recurrence, recurrence
 from printhammer.chaos.exponents.zero_one import ZeroOne, zero_one
@@ -30,6 +32,8 @@ __all__ = [
     "Branch",
     "BranchEvent",
     "Branches",
+    "CorrelationDimension",
+    "FiniteTime",
     "ImpactTrain",
     "LossCurve",
     "Lyapunov",
@@ -48,6 +52,8 @@ __all__ = [
     "basins",
     "bifurcation",
     "continuation",
+    "correlation_dimension",
+    "finite_time",
     "impact_train",
     "lyapunov",
     "lyapunovs",
