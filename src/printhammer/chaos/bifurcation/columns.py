@@ -202,31 +202,29 @@ def run_in_stretches(
     positions = np.array([regime.hammer.position for regime in regimes])
     drives = [regime.train(1)[0] for regime in regimes]
     columns.status[:] = OK
-    for firing in range(firings + 1):
+    for firing in range(firings):
         ensemble = Ensemble(
-            [regimes[row].hammer for row in left],
-            [drives[row] for row in left],
+            [regimes[int(row)].hammer for row in left],
+            [drives[int(row)] for row in left],
             2.0 * periods[left],
             states=now,
             tolerance=tolerance,
         )
         marks = np.column_stack([phases[left] * periods[left], periods[left]])
-        result = ensemble.run(strobes=marks, threads=threads)
+        result = ensemble.run(strobes=list(marks), threads=threads)
         table = result.strobes
         assert table is not None
-        if transient <= firing < firings:
+        if firing >= transient:
             place = firing - transient
             columns.x[left, place], columns.v[left, place] = table.x[:, 0], table.v[:, 0]
             columns.branch[left, place], columns.memory[left, place] = table.branch[:, 0], table.memory[:, 0]
-        if firing == firings:
-            columns.last[left, :2], columns.last[left, 2:] = now, (-1.0, 0.0)
-            break
         going = np.isfinite(table.x[:, 1])
         columns.status[left[~going]] = np.array(result.status_names)[~going]
         left = left[going]
         if not left.size:
-            break
+            return columns
         now = np.column_stack([np.maximum(table.x[going, 1], positions[left]), table.v[going, 1]])
+    columns.last[left, :2], columns.last[left, 2:] = now, (-1.0, 0.0)
     return columns
 
 
