@@ -29,7 +29,7 @@ def spring_energy(c, x):
 class CubicSpring(SpringPart):
     """Constants of the cubic spring."""
 
-    law = "cubic"
+    law = "hardening"
 
     stiffness: float = quantity("N/m", "K", "stiffness at small deflections")
     cubic: float = quantity("N/m^3", "D", "coefficient of the cubic term", ge=0)

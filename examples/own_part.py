@@ -29,7 +29,7 @@ print(Path(cubic_spring.__file__).read_text(encoding="utf-8"))
 oscillator = ph.Hammer.build(
     "1 kg",
     name="duffing",
-    spring={"law": "cubic", "stiffness": "1 N/m", "cubic": "1 N/m^3"},
+    spring={"law": "hardening", "stiffness": "1 N/m", "cubic": "1 N/m^3"},
 )
 print(oscillator.to_toml())
 

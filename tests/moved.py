@@ -78,7 +78,8 @@ def quantities(hammer: ph.Hammer, drive: Any, duration: float, state: Any = None
     """All quantities of the dots and of the run, SI, in one row."""
     motion = ph.simulate(hammer, drive, duration=duration, state=state, tolerance=MINUTE, points=2)
     assert motion.ok
-    run = [getattr(motion.energy, name) for name in RUN_QUANTITIES]
+    energies = [name for name in RUN_QUANTITIES if name != "damping_loss" or hammer.damping is not None]
+    run = [getattr(motion.energy, name) for name in energies]
     return np.concatenate([dot_values(motion).ravel(), run])
 
 

@@ -35,8 +35,14 @@ ORDER = (
     "measured_constants",
     "single_shot_fit",
     "bouncing_ball",
+    "tufillaro_ball",
     "impact_oscillator",
+    "shaw_holmes",
+    "resonant_grazing",
+    "grazing_at_resonance",
     "tung_shaw",
+    "duffing",
+    "rocking_block",
     "own_part",
 )
 """The examples in the order in which one would teach them."""

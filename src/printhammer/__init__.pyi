@@ -6,11 +6,14 @@ from .chaos.bifurcation.bifurcation import bifurcation as bifurcation
 from .chaos.continuation.continuation import continuation as continuation
 from .chaos.continuation.regimes import regimes as regimes
 from .chaos.continuation.stability_chart import stability_chart as stability_chart
+from .chaos.exponents.correlation import correlation_dimension as correlation_dimension
+from .chaos.exponents.finite_time import finite_time as finite_time
 from .chaos.exponents.lyapunov import lyapunov as lyapunov
 from .chaos.exponents.recurrence import recurrence as recurrence
 from .chaos.exponents.zero_one import zero_one as zero_one
 from .chaos.impacts.sections import section as section
 from .chaos.impacts.train import impact_train as impact_train
+from .chaos.orbits.manifolds import manifolds as manifolds
 from .chaos.orbits.search import orbits as orbits
 from .chaos.strobe.points import strobe as strobe
 from .control.feedback.comparison import feedback as feedback

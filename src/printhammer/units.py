@@ -37,6 +37,7 @@ DIMENSIONS: dict[str, str] = {
     "m/s": "a speed",
     "m/s^2": "an acceleration",
     "N/m": "a stiffness",
+    "N/m^3": "a cubic stiffness",
     "N s/m": "a linear damping",
     "N/m^1.5": "a Hertz stiffness",
     "N s/m^2.5": "a contact damping",

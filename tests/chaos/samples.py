@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 import printhammer as ph
-from printhammer.chaos import Branch, Branches, lyapunovs, strobe
+from printhammer.chaos import Branch, Branches, lyapunovs, orbit, strobe
 from printhammer.derivatives.sensitivities import Sensitivities
 from printhammer.results import Result
+from printhammer.run.regime import Regime
 
 PERIOD = 1.3e-3
 
@@ -27,6 +28,12 @@ def sensitivities(hammer: ph.Hammer) -> Sensitivities:
     return ph.sensitivities(hammer, drive, constants=["mass", "pack.stiffness"])
 
 
+def manifolds_of_duffing() -> Result:
+    force = ph.SineForce(0.3, 1.0 / (2.0 * np.pi), phase="90 deg")
+    saddle = orbit(Regime.of(ph.load("duffing-holmes"), drive=force), (-0.15, 0.015))
+    return ph.manifolds(saddle, length=0.05)
+
+
 CHAOS: dict[str, Callable[[ph.Hammer], Result]] = {
     "Basins": lambda hammer: ph.basins(
         hammer, period=PERIOD, x=(30e-6, 80e-6, 3), v=(-0.2, 0.2, 2), firings=40, rounds=1
@@ -36,9 +43,14 @@ CHAOS: dict[str, Callable[[ph.Hammer], Result]] = {
     ),
     "Branch": branch,
     "Branches": lambda hammer: Branches((branch(hammer),)),
+    "CorrelationDimension": lambda _hammer: ph.correlation_dimension(np.sqrt(2.0) * np.arange(400.0) % 1.0),
+    "FiniteTime": lambda hammer: ph.finite_time(
+        ph.lyapunov(hammer, period=PERIOD, firings=20, transient=2), lengths=(1, 2)
+    ),
     "ImpactTrain": lambda hammer: ph.impact_train(ph.section(hammer, period=PERIOD, touches=12)),
     "Lyapunov": lambda hammer: ph.lyapunov(hammer, period=PERIOD, firings=20, transient=2),
     "LyapunovChart": lambda hammer: lyapunovs(hammer, [1.2e-3, PERIOD], firings=10, transient=0),
+    "Manifolds": lambda _hammer: manifolds_of_duffing(),
     "Orbit": lambda hammer: ph.orbits(hammer, period=PERIOD, longest=1, starts=60, guesses=6)[0],
     "Orbits": lambda hammer: ph.orbits(hammer, period=PERIOD, longest=2, starts=60, guesses=6),
     "QuenchMap": lambda hammer: ph.quench_map(

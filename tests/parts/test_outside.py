@@ -44,7 +44,7 @@ def forgotten(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def written(folder: Path, name: str, text: str = CUBIC) -> Path:
     """Write a part whose law has the name of the file."""
     path = folder / f"{name}.py"
-    path.write_text(text.replace('law = "cubic"', f'law = "{name}"'), encoding="utf-8")
+    path.write_text(text.replace('law = "hardening"', f'law = "{name}"'), encoding="utf-8")
     return path
 
 

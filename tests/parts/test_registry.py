@@ -34,6 +34,7 @@ from printhammer.parts.magnet.reluctance import ReluctanceMagnet
 from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
+from printhammer.parts.spring.cubic import CubicSpring
 from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
 from printhammer.support.constants import options, quantities
 from printhammer.units import to_si
@@ -81,6 +82,7 @@ EXAMPLES: list[Part] = [
     ),
     LinearSpring(Bs=14.0, As=4.7e-4),
     PreloadSpring(preload=14.0, stiffness=-3e4),
+    CubicSpring(stiffness=-2e4, cubic=4e12, center=1.2e-4),
     PowerPack(stiffness=259.0, front=1.5e-4, thickness=1.8e-4),
     DashpotPack(stiffness=1e5, damping=2.0, front=1.5e-4),
     HertzBackstop(position=5e-5, stiffness=1.2e9, damping=4e8),

@@ -262,3 +262,24 @@ def test_a_hammer_without_a_pulse_goes_back_to_the_one_it_opens_with(page: Page)
     page.run("document.querySelector('[aria-label=\"reset pulse\"]').click()")
     assert page.run(f"{STATE}.waveform") == opened
     assert page.complaints == []
+
+
+@pytest.mark.slow
+def test_the_drag_of_a_damped_hammer_is_among_the_forces(page: Page) -> None:
+    names = (
+        "(() => { window.words = []; const pen = new Proxy({}, { get: (_t, name) => name === 'measureText' ?"
+        " (() => ({ width: 10 })) : (...all) => { if (name === 'fillText') window.words.push(all[0]); },"
+        " set: () => true }); window.studio.studio.views.forces.paint(pen, 600, 400);"
+        " return window.words; })()"
+    )
+    assert "drag" not in page.run(names)
+    page.run("window.studio.studio.choose('duffing-holmes').then(() => 1)")
+    page.wait("'F drag' in window.studio.studio.frames.motion.data")
+    assert "drag" in page.run(names)
+    assert "drag" in page.run(
+        "window.studio.studio.views.forces.table && Object.keys("
+        "window.studio.studio.views.forces.table()).join(' ')"
+    )
+    page.run("window.studio.studio.choose('hendriks-1983').then(() => 1)")
+    page.wait("!('F drag' in window.studio.studio.frames.motion.data)")
+    assert "drag" not in page.run(names)

@@ -1,4 +1,4 @@
-"""Periodic orbits of two rigid impact oscillators in closed form: bouncing ball and linear oscillator.
+"""Periodic orbits of rigid impact oscillators in closed form: bouncing ball and linear oscillator.
 
 Plain formulas, derived here; they share nothing with the program.
 
@@ -22,6 +22,18 @@ For one impact in n periods T, x is b at both ends, so B = A tan(T/2) and A = b 
 at both ends give G w sin(w t0) = B (1 - e) / (1 + e), and the impact leaves with 2 e B / (1 + e). From
 cos^2 + sin^2 = 1 follows a quadratic equation for B. The map from impact to impact has the determinant e^2
 and the trace -2 e cos T - (1 + e)^2 a sin T / (2 B), a = -b + F cos(w t0).
+
+*With damping*, x'' + c x' + x = F cos(w t), the free oscillation is exp(-c t/2) (A cos(W t) + B sin(W t)),
+W^2 = 1 - c^2/4, and the forced one has the gain 1/sqrt((1 - w^2)^2 + c^2 w^2) and lags by
+atan2(c w, 1 - w^2). With g cos p and g sin p the latter's parts at the impact, A = b - g cos p; x = b after n
+periods gives B / A = (exp(c T/2) - cos(W T)) / sin(W T), and both velocities there the speed after the impact
+and g sin p: all are multiples of A. The monodromy matrix is the flight, of the determinant exp(-c T), times
+the saltation matrix of the impact,
+
+    [[-e, 0], [-e (1 + e) a / V, -e]],   a = F cos(w t0) - b,
+
+V the speed after it: the forces of the damping before and after it cancel there. So the multipliers have the
+product e^2 exp(-c T).
 """
 
 import math
@@ -147,3 +159,93 @@ class LinearImpacts:
         """Whether it leaves the stop and stays off it until the next impact."""
         times = [self.period * i / 1000.0 for i in range(1, 1000)]
         return b > 0.0 and all(self.state(force, b, phase, t)[0] > self.stop for t in times)
+
+
+@dataclass(frozen=True)
+class DampedImpacts:
+    """n: periods of the force between impacts; mass and stiffness are 1. An orbit is named by its A."""
+
+    omega: float
+    stop: float
+    restitution: float
+    damping: float
+    n: int = 1
+
+    @property
+    def period(self) -> float:
+        return 2.0 * math.pi * self.n / self.omega
+
+    @property
+    def _own(self) -> float:
+        return math.sqrt(1.0 - 0.25 * self.damping**2)
+
+    @property
+    def _gain(self) -> float:
+        return 1.0 / math.hypot(1.0 - self.omega**2, self.damping * self.omega)
+
+    @property
+    def _lag(self) -> float:
+        return math.atan2(self.damping * self.omega, 1.0 - self.omega**2)
+
+    @property
+    def grazing(self) -> float:
+        """Amplitude of the force at which the oscillation without impact touches the stop."""
+        return abs(self.stop) / self._gain
+
+    @property
+    def product(self) -> float:
+        """Product of the multipliers."""
+        return self.restitution**2 * math.exp(-self.damping * self.period)
+
+    def _turn(self) -> tuple[float, float, float]:
+        """exp(-c T/2), cos(W T) and sin(W T)."""
+        angle = self._own * self.period
+        return math.exp(-0.5 * self.damping * self.period), math.cos(angle), math.sin(angle)
+
+    def orbit(self, a: float) -> tuple[float, float, float]:
+        """Amplitude of the force, its phase at the impact, rad, and the speed after it."""
+        shrinks, cosine, sine = self._turn()
+        b = (1.0 / shrinks - cosine) / sine
+        speed = (
+            self._own * a * (b * (1.0 - shrinks * cosine) + shrinks * sine) / (1.0 + 1.0 / self.restitution)
+        )
+        across = (a * (self._own * b - 0.5 * self.damping) - speed) / self.omega
+        along = self.stop - a
+        return math.hypot(along, across) / self._gain, math.atan2(across, along) + self._lag, speed
+
+    def trace(self, a: float) -> float:
+        """Sum of the multipliers."""
+        force, angle, speed = self.orbit(a)
+        shrinks, cosine, sine = self._turn()
+        e = self.restitution
+        corner = -e * (1.0 + e) * (force * math.cos(angle) - self.stop) / speed
+        return shrinks * (-2.0 * e * cosine + corner * sine / self._own)
+
+    def branch_point(self, multiplier: float, low: float, high: float) -> tuple[float, float]:
+        """A between two values, and the amplitude of the force, at which a multiplier is 1 or -1."""
+
+        def miss(a: float) -> float:
+            return multiplier * self.trace(a) - 1.0 - self.product
+
+        rising = miss(high) > 0.0
+        assert (miss(low) > 0.0) != rising
+        while low < (middle := 0.5 * (low + high)) < high:
+            low, high = (low, middle) if (miss(middle) > 0.0) == rising else (middle, high)
+        return low, self.orbit(low)[0]
+
+    def state(self, a: float, t: float) -> tuple[float, float]:
+        """Displacement and velocity a time t after the impact."""
+        force, angle, _ = self.orbit(a)
+        shrinks, cosine, sine = self._turn()
+        b = a * (1.0 / shrinks - cosine) / sine
+        own, gain, phase = self._own, force * self._gain, self.omega * t + angle - self._lag
+        free = a * math.cos(own * t) + b * math.sin(own * t)
+        turned = own * (b * math.cos(own * t) - a * math.sin(own * t))
+        fading = math.exp(-0.5 * self.damping * t)
+        x = fading * free + gain * math.cos(phase)
+        return x, fading * (turned - 0.5 * self.damping * free) - gain * self.omega * math.sin(phase)
+
+    def possible(self, a: float) -> bool:
+        """Whether it leaves the stop and stays off it until the next impact."""
+        times = [self.period * i / 2000.0 for i in range(1, 2000)]
+        return self.orbit(a)[2] > 0.0 and all(self.state(a, t)[0] > self.stop for t in times)

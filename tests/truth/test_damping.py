@@ -17,7 +17,7 @@ from tests.hammers import (
     interpreted,
     made_of,
 )
-from tests.moved import flow_deviation
+from tests.moved import flow_deviation, quantity_differences
 
 import printhammer as ph
 from printhammer.derivatives.states import tangent_map
@@ -166,3 +166,28 @@ def test_a_file_says_it_with_a_unit(hammer: ph.Hammer) -> None:
     assert "drag" not in ph.simulate(hammer, ph.PulseTrain(hammer.waveform)).force
     with pytest.raises(ph.InputError, match=r"damping\.coefficient = -1\.0 N s/m: expected .*0"):
         hammer.replace({"damping": {"law": "viscous", "coefficient": "-1.0 N s/m"}})
+
+
+@pytest.mark.parametrize("row", [0, 2])
+def test_sensitivities_of_the_energies_against_differences(row: int) -> None:
+    """Also through impacts on a rigid backstop, before and after which damping slows at other speeds."""
+    hammer, drive = case_of(CASES[row])
+    names = ["damping.coefficient", "mass"]
+    with interpreted():
+        found = ph.sensitivities(
+            hammer, drive, constants=names, duration=1.0e-3, state=STATE, tolerance=1e-13
+        )
+        assert found.run_quantities[-1] == "damping_loss"
+        for k, name in enumerate(names):
+            truth = quantity_differences(hammer, drive, name, 1.0e-3, STATE, size=1e-5, levels=2)[-5:]
+            mine = found.run_derivatives[:, k] * abs(found.values[k])
+            np.testing.assert_allclose(mine, truth, rtol=0.0, atol=1e-7 * np.abs(truth).max())
+
+
+def test_without_damping_there_is_no_such_energy() -> None:
+    hammer, drive = case_of(CASES[2])
+    with interpreted():
+        found = ph.sensitivities(
+            hammer.replace("damping", None), drive, constants=["mass"], duration=0.2e-3, state=STATE
+        )
+    assert found.run_quantities[-1] == "backstop_loss"

@@ -45,6 +45,17 @@ def test_exact_records_give_the_constants_back(tmp_path: Path) -> None:
     assert not fit.outliers.any()
 
 
+def test_damping_in_flight_is_found_too(tmp_path: Path) -> None:
+    damped = HAMMER.replace("damping", {"law": "viscous", "coefficient": "0.15 N s/m"})
+    path = shots.write(tmp_path / "shot.csv", damped, noise=0.0, resolution=0.0, bandwidth=None)
+    keys = ["mass", "damping.coefficient", "backstop.damping"]
+    start = damped.replace({key: 1.3 * damped.constants[key].si for key in keys})
+    fit = fit_motion([path], start, free=keys)
+    for key in keys:
+        assert fit[key].value == pytest.approx(damped.constants[key].si, rel=1e-7)
+    assert fit.into(start).damping == fit.into(damped).damping
+
+
 def test_mass_and_forces_scale_together(tmp_path: Path) -> None:
     """Twice the forces taken as known, twice the mass found: equations (1) and (2) are linear in both."""
     path = shots.write(tmp_path / "shot.csv", HAMMER, seed=1)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests import hammers
-from tests.hammers import BACKSTOPS, PACKS, SPRINGS, STOP, compare, drives, interpreted, made_of
+from tests.hammers import BACKSTOPS, PACKS, SPRINGS, STOP, compare, drives, interpreted, made_of, preload
 
 import printhammer as ph
 from printhammer.run import problem
@@ -143,3 +143,19 @@ def test_machine_code_and_plain_python_agree() -> None:
         np.testing.assert_allclose(plain.x, compiled.x, rtol=0.0, atol=1e-9 * hammers.STROKE)
         assert len(plain.contacts) == len(compiled.contacts)
     assert abs(plain.steps - compiled.steps) <= 2
+
+
+@pytest.mark.parametrize("front", [-203.2e-6, 0.0, 203.2e-6])
+@pytest.mark.parametrize("pack", ["power", "dashpot"])
+def test_a_pack_lies_anywhere_without_a_backstop(pack: str, front: float) -> None:
+    """Before and behind a spring of negative stiffness, which pushes the armature into it."""
+    part = PACKS[pack]
+    assert part is not None
+    hammer = made_of(spring=preload(0.5, -2e4), pack=part.model_copy(update={"front": front}))
+    drive = drives("force")["train"]
+    with interpreted():
+        found = compare(hammer, drive, 1.0e-3, state=(front - 20e-6, 1.0), sensitive=True)
+    assert found.motion.ok
+    assert found.error < 1e-8
+    mine, theirs = found.touches("pack")
+    assert len(mine) == len(theirs) > 0

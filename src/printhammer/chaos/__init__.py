@@ -11,12 +11,15 @@ from printhammer.chaos.continuation.events import BranchEvent
 from printhammer.chaos.continuation.regimes import Branches, regimes
 from printhammer.chaos.continuation.stability_chart import LossCurve, StabilityChart, stability_chart
 from printhammer.chaos.exponents.chart import LyapunovChart, lyapunovs
+from printhammer.chaos.exponents.correlation import CorrelationDimension, correlation_dimension
+from printhammer.chaos.exponents.finite_time import FiniteTime, finite_time
 from printhammer.chaos.exponents.lyapunov import Lyapunov, lyapunov
 from printhammer.chaos.exponents.recurrence import Recurrence, recurrence
 from printhammer.chaos.exponents.zero_one import ZeroOne, zero_one
 from printhammer.chaos.impacts.sections import Section, section, sections
 from printhammer.chaos.impacts.train import ImpactTrain, impact_train
 from printhammer.chaos.orbits.collection import Orbits
+from printhammer.chaos.orbits.manifolds import Manifolds, manifolds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbit, orbits
 from printhammer.chaos.strobe.points import Strobe, strobe, strobes
@@ -29,10 +32,13 @@ __all__ = [
     "Branch",
     "BranchEvent",
     "Branches",
+    "CorrelationDimension",
+    "FiniteTime",
     "ImpactTrain",
     "LossCurve",
     "Lyapunov",
     "LyapunovChart",
+    "Manifolds",
     "Orbit",
     "Orbits",
     "QuenchMap",
@@ -46,9 +52,12 @@ __all__ = [
     "basins",
     "bifurcation",
     "continuation",
+    "correlation_dimension",
+    "finite_time",
     "impact_train",
     "lyapunov",
     "lyapunovs",
+    "manifolds",
     "orbit",
     "orbits",
     "quench_map",

@@ -44,8 +44,9 @@ RUN_QUANTITIES: Final = {
     "drive_work": ("J", "work of a drive that is a force"),
     "pack_loss": ("J", "energy that the pack took"),
     "backstop_loss": ("J", "energy that the backstop took"),
+    "damping_loss": ("J", "energy that the damping of the armature took"),
 }
-"""Unit and meaning of what is told of the whole run."""
+"""Unit and meaning of what is told of the whole run; the last of a hammer with damping only."""
 
 _ENERGY: Final = 3
 _PACK_LOSS: Final = 5
@@ -177,7 +178,7 @@ class Changes(Declared):
     dots: FloatArray = part(
         "of `DOT_QUANTITIES`, shape (dots, quantities, n)", more="NaN where a dot is lost or one is not known"
     )
-    run: FloatArray = part("of `RUN_QUANTITIES`, shape (4, n)")
+    run: FloatArray = part("of `RUN_QUANTITIES`, shape (5, n)")
     smooth: bool = part("whether the motion is differentiable throughout")
 
 

@@ -124,7 +124,7 @@ class Sensitivities(Result):
     @property
     @derived("1", _IN_PARTS, "energy constant")
     def run_logarithmic(self) -> FloatArray:
-        """The same for the energies of the run, shape (4, n); NaN for an energy that is zero."""
+        """The same for the energies of the run, shape (energies, n); NaN for an energy that is zero."""
         return _relative(self.run_derivatives, self.values, self.run)
 
     def spread(self, spreads: Mapping[str, float | str]) -> Spread:
@@ -302,14 +302,19 @@ def sensitivities(
     record = problem.run(end)
     motion = Motion(problem, record, end, np.array([0.0]), "default")
     scales = np.array([parameter.scale for parameter in wanted])
-    run = np.array([getattr(motion.energy, name) for name in RUN_QUANTITIES])
+    energies = [name for name in RUN_QUANTITIES if name != "damping_loss" or hammer.damping is not None]
+    run = np.array([getattr(motion.energy, name) for name in energies])
     shape = (len(motion.dots), len(DOT_QUANTITIES))
     if motion.ok:
         changes = changes_of(motion, problem, record, wanted, initial)
-        dot_changes, run_changes, smooth = changes.dots / scales, changes.run / scales, changes.smooth
+        dot_changes, run_changes, smooth = (
+            changes.dots / scales,
+            changes.run[: len(energies)] / scales,
+            changes.smooth,
+        )
     else:
         dot_changes = np.full((*shape, len(wanted)), np.nan)
-        run_changes = np.full((len(RUN_QUANTITIES), len(wanted)), np.nan)
+        run_changes = np.full((len(energies), len(wanted)), np.nan)
         smooth = False
     return Sensitivities(
         hammer=hammer,
@@ -321,7 +326,7 @@ def sensitivities(
         quantities=tuple(DOT_QUANTITIES),
         dots=dot_values(motion),
         derivatives=dot_changes,
-        run_quantities=tuple(RUN_QUANTITIES),
+        run_quantities=tuple(energies),
         run=run,
         run_derivatives=run_changes,
         left_out=left_out,

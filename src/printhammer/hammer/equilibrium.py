@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _NEAREST: Final = 1e-18
 _LARGEST_CURRENT: Final = 1e6
+FARTHER: Final = (10.0, 100.0, 1000.0)
+"""How far from the origin an equilibrium is sought where nothing limits the search and none is nearer, m."""
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,8 @@ def equilibria(
     """Find all equilibria at a constant current, ascending.
 
     Sought from the lower limit of the magnet's law (or the rigid backstop) to the platen, or else to where
-    pack or magnet law end; where nothing limits the search, 1 m to either side. Stretches without any force
-    are left out.
+    pack or magnet law end; where nothing limits the search, 1 m to either side, or where no stable one is
+    there 10, 100 or 1000 m. Stretches without any force are left out.
 
     Parameters
     ----------
@@ -280,7 +282,17 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
     low, high = max(low, force.limits[0]), min(high, force.limits[1])
     if not low < high:
         raise InputError(f"the range {low:g} to {high:g} m is empty, expected the lower end first")
-    return roots(lambda x: force.total(x, current), _grid(force, low, high))
+    crossings = roots(lambda x: force.total(x, current), _grid(force, low, high))
+    if within is not None:
+        return crossings
+    # Oscillators in units of their own may rest some metres away.
+    for far in FARTHER:
+        if any(_is_stable(root, force) for root in crossings) or force.reach(far) == (low, high):
+            break
+        low, high = force.reach(far)
+        wider = roots(lambda x: force.total(x, current), _grid(force, low, high))
+        crossings = wider or crossings
+    return crossings
 
 
 def _same_rest(force: StaticForce, current: float, within: tuple[float, float] | None) -> list[Root]:

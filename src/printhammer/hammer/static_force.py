@@ -75,7 +75,7 @@ class StaticForce:
         low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
         self._domain = low, high
         self.limits = (max(low, self._position) if self.rigid else low), high
-        self.low, self.high = self._reach()
+        self.low, self.high = self.reach()
         self.end = self.high
         if hammer.platen is None and hammer.pack is not None:
             self.end = min(self.high, self.front + getattr(hammer.pack, "thickness", 0.0))
@@ -130,7 +130,8 @@ class StaticForce:
         places = [self.low, self.high, self._position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
 
-    def _reach(self) -> tuple[float, float]:
+    def reach(self, far: float = FAR) -> tuple[float, float]:
+        """Return between which places equilibria are sought, at most so far from the origin, m."""
         hammer = self.hammer
         low, high = self.limits
         if hammer.platen is not None:
@@ -138,7 +139,7 @@ class StaticForce:
         elif hammer.pack is not None:
             # A pack without thickness is searched as deep as its front is away from the origin.
             high = min(high, self.front + getattr(hammer.pack, "thickness", abs(self.front - hammer.origin)))
-        return max(low, hammer.origin - FAR), min(high, hammer.origin + FAR)
+        return max(low, hammer.origin - far), min(high, hammer.origin + far)
 
 
 def derivative(function: Callable[[float], float], x: float, step: float) -> float:

@@ -127,11 +127,14 @@ class ReferenceHammer:
     @staticmethod
     def _spring(spring: Any, origin: float) -> Array:
         if spring is None:
-            return np.zeros(2)
+            return np.zeros(4)
         if spring.law == "linear":
-            return np.array([spring.Bs + spring.Bs / spring.As * origin, -spring.Bs / spring.As])
+            return np.array([spring.Bs + spring.Bs / spring.As * origin, -spring.Bs / spring.As, 0.0, 0.0])
         if spring.law == "preload":
-            return np.array([spring.preload + spring.stiffness * origin, -spring.stiffness])
+            return np.array([spring.preload + spring.stiffness * origin, -spring.stiffness, 0.0, 0.0])
+        if spring.law == "cubic":
+            center = spring.center
+            return np.array([spring.stiffness * center, -spring.stiffness, -spring.cubic, center])
         raise ValueError(f"the reference knows no spring law {spring.law!r}")
 
     @staticmethod
@@ -204,6 +207,8 @@ class ReferenceHammer:
         current = drive if is_current else np.zeros(drive.size)
         out = np.zeros(drive.size) if is_current else drive.copy()
         out[0] += self.spring[0] + self.spring[1] * x
+        if self.spring[2] != 0.0:
+            out[0] += self.spring[2] * (x - self.spring[3]) ** 3
         if self.magnet_kind == INVERSE_ROOT:
             f0, am, bm = self.magnet
             gap = -bm * current

@@ -114,8 +114,9 @@ def _motion_series(
     """Fill ``y`` and ``v`` with coefficients in s/h, given ``y[0]`` and ``v[0]``; x = ref + y.
 
     ``magnet``: (F0, Am, Bm), or the cell (x0, i0, 16 coefficients c[i, j] of (x-x0)**i (i-i0)**j).
-    ``spring``: (force at x = 0, slope). ``damping``: of a unit of velocity. ``contact``: (sigma or 0, K, p,
-    E, q, scale). ``drive``: series in s/h. SI throughout.
+    ``spring``: (force at x = 0, slope, coefficient of the cubic term, place about which that is).
+    ``damping``: of a unit of velocity. ``contact``: (sigma or 0, K, p, E, q, scale). ``drive``: series in
+    s/h. SI throughout.
     """
 
     def product(a: Array, b: Array, k: int) -> float:
@@ -134,8 +135,9 @@ def _motion_series(
 
     n = y.size - 1
     sigma, big_k, p, big_e, q, scale = contact[0], contact[1], contact[2], contact[3], contact[4], contact[5]
-    rows = np.zeros((7, n + 1))
+    rows = np.zeros((9, n + 1))
     x, root, gap, r, r_p, r_q, speed = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
+    away, away_2 = rows[7], rows[8]
     chain, current_power, x_power = np.zeros((4, n + 1)), np.zeros((4, n + 1)), np.zeros((4, n + 1))
     if magnet_kind == 1:
         for k in range(n + 1):
@@ -155,6 +157,10 @@ def _motion_series(
     for k in range(n):
         x[k] = y[k] if k > 0 else ref + y[0]
         force = spring[1] * x[k] + (spring[0] if k == 0 else 0.0) - damping * v[k]
+        if spring[2] != 0.0:
+            away[k] = y[k] if k > 0 else (ref - spring[3]) + y[0]
+            away_2[k] = product(away, away, k)
+            force += spring[2] * product(away_2, away, k)
         if not is_current:
             force += drive[k]
         if magnet_kind == 1:

@@ -1,3 +1,4 @@
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import xarray as xr
 from tests.hammers import CRUDE
 
 import printhammer as ph
+from printhammer.drive.file import save_drive
 
 PLANE = ("--x", "30 um, 260 um, 5", "--v", "-1 m/s, 1 m/s, 4")
 
@@ -26,6 +28,20 @@ def test_attractors_entropy_and_files(cli: Callable, tmp_path: Path) -> None:
     assert len(pd.read_csv(paths["csv"], comment="#")) == 20
     assert paths["png"].read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in paths["svg"].read_bytes()
+
+
+@pytest.mark.slow
+def test_manifolds_of_saddles_over_basins(cli: Callable, tmp_path: Path) -> None:
+    picture = tmp_path / "b.svg"
+    drive = tmp_path / "drive.toml"
+    save_drive(ph.SineForce(0.3, 1.0 / (2.0 * math.pi), phase="90 deg"), drive)
+    plane = ("--x", "-0.4 m, 0.1 m, 4", "--v", "-0.2 m/s, 0.3 m/s, 4", "--firings", "5", "--rounds", "1")
+    done = cli("basins", "duffing-holmes", "--drive", drive, *plane, "--saddles", "1", "--out", picture)
+    assert done.status == 0
+    assert "manifolds of" in done.out
+    text = picture.read_text("utf-8")
+    assert "stable manifold 0" in text
+    assert "unstable manifold 2" in text
 
 
 def test_the_quench_map(cli: Callable, tmp_path: Path) -> None:
@@ -67,6 +83,8 @@ def test_a_run_that_stops_is_told(cli: Callable, tmp_path: Path) -> None:
         (("--period", "1 ms", "--gaps", "1 ms, 2 ms, 3"), "--gaps"),
         (("--quench", "--period", "1 ms"), "--period"),
         (("--quench", "--box", "2"), "--box"),
+        (("--quench", "--saddles", "1"), "--saddles"),
+        (("--period", "1 ms", "--saddles", "0"), "saddles"),
         (("--quench", "--gaps", "2 ms, 1 ms, 3"), "gaps"),
         (("--quench", "--tail", "-1 ms"), "tail"),
         (("--period", "1 ms", "--tolerance", "0"), "tolerance"),

@@ -18,9 +18,11 @@ from printhammer.chaos.bifurcation.columns import (
     orbit_distance,
     put,
     run_columns,
+    run_in_stretches,
     scales_of_columns,
     state_or_rest,
 )
+from printhammer.chaos.strobe.handing import forgets
 from printhammer.chaos.strobe.train import exponents_onward
 
 if TYPE_CHECKING:
@@ -146,6 +148,13 @@ class DiagramBuilder:
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
         scales = self.table.scales[list(rows)]
         cycles, distances = cycles_of(columns, fronts, scales)
+        # A motion that comes to rest on its backstop repeats itself where time is kept within the period.
+        able = np.array([forgets(regime) for regime in regimes])
+        open_rows = np.flatnonzero(able & (cycles == 0) & (columns.status == OK))
+        if open_rows.size:
+            own = [regimes[row] for row in open_rows]
+            put(columns, open_rows, run_in_stretches(own, states[open_rows], *self.counts, self.threads))
+            cycles, distances = cycles_of(columns, fronts, scales)
         confirm(columns, cycles, distances, regimes, scales, self.threads)
         return columns, cycles, distances
 

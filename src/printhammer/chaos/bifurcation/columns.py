@@ -181,6 +181,56 @@ def _run(
     )
 
 
+def run_in_stretches(
+    regimes: Sequence[Regime],
+    states: FloatArray,
+    firings: int,
+    transient: int,
+    tolerance: float,
+    threads: int | None = None,
+) -> Columns:
+    """Do as `run_columns` for trains that `forgets` allows, a period at a time.
+
+    Slower, but exact over long times, see `printhammer.chaos.strobe.handing.STRETCH`.
+    """
+    columns = blank_columns(len(regimes), firings - transient)
+    begun = [
+        initial_state(regime.hammer, None if math.isnan(state[0]) else (float(state[0]), float(state[1])))
+        for regime, state in zip(regimes, states, strict=True)
+    ]
+    left, now = np.arange(len(regimes)), np.array(begun)
+    periods, phases = (
+        np.array([getattr(regime, name) for regime in regimes]) for name in ("period", "phase")
+    )
+    positions = np.array([regime.hammer.position for regime in regimes])
+    drives = [regime.train(1)[0] for regime in regimes]
+    columns.status[:] = OK
+    for firing in range(firings):
+        ensemble = Ensemble(
+            [regimes[int(row)].hammer for row in left],
+            [drives[int(row)] for row in left],
+            2.0 * periods[left],
+            states=now,
+            tolerance=tolerance,
+        )
+        marks = np.column_stack([phases[left] * periods[left], periods[left]])
+        result = ensemble.run(strobes=list(marks), threads=threads)
+        table = result.strobes
+        assert table is not None
+        if firing >= transient:
+            place = firing - transient
+            columns.x[left, place], columns.v[left, place] = table.x[:, 0], table.v[:, 0]
+            columns.branch[left, place], columns.memory[left, place] = table.branch[:, 0], table.memory[:, 0]
+        going = np.isfinite(table.x[:, 1])
+        columns.status[left[~going]] = np.array(result.status_names)[~going]
+        left = left[going]
+        if not left.size:
+            return columns
+        now = np.column_stack([np.maximum(table.x[going, 1], positions[left]), table.v[going, 1]])
+    columns.last[left, :2], columns.last[left, 2:] = now, (-1.0, 0.0)
+    return columns
+
+
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
     """Return a drive, and the times of its firings from the first to the one after all that are asked for."""
     if rest and regime.drive is None:

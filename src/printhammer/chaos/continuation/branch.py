@@ -75,6 +75,7 @@ class Branch(Result):
     backstop_loss: FloatArray = column(
         "J", "energy that the backstop takes in a period of the orbit", "orbit"
     )
+    damping_loss: FloatArray = column("J", "energy that the damping takes in a period of the orbit", "orbit")
     residual: FloatArray = column(
         "1", "distance from itself after a period, in half-widths of the window", "orbit"
     )

@@ -93,6 +93,7 @@ class Course(Declared):
     drive_work: float = part("of a drive that is a force")
     pack_loss: float = part("in the pack")
     backstop_loss: float = part("in the backstop")
+    damping_loss: float = part("in the damping of the armature")
 
 
 class RegimeFamily:
@@ -198,8 +199,7 @@ class RegimeFamily:
                 forces[fired] = np.fmax(forces[fired], contact.peak_force)
         sections = np.array([problem.start + regime.period * k for k in range(self.firings)])
         states = problem.resample(record, sections)[:, :2].copy()
-        coil, drive, pack, backstop = (float(total) for total in increments.sum(axis=0)[:4])
-        return Course(states, forces, coil, drive, pack, backstop)
+        return Course(states, forces, *(float(total) for total in increments.sum(axis=0)[:5]))
 
 
 def rigid_backstop(regime: Regime) -> bool:

@@ -250,6 +250,7 @@ class Tracer:
             drive_work=of_courses("drive_work"),
             pack_loss=of_courses("pack_loss"),
             backstop_loss=of_courses("backstop_loss"),
+            damping_loss=of_courses("damping_loss"),
             residual=np.array([node.residual for node in nodes]),
             contacts=tuple(row.sequence for row in passages),
             events=tuple(event_of(point) for point in points),

@@ -127,7 +127,7 @@ def recurrence(
         threshold and a rate; scales that do not fit.
     """
     points = points_of(states, {})
-    rows, units = _rows(points, scales)
+    rows, units = rows_of(points, scales, MOST)
     # Of a train that has settled only the noise of the arithmetic differs.
     floor = AGREEMENT if isinstance(points, Strobe) and scales is None else 0.0
     count = len(rows)
@@ -198,8 +198,10 @@ def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
     return float(np.partition(pairs, wanted)[wanted])
 
 
-def _rows(states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None) -> tuple[FloatArray, FloatArray]:
-    """Return states, shape (n, m), and the scales of their components."""
+def rows_of(
+    states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None, most: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return states, shape (n, m) with n up to `most`, and the scales of their components."""
     if isinstance(states, Strobe):
         rows = np.column_stack([states.x, states.v, states.memory])
         units = states.window.half_widths[[0, 1, 0]]
@@ -211,8 +213,8 @@ def _rows(states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None) -> tuple
         if rows.ndim != 2:
             raise InputError(f"states: an array of shape {rows.shape}, expected a row for each state")
         units = np.ones(rows.shape[1])
-    if not 2 <= len(rows) <= MOST:
-        raise InputError(f"states: {len(rows)} are given, expected 2 to {MOST}")
+    if not 2 <= len(rows) <= most:
+        raise InputError(f"states: {len(rows)} are given, expected 2 to {most}")
     if not np.isfinite(rows).all():
         raise InputError("states: not all are finite, expected finite numbers")
     if scales is not None:

@@ -51,6 +51,7 @@ _ENERGIES: Final = {
     "drive_work": "work of a drive that is a force in a period of the orbit",
     "pack_loss": "energy that the pack takes in a period of the orbit",
     "backstop_loss": "energy that the backstop takes in a period of the orbit",
+    "damping_loss": "energy that the damping of the armature takes in a period of the orbit",
 }
 _SECTION: Final = (
     ("section_x", "m", "displacement at the section"),

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.figures.chaos.manifolds import draw
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.map_marks import edges
 from printhammer.figures.elements.marks import heading, legend_below, place_lines
@@ -13,9 +14,12 @@ from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import INK, new_panel, sign, styled
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.figure import Figure
 
     from printhammer.chaos.basins.basins import Basins
+    from printhammer.chaos.orbits.manifolds import Manifolds
 
 SHADES: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00", "#999933")
 """Colours of the basins, of M. Okabe and K. Ito (2008); further ones begin anew, lighter."""
@@ -39,8 +43,11 @@ def shade(number: int) -> str:
 
 
 @styled
-def plot(basins: Basins, *, attractors: bool = True) -> Figure:
-    """Draw basins, and in them the attractors where they lie in the plane, marked at the firings."""
+def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifolds] = ()) -> Figure:
+    """Draw basins, and in them the attractors where they lie in the plane, marked at the firings.
+
+    Over them `manifolds` of saddles, white the stable ones, which bound basins, and dark the unstable ones.
+    """
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -89,6 +96,10 @@ def plot(basins: Basins, *, attractors: bool = True) -> Figure:
         if cells:
             patch = Patch(facecolor=colour, edgecolor=INK, lw=0.5)
             handles.append((patch, patch, f"{name}: {cells} cells"))
+    lines: list[Any] = []
+    for each in manifolds:
+        lines = draw(ax, each, way, speed)
+    handles += [(line, line, line.get_label()) for line in lines]
     signs, names = [entry[:2] for entry in handles], [entry[2] for entry in handles]
     legend_below(ax, signs, names, ncols=1 + (len(handles) > _FEW), handlelength=1.2)
     heading(ax, f"Every {shown_period(basins.regime.period)}")

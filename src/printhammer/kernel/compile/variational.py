@@ -28,6 +28,10 @@ def variational(plain: Kernel, *, forced: bool) -> Kernel:
 def _built(plain: Kernel, forced: bool) -> Kernel:
     sources = hashlib.sha256(repr((plain.digest, forced)).encode())
     sources.update(source_file("variational.layout").read_bytes())
-    namespace = {**plain.namespace, "FORCED": forced, "CHANGING": changing(forced)}
+    namespace = {
+        **plain.namespace,
+        "FORCED": forced,
+        "CHANGING": changing(forced, plain.namespace["HAS_DAMPING"]),
+    }
     label = f"{plain.label}, by {'constants' if forced else 'states'}"
     return execute_all([f"variational.{name}" for name in TEMPLATES], namespace, sources, label)

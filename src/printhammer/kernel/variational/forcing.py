@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_change, piece_rate
     from printhammer.kernel.variational.layout import Forcing, Setting
-    from printhammer.kernel.variational.slopes import field_slope
+    from printhammer.kernel.variational.slopes import damping_slope, field_slope
 
 
 @compiled
@@ -249,8 +249,12 @@ def add_forcing(
         j = V.FIRST_COLUMN + CHANGING * k
         dx, dv = y[j], y[j + 1]
         change, coil_change, drive_part = field_changes(t, x, value, with_value, k, drive, forcing)
+        e = j + V.STATE - V.ENERGY
         if HAS_DAMPING:
-            change += damping_change(v, k, forcing)
+            drag = damping_change(v, k, forcing)
+            change += drag
+            by_v = damping_slope(v, scales, hammer) * v + damping_force(hammer[DAMPING:SPRING], v)
+            rates[e + V.DAMPING_LOSS] = -pace * (drag * v + by_v * dv)
         surface, push, lost = 0.0, 0.0, 0.0
         if compressed:
             surface = moves[k, POSITION]
@@ -265,7 +269,6 @@ def add_forcing(
         rates[j + 1] += rates[1] * moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
         lost = pace * (lost + loss_v * dv) + loss_x * (dx - surface)
         lost += push_peak * (columns[V.PEAK, k] - surface)
-        e = j + V.STATE - V.ENERGY
         rates[e + V.COIL] = pace * ((coil_change + coil_x * dx) * v + coil * dv)
         rates[e + V.DRIVE] = pace * (drive_part * v + value * dv) if FORCE_DRIVE else 0.0
         power = -lost * v - pace * loss * dv

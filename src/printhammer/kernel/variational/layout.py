@@ -3,7 +3,7 @@
 A column is the change of the motion, all at one time, per unit of an initial change or of a constant: of the
 `STATE` components of the state, displacement [m] and velocity [m/s]; of the latest local maximum in the pack
 [m], which changes at switches only; and, where constants force the equation, of the energies [J] that coil
-and drive force have given and pack and backstop have taken.
+and drive force have given and pack, backstop and damping have taken.
 """
 
 from typing import Any, NamedTuple
@@ -14,8 +14,8 @@ STATE = 2
 """Components of the state: displacement and velocity."""
 PEAK = STATE
 ENERGY = STATE + 1
-COIL, DRIVE, PACK_LOSS, BACKSTOP_LOSS = range(ENERGY, ENERGY + 4)
-ENERGIES = 4
+COIL, DRIVE, PACK_LOSS, BACKSTOP_LOSS, DAMPING_LOSS = range(ENERGY, ENERGY + 5)
+ENERGIES = 5
 ROWS = ENERGY + ENERGIES
 """Rows of a column; without forcing the first three."""
 
@@ -78,7 +78,7 @@ class Forcing(NamedTuple):
 class Carried(NamedTuple):
     """Columns on their way along a run, and what is noted of them at marks and wanted nodes.
 
-    Without forcing a column has r = 3 rows, with it 7.
+    Without forcing a column has r = 3 rows, with it 8.
 
     Attributes
     ----------
@@ -116,9 +116,9 @@ class Setting(NamedTuple):
     forcing: Any
 
 
-def changing(forced: bool) -> int:
-    """Return the number of rows of a column that change between switches."""
-    return STATE + (ENERGIES if forced else 0)
+def changing(forced: bool, damped: bool = True) -> int:
+    """Return the number of rows of a column that change between switches; the last is that of damping."""
+    return STATE + (ENERGIES - (not damped) if forced else 0)
 
 
 def work_width(columns: int, forced: bool) -> int:

@@ -69,6 +69,8 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
     ) / (12.0 * spacing)
     a = acceleration(node[0], node[1], v_in, M.FREE, 0.0, hammer, drive)
+    # That after the impact is another where damping acts on the armature.
+    a_out = acceleration(node[0], node[1], v_out, M.FREE, 0.0, hammer, drive)
     for k in range(columns.shape[1]):
         if FORCED:
             columns[0, k] -= forcing.moves[k, POSITION]
@@ -79,10 +81,10 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
             add_energies(columns, k, -earlier, before, behind)
             columns[BACKSTOP_LOSS, k] += v_in * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
         columns[0, k] = earlier * v_out
-        columns[1, k] = slope * columns[1, k] + (1.0 - slope) * a * earlier
+        columns[1, k] = slope * columns[1, k] + (1.0 - slope) * a * earlier + (a_out - a) * earlier
         if FORCED:
             columns[1, k] += rebound_change(v_in, k, forcing)
-            columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
+            columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - a_out * earlier) / hammer[INVERSE_MASS]
             # The energy that is lost goes with the mass.
             lost = 0.5 * (v_in * v_in - v_out * v_out) / hammer[INVERSE_MASS]
             columns[BACKSTOP_LOSS, k] -= lost * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]

@@ -35,22 +35,33 @@ EQUATIONS: Final = {
 }
 """Equations of the laws of the paper; the others are told in the first line of their part."""
 
+# A hop lasts about as long as a period.
+_HOPS: Final[dict[str, Any]] = {
+    "waveform": {"shape": "half-sine", "amplitude": 0.5, "width": 3e-4, "quantity": "force"},
+    "rate": 50.0,
+    "low": 20.0,
+    "high": 100.0,
+}
+# Two pushes, a free period apart, of 2 pi s.
+_PUSHES: Final[dict[str, Any]] = {
+    "waveform": {"shape": "half-sine", "amplitude": 10.0, "width": 0.02, "quantity": "force"},
+    "rate": 10.0,
+    "pattern": "1" + 62 * "0" + "1",
+    "low": 10.0,
+    "high": 20.0,
+}
+# The same, hard enough to get to a stop that is a unit of length away.
+_BLOWS: Final = {**_PUSHES, "waveform": {**_PUSHES["waveform"], "amplitude": 100.0}}
+
 OPENINGS: Final[dict[str, dict[str, Any]]] = {
-    # A hop lasts about as long as a period.
-    "bouncing-ball": {
-        "waveform": {"shape": "half-sine", "amplitude": 0.5, "width": 3e-4, "quantity": "force"},
-        "rate": 50.0,
-        "low": 20.0,
-        "high": 100.0,
-    },
-    # Two pushes, a free period apart, of 2 pi s.
-    "linear-impact-oscillator": {
-        "waveform": {"shape": "half-sine", "amplitude": 10.0, "width": 0.02, "quantity": "force"},
-        "rate": 10.0,
-        "pattern": "1" + 62 * "0" + "1",
-        "low": 10.0,
-        "high": 20.0,
-    },
+    "bouncing-ball": _HOPS,
+    "tufillaro-1992": _HOPS,
+    "linear-impact-oscillator": _PUSHES,
+    "resonant-grazing": _BLOWS,
+    "shaw-holmes-1983": _PUSHES,
+    "dankowicz-schilder-2013": _BLOWS,
+    "duffing-holmes": _BLOWS,
+    "housner-1963": _PUSHES,
 }
 """What the shipped hammers without a pulse open with, whose times and forces are not those of printers."""
 

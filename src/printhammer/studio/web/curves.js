@@ -5,8 +5,9 @@ import { colours, FONT } from "./theme.js";
 import { digits, shown, timeUnit, unitOf } from "./units.js";
 
 const FORCES = ["total", "magnet", "spring", "damping", "backstop", "pack"];
+const DRAG = "drag"; // of a hammer that is damped in flight
 const SPACE = { 1: 14, 2: 60, 3: 30 }; // pixels between ticks, by side
-const DASHES = { damping: [2, 2] };
+const DASHES = { damping: [2, 2], drag: [6, 2] };
 
 /** Displacement against time, with backstop, pack and platen, firings, and the drive on the right axis. */
 export function motionView(body, studio) {
@@ -28,11 +29,13 @@ export function motionView(body, studio) {
 export function forcesView(body, studio) {
   return curveView(body, studio, {
     label: "Forces against time",
-    series: () => FORCES.map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
-    scales: (frame) => ({ x: widened(...FORCES.reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
+    series: () => forcesOf(studio.frames.motion).map((name) => ({ name, si: "N", scale: "x", colour: colours()[name], values: (f) => f.data[`F ${name}`], dash: DASHES[name] })),
+    scales: (frame) => ({ x: widened(...forcesOf(frame).reduce((ends, name) => extent(frame.data[`F ${name}`], ...ends), [0, 0])) }),
     under: () => {},
   });
 }
+
+const forcesOf = (frame) => (frame && `F ${DRAG}` in frame.data ? [...FORCES, DRAG] : FORCES);
 
 function quantity(studio) { return studio.frames.motion?.quantity === "force" ? "force" : "current"; }
 
@@ -159,7 +162,7 @@ function curveView(body, studio, kind) {
     }, [[0, 1], ...series.map(() => [0, 0])], holder);
     made = style();
   }
-  const style = () => JSON.stringify([unitOf("s"), unitOf("m"), unitOf("N"), quantity(studio), colours()]);
+  const style = () => JSON.stringify([unitOf("s"), unitOf("m"), unitOf("N"), quantity(studio), kind.series().map((entry) => entry.name), colours()]);
 
   function draw() {
     const frame = studio.frames.motion;

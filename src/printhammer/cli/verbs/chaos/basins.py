@@ -15,11 +15,16 @@ from printhammer.cli.units import Units, range_with_unit, with_unit
 if TYPE_CHECKING:
     from printhammer.chaos.basins.basins import Basins
     from printhammer.chaos.basins.quench import QuenchMap
+    from printhammer.chaos.orbits.manifolds import Manifolds
     from printhammer.hammer.hammer import Hammer
 
 _BASINS: Final = "Basins"
 _QUENCH: Final = "Quench map"
 _ROWS: Final = 12
+_CROSSINGS: Final = 6
+"""Length of a manifold over the longer side of the plane."""
+_PIECES: Final = 200
+"""Points of a manifold over that side."""
 _count = partial(opt.whole, panel=_BASINS)
 
 
@@ -45,6 +50,7 @@ def basins(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     box: int | None = _count("Cells along the side of a box, for the entropy (4)."),
+    saddles: int | None = _count("Draw the manifolds of saddles of up to so many firings."),
     quench: bool = opt.switch("Map two pulses from rest instead.", panel=_QUENCH),
     units: Units = opt.UNITS,
     **passed: Any,
@@ -56,28 +62,63 @@ def basins(
     from printhammer.chaos.basins.basins import NO_STATE_STATUS
     from printhammer.chaos.basins.basins import basins as computed
     from printhammer.chaos.basins.quench import quench_map
+    from printhammer.drive.input import read_count
 
     of_quench = {name: passed.get(name) for name in ("gaps", "widths", "tail")}
     if quench:
         of_basins = {name: passed.get(name) for name in ("period", "rate", "overlap", "drive", "x", "v")}
         more = {name: passed.get(name) for name in ("firings", "rounds")}
-        opt.refuse({**of_basins, **more, "box": box}, "none beside --quench")
+        opt.refuse({**of_basins, **more, "box": box, "saddles": saddles}, "none beside --quench")
     else:
         opt.refuse(of_quench, "--quench beside it")
         firing = firing_of(job, hammer, passed, "--period '1.05 ms', or --quench")
+    if saddles is not None:
+        read_count(saddles, "saddles")
     with job.counting("cells") as tell:
         if quench:
             mapped = quench_map(hammer, progress=tell, **passed)
             status, content, rows = mapped.status, Content.of(mapped), quenched(mapped, units)
         else:
             planes = computed(hammer, progress=tell, **firing, **passed)
-            status, content, rows = planes.status, Content.of(planes), led(planes, box, units)
+            status, rows = planes.status, led(planes, box, units)
+            content = Content.of(planes)
+    if saddles is not None:
+        curves, said = curves_of(job, planes, saddles)
+        rows += said
+        content = Content.of(planes, manifolds=curves)
     return Answer(
         [facts(rows)],
         note=f"{status.size} cells, computed in {job.seconds:.2g} s",
         files={"out": content},
         complaints=ended_early(status[status != NO_STATE_STATUS], status.size),
     )
+
+
+def curves_of(job: Job, planes: Basins, longest: int) -> tuple[list[Manifolds], list[tuple[str, str | None]]]:
+    """Return the manifolds of all saddles of up to so many firings, and what is said of them."""
+    import numpy as np
+
+    from printhammer.chaos.orbits.manifolds import manifolds
+    from printhammer.chaos.orbits.orbit import SADDLE
+    from printhammer.chaos.orbits.search import orbits
+
+    spans = np.array([np.ptp(planes.x), np.ptp(planes.v)]) / planes.regime.window.half_widths
+    with job.counting("orbits", remaining=False) as tell:
+        known = [
+            orbit for orbit in orbits(planes.regime, longest=longest, progress=tell) if orbit.kind == SADDLE
+        ]
+    # The plane is that of the states at a firing.
+    shown = [orbit for orbit in known if orbit.phase == planes.regime.phase]
+    curves = []
+    with job.counting("saddles") as tell:
+        for number, saddle in enumerate(shown, 1):
+            way = _CROSSINGS * float(spans.max())
+            curves.append(manifolds(saddle, length=way, spacing=float(spans.max()) / _PIECES))
+            tell(number, len(shown))
+    rows: list[tuple[str, str | None]] = [("saddles", f"manifolds of {len(curves)} drawn")]
+    if len(known) > len(shown):
+        rows.append(("", f"{len(known) - len(shown)} more are in the pack at the firing"))
+    return curves, rows
 
 
 def led(result: Basins, box: int | None, units: Units) -> list[tuple[str, str | None]]:

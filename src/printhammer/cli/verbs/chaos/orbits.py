@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.orbit import Orbit
     from printhammer.cli.units import Units
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Regime
 
 _STYLES: Final = {"stable": "green", "saddle": "cyan", "unstable": "magenta", "undecided": "yellow"}
 _search = partial(opt.whole, panel="Search")
@@ -36,6 +37,15 @@ _COLUMNS: Final[tuple[Column[Orbit], ...]] = (
     Column("pack loss", partial(_energy, "pack_loss"), "energy"),
     Column("backstop loss", partial(_energy, "backstop_loss"), "energy"),
 )
+_DRIVE_WORK: Final[Column[Orbit]] = Column("drive work", partial(_energy, "drive_work"), "energy")
+_DAMPING_LOSS: Final[Column[Orbit]] = Column("damping loss", partial(_energy, "damping_loss"), "energy")
+
+
+def columns_for(regime: Regime) -> tuple[Column[Orbit], ...]:
+    """Return the columns of the table: the work of what drives the hammer, and the losses that it has."""
+    force = regime.fired.quantity == "force"
+    columns = tuple(_DRIVE_WORK if force and each.heading == "coil work" else each for each in _COLUMNS)
+    return (*columns, _DAMPING_LOSS) if regime.hammer.damping is not None else columns
 
 
 @verb(
@@ -62,7 +72,7 @@ def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **pa
     with job.counting("orbits", remaining=False) as tell:
         result = search(hammer, progress=tell, **firing, **passed)
     regime = result.regime
-    shown: list[Table | str] = [table(_COLUMNS, result, units), ""] if len(result) else []
+    shown: list[Table | str] = [table(columns_for(regime), result, units), ""] if len(result) else []
     missing = "no periodic orbit was found; more --starts or --guesses may find one"
     return Answer(
         [*shown, result.message],

@@ -1,0 +1,306 @@
+"""Compare what the program computes for the oscillators of the literature with what is known of them.
+
+Run it with ``.venv/bin/python docs/measure/known_results.py``; it takes a minute or two.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from measured import MOTION, Cell, Column, write
+
+import printhammer as ph
+from printhammer.chaos.continuation.branch import Branch
+
+ROOMS = (*MOTION, "chaos", "derivatives")
+SHARP = 1e-9
+"""Difference allowed from a closed form."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """One number that is known of a shipped oscillator, and how the program computes it."""
+
+    hammer: str
+    what: str
+    source: str
+    expected: str
+    """As printed; closed forms to twelve digits."""
+    tolerance: float
+    """Half a unit of the last digit that is printed; more only for a mean over a chaotic motion."""
+    compute: Callable[[], float]
+
+
+def resonant(omega: float, amplitude: float, phase: float, state: tuple[float, float], kind: str) -> float:
+    """Branch point of the orbits with one impact in two periods of the force."""
+    (event,) = [
+        event for event in resonant_branch(omega, amplitude, phase, state).events if event.kind == kind
+    ]
+    return float(event.value)
+
+
+@cache
+def resonant_branch(omega: float, amplitude: float, phase: float, state: tuple[float, float]) -> Branch:
+    """The orbits with one impact in two periods of the force, near an amplitude."""
+    drive = ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
+    bounds = (amplitude * (1.0 - 2e-3), amplitude * (1.0 + 2e-3))
+    hammer = ph.load("resonant-grazing")
+    return ph.continuation(
+        hammer, "drive.amplitude", bounds, drive=drive, state=state, firings=2, phase=phase
+    )
+
+
+FOLD = (0.799, 0.3628362, 0.0091, (1.91021, -0.06294))
+DOUBLING = (0.81, 0.3475334, 0.0125, (1.95734, -0.03168))
+FARTHER = (0.95001, 0.44844, 0.0059, (1.84241, -0.48668))
+
+
+def product() -> float:
+    """Product of the multipliers of the orbits with one impact in two periods, that farthest from exact."""
+    branch = resonant_branch(*FARTHER)
+    exact = 0.81 * math.exp(-4.0 * math.pi * 0.04 / FARTHER[0])
+    products = branch.multipliers.prod(axis=1).real
+    return float(products[np.abs(products - exact).argmax()])
+
+
+def grazing(name: str, omega: float, start: float, bounds: tuple[float, float]) -> float:
+    """Amplitude of the force at which the oscillation without impact touches the stop."""
+    hammer = ph.load(name)
+    spring = hammer.spring
+    rest = hammer.position + spring.preload / spring.stiffness
+    drive = ph.SineForce(start, omega / (2.0 * math.pi), phase="90 deg")
+    branch = ph.continuation(hammer, "drive.amplitude", bounds, drive=drive, state=(rest, 0.0))
+    (stop,) = [stop for stop in branch.stops if stop.reason == "grazing"]
+    return float(stop.parameter)
+
+
+def shaw_holmes(
+    omega: float, amplitude: float, phase: float, state: tuple[float, float], firings: int, kind: str
+) -> float:
+    """Branch point of the orbits with one impact in so many periods of the force."""
+    drive = ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
+    bounds = (0.99 * amplitude, 1.01 * amplitude)
+    branch = ph.continuation(
+        ph.load("shaw-holmes-1983"),
+        "drive.amplitude",
+        bounds,
+        drive=drive,
+        state=state,
+        firings=firings,
+        phase=phase,
+    )
+    (event,) = [event for event in branch.events if event.kind == kind]
+    return float(event.value)
+
+
+@cache
+def doublings() -> list[float]:
+    """Amplitudes of the table, cm, at which the ball doubles its period, one after the other."""
+    ball, frequency = ph.load("tufillaro-1992"), 60.0
+    weight, omega, e = -ball.spring.preload, 2.0 * math.pi * frequency, ball.backstop.restitution
+    gravity, gamma = weight / ball.mass, 1.3
+    # The table meets the ball at this phase; half a period after its phase 0 the ball is in flight.
+    meets = math.acos(math.pi * (1.0 - e) / (1.0 + e) / gamma)
+    height, leaves, later = gamma * gravity / omega**2, 0.5 * gravity / frequency, (math.pi - meets) / omega
+    state = height * math.sin(meets) + leaves * later - 0.5 * gravity * later**2, leaves - gravity * later
+    branch = ph.continuation(
+        ball,
+        "drive.amplitude",
+        (weight, 1.75 * weight),
+        drive=ph.SineForce(gamma * weight, frequency),
+        state=(state[0], state[1] + height * omega),
+        phase=0.5,
+    )
+    forces = []
+    for _ in range(3):
+        event = next(event for event in branch.events if event.kind == "period doubling")
+        forces.append(event.value)
+        branch = branch.doubled(event)
+    return [100.0 * force / (ball.mass * omega**2) for force in forces]
+
+
+@cache
+def duffing() -> tuple[float, float, float]:
+    """Both exponents per unit of time, and their sum."""
+    drive = ph.SineForce(0.3, 1.0 / (2.0 * math.pi), phase="90 deg")
+    found = ph.lyapunov(
+        ph.load("duffing-holmes"), drive=drive, state=(0.1, 0.1), firings=50_000, transient=500
+    )
+    assert found.growth == "chaotic"
+    return float(found.per_second[0]), float(found.per_second[1]), found.total / (2.0 * math.pi)
+
+
+@cache
+def rocking() -> ph.Motion:
+    """A block that is let go at 0.6 of the angle at which it tips over, in units of 1/p and of that angle."""
+    return ph.simulate(ph.load("housner-1963"), ph.SineForce(0.0, 1.0), state=(0.6, 0.0), duration=12.0)
+
+
+def rocking_angle(impacts: int) -> float:
+    """Largest angle after so many impacts."""
+    return float(rocking().maxima[1][impacts - 1])
+
+
+MODEL = "model of Simpson and Ghosh (2026), closed form"
+SHAW = "model of Shaw and Holmes (1983), closed form"
+BOOK = "Tufillaro, Abbott and Reilly (1992)"
+HOUSNER = "Housner (1963), formula"
+RECIPES = "Dankowicz and Schilder (2013), closed form"
+HOLMES = "equation of Holmes (1979), quoted to three digits"
+
+CASES = (
+    Known(
+        "resonant-grazing",
+        "w = 0.81, one impact in two periods: F of the doubling",
+        MODEL,
+        "0.347533397412",
+        SHARP,
+        lambda: resonant(*DOUBLING, "period doubling"),
+    ),
+    Known(
+        "resonant-grazing",
+        "w = 0.95001, one impact in two periods: F of the doubling",
+        MODEL,
+        "0.448439415498",
+        SHARP,
+        lambda: resonant(*FARTHER, "period doubling"),
+    ),
+    Known(
+        "resonant-grazing",
+        "w = 0.799, one impact in two periods: F of the fold",
+        MODEL,
+        "0.362836201981",
+        SHARP,
+        lambda: resonant(*FOLD, "fold"),
+    ),
+    Known(
+        "resonant-grazing",
+        "w = 0.95001, one impact in two periods: product of the multipliers",
+        MODEL,
+        "0.477197034359",
+        1e-10,
+        product,
+    ),
+    Known(
+        "resonant-grazing",
+        "w = 0.81, without impact: F of the grazing",
+        MODEL,
+        "0.345422885750",
+        SHARP,
+        lambda: grazing("resonant-grazing", 0.81, 0.3, (0.25, 0.4)),
+    ),
+    Known(
+        "shaw-holmes-1983",
+        "w = 2.2, one impact in a period: F of the doubling",
+        SHAW,
+        "0.426985572704",
+        SHARP,
+        lambda: shaw_holmes(2.2, 0.427, 0.4823, (0.18637, 0.01023), 1, "period doubling"),
+    ),
+    Known(
+        "shaw-holmes-1983",
+        "w = 2.6, one impact in two periods: F of the doubling",
+        SHAW,
+        "0.251827113670",
+        SHARP,
+        lambda: shaw_holmes(2.6, 0.252, 0.0732, (0.0573, 0.2256), 2, "period doubling"),
+    ),
+    Known(
+        "shaw-holmes-1983",
+        "w = 2.6, one impact in two periods: F of the fold",
+        SHAW,
+        "0.087142997638",
+        SHARP,
+        lambda: shaw_holmes(2.6, 0.08715, 0.2649, (0.06975, 0.1598), 2, "fold"),
+    ),
+    *(
+        Known(
+            "tufillaro-1992",
+            f"60 Hz, restitution 0.5: amplitude of doubling {k + 1}, cm",
+            BOOK,
+            printed,
+            5e-9,
+            lambda k=k: doublings()[k],
+        )
+        for k, printed in enumerate(("0.01053531", "0.01150345", "0.01170804"))
+    ),
+    Known(
+        "duffing-holmes",
+        "F = 0.3: larger exponent per unit of time",
+        HOLMES,
+        "0.159",
+        2e-3,
+        lambda: duffing()[0],
+    ),
+    Known(
+        "duffing-holmes",
+        "F = 0.3: smaller exponent per unit of time",
+        HOLMES,
+        "-0.359",
+        2e-3,
+        lambda: duffing()[1],
+    ),
+    Known(
+        "duffing-holmes",
+        "F = 0.3: sum of the exponents",
+        "minus the damping",
+        "-0.2",
+        SHARP,
+        lambda: duffing()[2],
+    ),
+    Known(
+        "housner-1963",
+        "let go at 0.6: p times the time of the first impact",
+        HOUSNER,
+        "1.566799236972",
+        SHARP,
+        lambda: float(rocking().contacts[0].t_in),
+    ),
+    *(
+        Known(
+            "housner-1963",
+            f"let go at 0.6, r = 0.81: largest angle after {impacts} impact{'s' if impacts > 1 else ''}",
+            HOUSNER,
+            printed,
+            SHARP,
+            lambda impacts=impacts: rocking_angle(impacts),
+        )
+        for impacts, printed in ((1, "0.434668238996"), (2, "0.330017910687"), (5, "0.159101605236"))
+    ),
+    Known(
+        "dankowicz-schilder-2013",
+        "w = 1: A of the grazing",
+        RECIPES,
+        "0.1",
+        SHARP,
+        lambda: grazing("dankowicz-schilder-2013", 1.0, 0.05, (0.02, 0.5)),
+    ),
+)
+
+
+def main() -> None:
+    """Compute all and write the table."""
+    rows: list[list[Cell]] = []
+    for case in CASES:
+        ours = case.compute()
+        off = ours - float(case.expected)
+        rows.append(
+            [case.hammer, case.what, case.source, case.expected, ours, off, abs(off) <= case.tolerance]
+        )
+    columns = [
+        Column(name="oscillator"),
+        Column(name="what"),
+        Column(name="source"),
+        Column(name="known"),
+        Column(name="ours", format=".12g"),
+        Column(name="difference", format=".1e"),
+        Column(name="within tolerance"),
+    ]
+    hammers = tuple(sorted({case.hammer for case in CASES}))
+    write("known-results", columns, rows, {"exponents": 50_000}, ROOMS, hammers=hammers)
+
+
+if __name__ == "__main__":
+    main()

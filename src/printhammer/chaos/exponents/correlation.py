@@ -1,0 +1,213 @@
+"""Correlation dimension of an attractor, with its plateau and an interval that says what is known.
+
+The correlation sum C(r) is the part of the pairs of states that lie closer than r; on an attractor of
+dimension D2 it goes as r^D2 where r is neither so large that the shape shows nor so small that few pairs are
+left (P. Grassberger and I. Procaccia, Physica D 9 (1983) 189). Pairs close in time are left out (J. Theiler,
+Phys. Rev. A 34 (1986) 2427). The dimension is the slope of ln C over ln r on a *plateau*: the widest range
+over which the slope of short pieces stays within a tolerance.
+
+Weakness: of N states distances below about N^(-2/D2) of the whole are not seen, and a set with gaps has
+slopes that waver however many states there are. The interval therefore has room for every slope on the
+plateau, and for the scatter between parts of the series; without a plateau there is no dimension.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.exponents.recurrence import rows_of
+from printhammer.chaos.strobe.points import Strobe, points_of
+from printhammer.drive.input import read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.results import Result, column, coordinate, scalar
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+MOST: Final = 50_000
+"""Largest number of states."""
+FEWEST: Final = 200
+"""Smallest number of states."""
+THEILER: Final = 10
+FLAT: Final = 0.1
+"""Range of local slopes on a plateau, unless told otherwise."""
+
+_PER_OCTAVE: Final = 2
+_PIECE: Final = 4
+"""Radii over which a local slope is taken."""
+_SHORTEST: Final = 3 * _PER_OCTAVE
+"""Radii of the shortest plateau: a factor of 8."""
+_FEW_PAIRS: Final = 200
+_LARGEST: Final = 0.25
+"""Share of pairs above which the shape of the attractor shows."""
+_PARTS: Final = 5
+
+
+class CorrelationDimension(Result, rows="radius"):
+    """Correlation sums of a series of states, their local slopes, and the dimension if there is a plateau."""
+
+    radius: FloatArray = coordinate("1", "distance of states", "radius", more="in units of the scales")
+    sums: FloatArray = column("1", "part of the pairs that lie closer", "radius", name="correlation_sum")
+    slopes: FloatArray = column(
+        "1", "slope of its logarithm over that of the distance", "radius", more="nan at the ends"
+    )
+    states: int = scalar("1", "number of states")
+    theiler: int = scalar("1", "states less than so many places apart are not counted")
+    flat: float = scalar("1", "largest range of local slopes on a plateau")
+    plateau: tuple[float, float] = scalar("1", "distances between which the slope is flat, or nan")
+    dimension: float = scalar("1", "correlation dimension", more="nan without a plateau")
+    low: float = scalar("1", "lower end of the interval of the dimension")
+    high: float = scalar("1", "upper end of the interval of the dimension")
+
+    @property
+    def title(self) -> str:
+        """One line that says what this is."""
+        return f"correlation dimension of {self.states} states"
+
+    @property
+    def message(self) -> str:
+        """The dimension with its interval and plateau, or why there is none, in one line."""
+        if math.isnan(self.dimension):
+            return f"no plateau over a factor of 8 with slopes within {self.flat:.2g}: no dimension"
+        near, far = self.plateau
+        return (
+            f"dimension {self.dimension:.3f}, between {self.low:.3f} and {self.high:.3f}, on a plateau from"
+            f" {near:.2g} to {far:.2g}"
+        )
+
+
+def correlation_dimension(
+    states: npt.ArrayLike | Strobe | Regime,
+    *,
+    scales: npt.ArrayLike | None = None,
+    theiler: SupportsIndex = THEILER,
+    flat: float = FLAT,
+) -> CorrelationDimension:
+    """Return the correlation dimension of a series of states, or of the points of a strobe.
+
+    Parameters
+    ----------
+    states : array, Strobe or Regime
+        One row for each state, or one number; 200 to 50,000. Of strobe points: displacement, velocity and
+        memory of the pack. Of a regime a thousand points are taken, after a thousand firings; a few
+        thousand tell more. The distance is the largest difference of a component.
+    scales : array, optional
+        By which the components are divided; by default the half-widths of the window of a strobe, and 1 for
+        other states.
+    theiler : int, optional
+        States less than so many places apart are not counted.
+    flat : float, optional
+        Largest range of local slopes on a plateau.
+
+    Returns
+    -------
+    CorrelationDimension
+        The interval goes to either side of the dimension as far as the local slopes on the plateau, and
+        twice the standard error between five parts of the series beyond.
+
+    Raises
+    ------
+    InputError
+        Too many or too few states, states not finite, all equal, or scales that do not fit.
+    """
+    rows, units = rows_of(points_of(states, {}), scales, MOST)
+    apart, tolerance = read_count(theiler, "theiler"), read_positive(flat, "1", "flat")
+    if len(rows) < FEWEST:
+        raise InputError(f"states: {len(rows)} are given, expected {FEWEST} to {MOST}")
+    if apart > len(rows) // 4:
+        raise InputError(
+            f"theiler = {apart}, expected at most a quarter of the number of states, {len(rows)}"
+        )
+    scaled = rows / units
+    width = float(np.ptp(scaled, axis=0).max())
+    if width == 0.0:
+        raise InputError("states: all are equal, expected an attractor of more than one state")
+    count = math.ceil(_PER_OCTAVE * math.log2(2.0 * len(rows)) * 2.0)
+    radius = width * 2.0 ** (-np.arange(count)[::-1] / _PER_OCTAVE)
+    sums, pairs = correlation_sums(scaled, radius, apart)
+    slopes = local_slopes(radius, np.where(sums * pairs >= _FEW_PAIRS, sums, np.nan))
+    slopes[sums > _LARGEST] = np.nan
+    flattest = _plateau(slopes, tolerance)
+    if flattest is None:
+        nothing = (math.nan, math.nan)
+        return CorrelationDimension(
+            radius=radius, sums=sums, slopes=slopes, states=len(rows), theiler=apart, flat=tolerance,
+            plateau=nothing, dimension=math.nan, low=math.nan, high=math.nan,
+        )  # fmt: skip
+    first, last = flattest
+    dimension = _slope(radius[first : last + 1], sums[first : last + 1])
+    parts = []
+    for part in np.array_split(scaled, _PARTS):
+        own, few = correlation_sums(part, radius[first : last + 1], min(apart, len(part) // 4))
+        seen = own * few >= 2.0
+        parts.append(_slope(radius[first : last + 1][seen], own[seen]) if seen.sum() > 1 else math.nan)
+    error = 2.0 * float(np.nanstd(parts)) / math.sqrt(_PARTS - 1)
+    room = float(np.abs(slopes[first : last + 1] - dimension).max()) + error
+    return CorrelationDimension(
+        radius=radius,
+        sums=sums,
+        slopes=slopes,
+        states=len(rows),
+        theiler=apart,
+        flat=tolerance,
+        plateau=(float(radius[first]), float(radius[last])),
+        dimension=dimension,
+        low=dimension - room,
+        high=dimension + room,
+    )
+
+
+def correlation_sums(states: FloatArray, radius: FloatArray, theiler: int) -> tuple[FloatArray, int]:
+    """Return the part of the pairs of states that lie within some distances, and how many pairs count.
+
+    States less than `theiler` places apart are not counted.
+    """
+    from scipy.spatial import cKDTree
+
+    count = len(states)
+    tree = cKDTree(states)
+    within = (tree.count_neighbors(tree, radius, p=math.inf) - count).astype(np.float64) / 2.0
+    for lag in range(1, theiler):
+        distances = np.sort(np.abs(states[lag:] - states[:-lag]).max(axis=1))
+        within -= np.searchsorted(distances, radius, side="right")
+    pairs = (count - theiler) * (count - theiler + 1) // 2
+    return np.asarray(within / pairs), pairs
+
+
+def local_slopes(radius: FloatArray, sums: FloatArray) -> FloatArray:
+    """Return the slope of ln C over ln r at each distance, from the straight line through its neighbours."""
+    slopes = np.full(len(radius), np.nan)
+    half = _PIECE // 2
+    for k in range(half, len(radius) - half):
+        piece = slice(k - half, k + half + 1)
+        if np.isfinite(sums[piece]).all() and (sums[piece] > 0.0).all():
+            slopes[k] = _slope(radius[piece], sums[piece])
+    return slopes
+
+
+def _slope(radius: FloatArray, sums: FloatArray) -> float:
+    x, y = np.log(radius), np.log(sums)
+    away = x - x.mean()
+    return float(away @ y / (away @ away))
+
+
+def _plateau(slopes: FloatArray, tolerance: float) -> tuple[int, int] | None:
+    """Return the ends of the longest row of slopes within a tolerance, of rows as long the flattest."""
+    best: tuple[int, float, int] | None = None
+    for first in range(len(slopes)):
+        least, most = math.inf, -math.inf
+        for last in range(first, len(slopes)):
+            if not math.isfinite(slopes[last]):
+                break
+            least, most = min(least, float(slopes[last])), max(most, float(slopes[last]))
+            if most - least > tolerance:
+                break
+            if last - first >= _SHORTEST and (best is None or (last - first, least - most) > best[:2]):
+                best = (last - first, least - most, first)
+    return None if best is None else (best[2], best[2] + best[0])

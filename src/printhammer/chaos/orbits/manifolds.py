@@ -1,0 +1,384 @@
+"""Stable and unstable manifolds of saddles of the strobe map, as curves in the plane of states.
+
+The unstable manifold of a saddle is the set of states that come from it, the stable one that of the states
+which are led to it; the latter bounds basins. Both are tangent at the saddle to an eigenvector of the
+monodromy matrix. The unstable one is grown from a fundamental segment on that eigenvector, whose images under
+the map are the whole curve; where two images lie too far apart or the curve bends too much, a point of the
+segment between them is followed as well (D. Hobson, J. Comput. Phys. 104 (1993) 14). Time does not run back
+through the paper's pack or a contact at rest, so the stable one is continued instead: each further point is
+the state whose image is a point of the curve already known, by Newton's method with the tangent flow (J. P.
+England, B. Krauskopf and H. M. Osinga, SIAM J. Appl. Dyn. Syst. 3 (2004) 161).
+
+Lengths are in half-widths of the strobe window. Weakness: a curve ends where the map has no derivative or the
+state is none, such as below a rigid backstop; what lies beyond is not found.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import product
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.chaos.orbits.maps import ExactMaps
+from printhammer.chaos.orbits.newton import CLOSED
+from printhammer.chaos.orbits.orbit import SADDLE, Orbit, multipliers_of
+from printhammer.drive.input import read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.results import Column, Result, column, part
+from printhammer.support.threads import mapped
+
+if TYPE_CHECKING:
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray, IntArray
+    from printhammer.support.threads import Progress
+
+KINDS: Final = ("stable", "unstable")
+LENGTH: Final = 10.0
+"""Length of each of the curves unless told otherwise."""
+POINTS: Final = 4000
+"""Points of each of the curves, at most, unless told otherwise."""
+SPACING: Final = 0.02
+"""Distance of neighbouring points that is aimed at, unless told otherwise."""
+BEND: Final = 0.2
+"""Angle between neighbouring pieces, rad, above which the curve gets more points."""
+
+_NEAR: Final = 1e-5
+"""Distance from the saddle up to which a manifold is taken to be straight."""
+_FINEST: Final = 1e-3
+"""Share of the spacing below which a bend gets no more points."""
+_TIGHT: Final = 1e-12
+"""Distance of points of a fundamental segment below which what lies apart is a jump."""
+_CLOSE: Final = 1e-10
+_NEWTON: Final = 8
+_FEW: Final = 4
+
+
+class Manifolds(Result, rows="point"):
+    """Stable and unstable manifolds of one saddle: curves from each of its states to both sides.
+
+    A jump of the strobe map, where a contact happens at the section, shows as a row of NaN.
+    """
+
+    orbit: Orbit = part("the saddle")
+    x: FloatArray = column("m", "displacement", "point")
+    v: FloatArray = column("m/s", "velocity", "point")
+    curve: IntArray = column("1", "number of the curve, from 0 on", "point", dtype=np.int32)
+    length: FloatArray = column(
+        "1", "way along the curve from the saddle, in half-widths of the window", "point"
+    )
+    kinds: IntArray = column("1", "kind of the curve", "curves", dtype=np.int32, codes=KINDS, name="kind")
+    ends: tuple[str, ...] = part(
+        'why each curve ends: "length"; "points"; "no preimage", where Newton\'s method finds none; "no'
+        ' value", where no run comes through'
+    )
+    spacing: float = part("distance of neighbouring points that was aimed at")
+
+    @property
+    def title(self) -> str:
+        """One line that says what the curves are."""
+        return f"manifolds of the {self.orbit.name} of {self.orbit.regime.hammer.name}"
+
+    def points(self, number: int) -> FloatArray:
+        """Return displacement, m, and velocity, m/s, along one of the curves, shape (n, 2)."""
+        rows = self.curve == number
+        return np.column_stack([self.x[rows], self.v[rows]])
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return points over `point`, and kind and end of each curve over `curves`."""
+        own = super().entries()
+        ends = np.array(self.ends, "U16")
+        own["end"] = Column("", "why the curve ends", ("curves",), name="end"), ends
+        return own
+
+
+def manifolds(
+    orbit: Orbit,
+    *,
+    length: float = LENGTH,
+    points: SupportsIndex = POINTS,
+    spacing: float = SPACING,
+    kinds: tuple[str, ...] = KINDS,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Manifolds:
+    """Return the stable and unstable manifolds of a saddle, at the phase of its section.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        A saddle, see `printhammer.orbits`.
+    length : float, optional
+        Of each curve, in half-widths of the strobe window, along it.
+    points : int, optional
+        Of each curve, at most.
+    spacing : float, optional
+        Distance of neighbouring points that is aimed at, in the same unit.
+    kinds : tuple of str, optional
+        "stable", "unstable", or both.
+    threads, progress
+        As for `printhammer.chaos.strobes`; of the curves.
+
+    Returns
+    -------
+    Manifolds
+        Of an orbit of n firings 2 n curves of each kind.
+
+    Raises
+    ------
+    InputError
+        The orbit is no saddle with a derivative, or an argument is not what is described above.
+    """
+    if not orbit.ok or orbit.kind != SADDLE:
+        raise InputError(f"the orbit is a {orbit.name}, expected a saddle, which has both manifolds")
+    unknown = [kind for kind in kinds if kind not in KINDS]
+    if unknown or not kinds:
+        raise InputError(f"kinds = {kinds!r}, expected some of {', '.join(KINDS)}")
+    limits = _Limits(
+        read_positive(length, "1", "length"),
+        read_count(points, "points"),
+        read_positive(spacing, "1", "spacing"),
+    )
+    own = Scaled(orbit.regime, orbit.tolerance)
+    states = [own.inward(orbit.section)]
+    for _ in range(orbit.firings - 1):
+        states.append(own.image(states[-1], 1)[0])
+    tasks = list(product(kinds, states, (1.0, -1.0)))
+    grow = {"stable": _stable, "unstable": _unstable}
+    made = mapped(
+        lambda i: grow[tasks[i][0]](own, tasks[i][1], tasks[i][2], orbit.firings, limits),
+        range(len(tasks)),
+        threads,
+        progress,
+    )
+    curves = [own.outward(curve.points) for curve in made]
+    return Manifolds(
+        orbit=orbit,
+        x=np.concatenate([curve[:, 0] for curve in curves]),
+        v=np.concatenate([curve[:, 1] for curve in curves]),
+        curve=np.repeat(np.arange(len(curves)), [len(curve) for curve in curves]),
+        length=np.concatenate([_along(curve.points) for curve in made]),
+        kinds=np.array([KINDS.index(kind) for kind, _, _ in tasks]),
+        ends=tuple(curve.end for curve in made),
+        spacing=limits.spacing,
+    )
+
+
+@dataclass(frozen=True)
+class _Limits:
+    length: float
+    points: int
+    spacing: float
+
+
+@dataclass
+class _Curve:
+    """A curve from a saddle on, in half-widths of the window."""
+
+    points: FloatArray
+    end: str
+
+
+class Scaled:
+    """The strobe map in half-widths of the window, with its derivative."""
+
+    def __init__(self, regime: Regime, tolerance: float) -> None:
+        self.maps, self.scales = ExactMaps(regime, tolerance, 1), regime.window.half_widths
+
+    def inward(self, states: FloatArray) -> FloatArray:
+        """Return states, m and m/s, in half-widths."""
+        return np.asarray(states / self.scales)
+
+    def outward(self, points: FloatArray) -> FloatArray:
+        """Return points in half-widths as states, m and m/s."""
+        return np.asarray(points * self.scales)
+
+    def image(self, point: FloatArray, firings: int) -> tuple[FloatArray, FloatArray]:
+        """Return the image of a point and the derivative there; NaN where there is none."""
+        images = self.maps(self.outward(point)[np.newaxis], np.array([firings]))
+        if images.reasons[0] != CLOSED:
+            return np.full(2, np.nan), np.full((2, 2), np.nan)
+        jacobian = images.jacobians[0] / self.scales[:, np.newaxis] * self.scales
+        return self.inward(images.states[0]), jacobian
+
+
+def _direction(own: Scaled, saddle: FloatArray, firings: int, stable: bool) -> tuple[FloatArray, float, int]:
+    """Return the eigenvector at a saddle, how it grows in a number of firings, and that number.
+
+    Where the multiplier is negative a state changes sides, so that two periods of the orbit are one step.
+    """
+    _, jacobian = own.image(saddle, firings)
+    # Of the two the smaller one would drown in the rounding of the trace.
+    large, small = (float(value.real) for value in multipliers_of(jacobian[np.newaxis]))
+    multiplier = small if stable else large
+    first = jacobian - multiplier * np.eye(2)
+    row = first[int(np.argmax(np.abs(first).sum(axis=1)))]
+    vector = np.array([-row[1], row[0]])
+    turns = 1 if multiplier > 0.0 else 2
+    return vector / np.hypot(*vector), abs(multiplier) ** turns, turns * firings
+
+
+def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
+    """Grow an unstable manifold from images of a fundamental segment."""
+    vector, growth, firings = _direction(own, saddle, firings, stable=False)
+    start = _NEAR / growth
+
+    def on_segment(share: float, level: int) -> FloatArray:
+        point = saddle + side * start * growth**share * vector
+        for _ in range(level):
+            if not np.isfinite(point).all():
+                break
+            point = own.image(point, firings)[0]
+        return np.asarray(point)
+
+    points, total, level = [saddle], 0.0, 0
+    shares = [0.0, 1.0]
+    row = [on_segment(share, 0) for share in shares]
+    while True:
+        level += 1
+        row = [own.image(point, firings)[0] if np.isfinite(point).all() else point for point in row]
+        k = 0
+        while k + 1 < len(row):
+            gap, close = _gap(row, k, limits.spacing), shares[k + 1] - shares[k] <= _TIGHT
+            if gap and not close and len(points) + len(row) < 2 * limits.points:
+                shares.insert(k + 1, 0.5 * (shares[k] + shares[k + 1]))
+                row.insert(k + 1, on_segment(shares[k + 1], level))
+                continue
+            k += 1
+            if close and gap:
+                points.append(np.full(2, np.nan))
+            elif np.isfinite(row[k]).all() and np.isfinite(points[-1]).all():
+                total += float(np.hypot(*(row[k] - points[-1])))
+            points.append(row[k])
+            if total >= limits.length:
+                return _Curve(np.array(points), "length")
+            if len(points) >= limits.points:
+                return _Curve(np.array(points), "points")
+        if not np.isfinite(row).any():
+            return _Curve(np.array(points), "no value")
+
+
+def _gap(row: list[FloatArray], k: int, spacing: float) -> bool:
+    """Return whether a curve needs a point after its k-th one."""
+    here, there = row[k], row[k + 1]
+    step = float(np.hypot(*(there - here)))
+    if not math.isfinite(step):
+        # Beside the end of a curve: as close to it as to its other points.
+        return bool(np.isfinite(here).any() != np.isfinite(there).any())
+    if step > spacing:
+        return True
+    if k == 0 or step < _FINEST * spacing:
+        return False
+    before = here - row[k - 1]
+    return bool(np.isfinite(before).all() and _angle(before, there - here) > BEND)
+
+
+def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
+    """Continue a stable manifold: each point is the state whose image lies on the curve, further in."""
+    vector, shrink, firings = _direction(own, saddle, firings, stable=True)
+    made = _Inward(saddle, side * _NEAR * vector, shrink)
+    place, step, total = 1.0, 0.05, 0.0
+    end = "length"
+    while total < limits.length:
+        if len(made.points) >= limits.points:
+            end = "points"
+            break
+        if step <= _TIGHT:
+            end = "no preimage"
+            break
+        last, wanted = made.points[-1], made.at(place + step - 1.0)
+        # The curve goes on as it was; at first it is straight.
+        ahead = made.at(place + step) if len(made.points) >= _FEW else made.ahead(step)
+        move = ahead - last
+        # Far away a run may cost anything.
+        near = float(np.hypot(*move)) <= 2.0 * limits.spacing
+        solved = _preimage(own, wanted, last + move, firings, limits.spacing) if near else None
+        if solved is None:
+            step *= 0.5
+            continue
+        point = solved
+        way = float(np.hypot(*(point - last)))
+        turn = _angle(last - made.points[-2], point - last) if len(made.points) > 1 else 0.0
+        if way > limits.spacing or (turn > BEND and way > _FINEST * limits.spacing):
+            step *= 0.5
+            continue
+        place += step
+        total += way
+        made.points.append(point)
+        made.places.append(place)
+        if way < 0.5 * limits.spacing and turn < 0.5 * BEND:
+            step *= 1.5
+    return _Curve(np.array([saddle, *made.points]), end)
+
+
+@dataclass
+class _Inward:
+    """A stable manifold as far as it is known, by a place that grows by 1 from a point to its preimage.
+
+    Up to the place 1 it is straight.
+    """
+
+    saddle: FloatArray
+    reach: FloatArray
+    """From the saddle to the place 1."""
+    shrink: float
+    points: list[FloatArray] = field(default_factory=list)
+    places: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.points.append(self.saddle + self.reach)
+        self.places.append(1.0)
+
+    def ahead(self, step: float) -> FloatArray:
+        """Return where the curve would be a step beyond its last place, were it straight."""
+        return np.asarray(self.saddle + (self.points[-1] - self.saddle) * self.shrink**-step)
+
+    def at(self, place: float) -> FloatArray:
+        """Return the point at a place: beyond 1 by the cubic through four neighbours.
+
+        Of distances from the saddle in units of those that they would have if all were linear.
+        """
+        if place <= 1.0:
+            return np.asarray(self.saddle + self.shrink ** (1.0 - place) * self.reach)
+        right = int(np.searchsorted(self.places, place))
+        first = min(max(right - 2, 0), max(len(self.places) - 4, 0))
+        near = slice(first, first + 4)
+        t, rows = np.array(self.places[near]), np.array(self.points[near])
+        weights = [
+            math.prod((place - t[j]) / (t[i] - t[j]) for j in range(len(t)) if j != i) for i in range(len(t))
+        ]
+        away = (rows - self.saddle) * self.shrink ** (t - place)[:, np.newaxis]
+        return np.asarray(self.saddle + np.array(weights) @ away)
+
+
+def _preimage(
+    own: Scaled, wanted: FloatArray, guess: FloatArray, firings: int, spacing: float
+) -> FloatArray | None:
+    """Return the state near a guess that the map takes to a point, if Newton's method finds it."""
+    point = guess
+    for _ in range(_NEWTON):
+        image, jacobian = own.image(point, firings)
+        if not np.isfinite(jacobian).all() or np.linalg.det(jacobian) == 0.0:
+            return None
+        miss = image - wanted
+        move = np.linalg.solve(jacobian, miss)
+        point = point - move
+        if not float(np.hypot(*move)) <= 2.0 * spacing:
+            return None
+        if float(np.hypot(*miss)) <= _CLOSE * max(1.0, float(np.hypot(*wanted))):
+            return point
+    return None
+
+
+def _angle(one: FloatArray, other: FloatArray) -> float:
+    """Return the angle between two directions, rad."""
+    across = one[0] * other[1] - one[1] * other[0]
+    return abs(math.atan2(across, float(one @ other)))
+
+
+def _along(points: FloatArray) -> FloatArray:
+    """Return the way along a curve at its points; a jump has none."""
+    steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
+    return np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,0 +1,45 @@
+"""Spring of Duffing's equation: a linear and a cubic term about the place where it is relaxed.
+
+    Fs = -K (x - x0) - D (x - x0)^3
+
+Source: G. Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (Vieweg, 1918); with a negative K
+and a positive D two wells, P. Holmes, Phil. Trans. R. Soc. Lond. A 292 (1979) 419.
+Validity: deflections for which higher terms are small. Weakness: symmetric about x0, neither mass nor damping
+of its own; with a negative D it pushes away without bound beyond sqrt(-K / D).
+
+Packed constants: c = [K, D, x0].
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from printhammer.parts.base import SpringPart, register
+from printhammer.support.constants import quantity
+
+
+def spring_force(c: Any, x: float) -> float:
+    """Return the force of the spring, N."""
+    travel = x - c[2]
+    return float(-(c[0] + c[1] * travel * travel) * travel)
+
+
+def spring_energy(c: Any, x: float) -> float:
+    """Return the potential energy of the spring, J, zero where it is relaxed."""
+    square = (x - c[2]) * (x - c[2])
+    return float((0.5 * c[0] + 0.25 * c[1] * square) * square)
+
+
+@register
+class CubicSpring(SpringPart):
+    """Stiffness, coefficient of the cubic term, and place where the spring is relaxed."""
+
+    law: ClassVar[str] = "cubic"
+
+    stiffness: float = quantity("N/m", "K", "stiffness at the relaxed place, negative between two wells")
+    cubic: float = quantity("N/m^3", "D", "coefficient of the cubic term")
+    center: float = quantity("m", "x0", "position at which the spring is relaxed")
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (K, D, x0)."""
+        return (self.stiffness, self.cubic, self.center)
