@@ -9,7 +9,7 @@ from tests.truth.impact_orbits import BouncingBall, LinearImpacts
 import printhammer as ph
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.continuation import continuation
-from printhammer.chaos.continuation.stability_chart import stability_chart
+from printhammer.chaos.curves.stability_chart import stability_chart
 
 SHARP = 1e-8
 MASS, GRAVITY, FREQUENCY = 1e-3, 9.80665, 50.0

@@ -156,7 +156,7 @@ def points_of(
             kinds = [kind for kind in kinds if kind not in ("fold", "branching")]
         points = []
         for kind in kinds:
-            locate = _branching if kind == "branching" else _crossing
+            locate = _branching if kind == "branching" else zero_between
             share, node = locate(follower, here, ahead, tests[kind])
             if kind == "Neimark-Sacker" and not _has_pair(node if node is not None else here):
                 continue
@@ -191,7 +191,7 @@ def _has_pair(node: Node) -> bool:
     return bool((pair & (np.abs(np.abs(node.multipliers) - 1.0) < 1e-3)).any())
 
 
-def _crossing(
+def zero_between(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
     """Return where between two nodes a test function is zero, as a share of the way, and the node there.
@@ -230,7 +230,7 @@ def _crossing(
 def _branching(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Return where two curves cross, as `_crossing`.
+    """Return where two curves cross, as `zero_between`.
 
     Newton's method fails at the crossing itself: it is bracketed ever closer and met by interpolation.
     """

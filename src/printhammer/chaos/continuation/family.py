@@ -20,6 +20,8 @@ from printhammer.run.problem import Problem, Record
 from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
@@ -34,6 +36,14 @@ _MOST_TOUCHES: Final = 100
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
 
 Surface = Literal["pack", "backstop"]
+
+
+def cyclic(surfaces: Iterable[str]) -> str:
+    """Return a sequence of surfaces touched, P or B each, from where it is first in the alphabet."""
+    word = "".join("P" if surface == "pack" else "B" for surface in surfaces)
+    if len(word) > _MOST_TOUCHES:
+        return _MANY
+    return min((word[i:] + word[:i] for i in range(len(word))), default="")
 
 
 class Touch(Declared):
@@ -64,10 +74,7 @@ class Passage(Declared):
 
         A touch that moves through the section changes nothing: of an orbit, the beginning is arbitrary.
         """
-        word = "".join("P" if touch.surface == "pack" else "B" for touch in self.touches)
-        if len(word) > _MOST_TOUCHES:
-            return _MANY
-        return min((word[i:] + word[:i] for i in range(len(word))), default="")
+        return cyclic(touch.surface for touch in self.touches)
 
     @property
     def dots(self) -> list[tuple[float, float] | None]:

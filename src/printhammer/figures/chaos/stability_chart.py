@@ -14,7 +14,7 @@ from printhammer.figures.elements.style import new_panel, sign, styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.continuation.stability_chart import StabilityChart
+    from printhammer.chaos.curves.stability_chart import StabilityChart
 
 _STYLES: Final = {
     "fold": (style.BLUE, "-"),

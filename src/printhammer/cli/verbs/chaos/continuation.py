@@ -84,7 +84,7 @@ def continue_(
     """
     from printhammer.chaos.continuation.regimes import InterruptedBranches
     from printhammer.chaos.continuation.regimes import regimes as all_regimes
-    from printhammer.chaos.continuation.stability_chart import stability_chart
+    from printhammer.chaos.curves.stability_chart import stability_chart
     from printhammer.run.regime import Regime
 
     bounds = _both(lowest, highest, "--from", "--to", parameter)
