@@ -135,6 +135,7 @@ def curve_of(plane: Plane, traced: Traced, grid: tuple[int, int], threads: int |
         contacts=tuple(place.contacts for place in places),
         points=tuple(traced.points),
         stops=traced.stops,
+        crossings=traced.crossings,
         grid=axes,
         settled=settled,
     )

@@ -7,13 +7,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.drive.input import read_number
+from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy.typing as npt
 
     from printhammer.chaos.continuation.arclength import Stop
     from printhammer.chaos.curves.codimension import CodimensionTwo
+    from printhammer.chaos.curves.systems import Place
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -68,6 +73,9 @@ class BifurcationCurve(Result, rows="point"):
     stops: tuple[Stop, Stop] = part("why and where the curve ends", repr=False)
     grid: tuple[FloatArray, FloatArray] = part(
         "values of the two constants, shapes (m,) and (n,), at which trains from rest were judged", repr=False
+    )
+    crossings: Callable[[int, float], list[Place]] = part(
+        "solves for the places at which the curve passes a value of the first or second constant", repr=False
     )
     settled: IntArray = column(
         "1",
@@ -134,6 +142,27 @@ class BifurcationCurve(Result, rows="point"):
             period=regime.period,
             tolerance=self.tolerance,
         )
+
+    def at(self, name: str, value: float | str) -> list[tuple[float, float]]:
+        """Return both constants where the curve passes a value of one of them, solved for anew.
+
+        Parameters
+        ----------
+        name : str
+            One of the two constants.
+        value : float or str
+            SI or text with a unit.
+
+        Raises
+        ------
+        InputError
+            It is none of the two, or no number.
+        """
+        if name not in self.names:
+            raise InputError(f"name = {name!r}, expected {self.names[0]} or {self.names[1]}")
+        which = self.names.index(name)
+        level = read_number(value, self.units[which], name)
+        return [(place.first, place.second) for place in self.crossings(which, level)]
 
     def notes(self) -> dict[str, Any]:
         """Return how the curve ends, and the points of codimension two, for the attributes of the Dataset."""

@@ -37,6 +37,8 @@ MOST_PERIODS: Final = 4
 _SPACINGS: Final = (2e-3, 2e-4, 5e-5)
 _AGREE: Final = 0.05
 """Relative difference of coefficients from one spacing and from its half, within which they count."""
+_DOUBLES: Final = 1e-4
+"""Distance of a multiplier from -1 within which it is known well enough."""
 _FEW: Final = 1e-9
 
 
@@ -60,9 +62,13 @@ def doubling_coefficient(plane: Plane, place: Place) -> float:
         return math.nan
     matrix, contacts = here
     values, right = np.linalg.eig(matrix)
+    if float(np.abs(values + 1.0).min()) > _DOUBLES:
+        return math.nan
     q = right[:, int(np.argmin(np.abs(values + 1.0)))].real
     values, left = np.linalg.eig(matrix.T)
     p = left[:, int(np.argmin(np.abs(values + 1.0)))].real
+    if abs(float(p @ q)) < _FEW:
+        return math.nan
     p = p / float(p @ q)
 
     def coefficient(spacing: float) -> float:

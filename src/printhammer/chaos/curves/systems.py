@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.chaos.continuation.fixed_points import Node
+    from printhammer.chaos.strobe.map import Image
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
@@ -107,12 +108,15 @@ class MultiplierSystem:
         plane, scales = self.plane, self.scales
         moves = SPACING * scales
         point = np.append(whole, other)
-        values = []
-        for row, (*state, first, second) in enumerate([point, *(point + move for move in np.diag(moves))]):
-            try:
-                regime = plane.at(first, second)
-            except InputError as error:
-                return MapValue.none(3, str(error))
+        values: list[Image] = []
+        try:
+            same = plane.at(point[2], point[3])
+            regimes = [same, same, same, plane.at(point[2] + moves[2], point[3])]
+            regimes.append(plane.at(point[2], point[3] + moves[3]))
+        except InputError as error:
+            return MapValue.none(3, str(error))
+        points = [point, *(point + move for move in np.diag(moves))]
+        for row, (regime, (*state, _first, _second)) in enumerate(zip(regimes, points, strict=True)):
             end = image_of(regime, np.array(state), plane.firings, plane.tolerance, contacts=row == 0)
             if not end.ok or not np.isfinite(end.jacobian).all():
                 return MapValue.none(3, "no derivative" if end.ok else end.status)

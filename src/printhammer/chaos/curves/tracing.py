@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
@@ -55,11 +56,35 @@ class Traced:
     stops: tuple[Stop, Stop]
     points: list[CodimensionTwo]
     coefficients: FloatArray = field(repr=False)
+    pieces: list[tuple[System, list[Node]]] = field(repr=False)
 
     @property
     def places(self) -> list[Place]:
         """The points of the curve."""
         return [place_of(node) for node in self.nodes]
+
+    def crossings(self, which: int, value: float) -> list[Place]:
+        """Return where the curve passes a value of the first constant (0) or the second (1)."""
+        places: list[Place] = []
+        for system, nodes in self.pieces:
+            corrector = Corrector(system, system.scales, PRECISION)
+            column = system.scales.size - 2 + which
+            row, level = np.eye(system.scales.size)[column], value / system.scales[column]
+            for here, ahead in itertools.pairwise(nodes):
+                begin, end = corrector.point(here), corrector.point(ahead)
+                if (begin[column] - level) * (end[column] - level) > 0.0 or begin[column] == end[column]:
+                    continue
+                share = (level - begin[column]) / (end[column] - begin[column])
+                z = begin + share * (end - begin)
+                z[column] = level
+                node = corrector.correct(z, row)
+                if node is not None and not any(_same(place_of(node), place) for place in places):
+                    places.append(place_of(node))
+        return places
+
+
+def _same(one: Place, other: Place) -> bool:
+    return bool(np.allclose([one.first, one.second], [other.first, other.second], rtol=1e-9, atol=0.0))
 
 
 class CurveTracer:
@@ -111,7 +136,7 @@ class CurveTracer:
             points = self.with_ends(nodes, stops, points)
         surface = system.surface if isinstance(system, GrazingSystem) else ""
         first, last = (self.in_words(stop, points, end) for end, stop in enumerate(stops))
-        return Traced(self.kind, surface, nodes, (first, last), points, coefficients)
+        return Traced(self.kind, surface, nodes, (first, last), points, coefficients, pieces)
 
     def begin(self, start: Start, second: float) -> tuple[System, FloatArray]:
         """Return the system of a curve and its unknowns at the start."""
@@ -262,8 +287,8 @@ class CurveTracer:
     def with_ends(
         self, nodes: list[Node], stops: list[Stop], points: list[CodimensionTwo]
     ) -> list[CodimensionTwo]:
-        """Return the points with those at which the curve ends on a grazing of a rigid backstop."""
-        if not self.rigid or self.kind not in ("fold", "period doubling"):
+        """Return the points with those at which the curve ends in a grazing."""
+        if self.kind not in ("fold", "period doubling"):
             return points
         for end, (node, after) in enumerate(((nodes[0], -1), (nodes[-1], len(nodes) - 1))):
             if stops[end].reason not in ("grazing", "lost", "jump", "no value"):
@@ -277,7 +302,7 @@ class CurveTracer:
     def end_at(self, place: Place, after: int) -> CodimensionTwo | None:
         """Return the point of codimension two at which a curve ends beside a place."""
         speed = float(place.state[1]) / float(self.plane.scales[1])
-        if 0.0 < speed < _SLOW:
+        if self.rigid and 0.0 < speed < _SLOW:
             guess = np.array([place.phase, place.first, place.second])
             for firings in range(1, self.plane.firings + 1):
                 if self.plane.firings % firings == 0:
