@@ -170,6 +170,37 @@ def test_an_oscillation_ends_where_it_grazes_a_rigid_stop() -> None:
     np.testing.assert_allclose(branch.v[:, 0], speeds, atol=1e-9)
 
 
+def test_a_branch_goes_on_where_its_impact_meets_the_section() -> None:
+    case = LinearImpacts(1.7, -0.1, 0.8)
+    force = 0.756
+    (b, angle), _ = case.roots(force)
+    phase = (0.5 * angle / math.pi + 0.45) % 1.0
+    late = (2.0 * math.pi * phase - angle) / case.omega % case.period
+    branch = continuation(
+        oscillator_of(case),
+        "drive.amplitude",
+        (0.1 * case.grazing, 1.05 * force),
+        drive=ph.SineForce(force, case.omega / (2.0 * math.pi), phase=0.5 * math.pi),
+        state=case.state(force, b, angle, late),
+        phase=phase,
+    )
+    # Beyond the fold to where the speed of the impact vanishes.
+    assert [stop.reason for stop in branch.stops] == ["grazing", "bound"]
+    assert branch.stops[0].parameter == pytest.approx(case.grazing, rel=1e-7)
+    assert [event.kind for event in branch.events] == ["section", "fold"]
+    moved, fold = branch.events
+    assert "nears the section, which moves to the phase" in moved.message
+    assert fold.value == pytest.approx(case.fold, rel=SHARP)
+    assert set(branch.phases) == {phase, moved.phase}
+    for value, x, v, at in zip(branch.values, branch.x, branch.v, branch.phases, strict=True):
+        exact = [
+            case.state(value, b, angle, ((2.0 * math.pi * at - angle) / case.omega) % case.period)
+            for b, angle in case.roots(value)
+        ]
+        if value > 1.0001 * case.fold:
+            assert min(math.dist((x[0], v[0]), state) for state in exact) < 1e-7
+
+
 def test_an_oscillation_goes_on_where_it_grazes_a_pack() -> None:
     # x'' + x = F cos(w t) is F / (1 - w^2) cos(w t), and meets the pack where that gets to its front.
     omega, front = 1.7, 0.1

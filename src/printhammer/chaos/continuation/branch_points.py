@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change"]
+Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change", "section"]
 
 BIRTH: Final = "period doubling"
 """Reason of the stop of an orbit of even period where it comes from a doubling."""
@@ -73,7 +73,7 @@ _HALF_DOUBLES: Final = 0.5
 class BranchPoint(Declared):
     """A point at which something happens to a curve of fixed points."""
 
-    kind: Kind = part('"fold", "period doubling", "Neimark-Sacker", "branching" or "change"')
+    kind: Kind = part('"fold", "period doubling", "Neimark-Sacker", "branching", "change" or "section"')
     node: Node = part("the fixed point there")
     after: int = part("number of the node of the curve that it follows")
     labels: tuple[Hashable, Hashable] = part("labels of the motion before and after it")

@@ -80,14 +80,15 @@ def start_of(
 
 
 def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
-    at = (branch.regime, branch.parameter, branch.bounds, branch.firings, branch.tolerance)
+    at = (branch.parameter, branch.bounds, branch.firings, branch.tolerance)
     if isinstance(event, str) and event in _ENDS:
         stop: Stop = branch.stops[_ENDS[event]]
         if stop.reason != "grazing":
             raise InputError(
                 f"event = {event!r}: the branch does not end in a grazing there, {stop.sentence}"
             )
-        return Start("grazing", *at, np.array(stop.state), stop.parameter)
+        regime = replace(branch.regime, phase=float(branch.phases[_ENDS[event]]))
+        return Start("grazing", regime, *at, np.array(stop.state), stop.parameter)
     if isinstance(event, BranchEvent):
         if not any(event is own for own in branch.events):
             raise InputError(f"event = {event.kind!r}, expected one of the events of the branch")
@@ -95,7 +96,8 @@ def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
     else:
         kinds = [own.kind for own in branch.events]
         chosen = branch.events[_number(kinds, [own.sharp for own in branch.events], event, "the branch")]
-    return Start(chosen.kind, *at, np.array(chosen.state), chosen.value)
+    regime = replace(branch.regime, phase=chosen.phase)
+    return Start(chosen.kind, regime, *at, np.array(chosen.state), chosen.value)
 
 
 def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, whose: str) -> int:
@@ -126,7 +128,7 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
         )
     if "names" in notes and "first" in dataset:
         return _of_curve(opened, event, regime)
-    needed = ("event_kind", "event_value", "event_x", "event_v", "firings")
+    needed = ("event_kind", "event_value", "event_x", "event_v", "event_phase", "firings")
     if any(name not in dataset for name in needed) or "parameter" not in notes:
         raise InputError(f"{opened.path}: expected a branch or branches with their events, or a curve")
     if "branch" in dataset["event_kind"].dims:
@@ -135,7 +137,6 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
     kinds = [EVENTS[code] if code >= 0 else "" for code in dataset["event_kind"].values]
     located = [bool(value == 1) for value in dataset["event_located"].values]
     common = (
-        replace(regime, phase=float(notes.get("phase", 0.0))),
         str(notes["parameter"]),
         _pair(notes["bounds"]),
         int(dataset["firings"]),
@@ -147,13 +148,14 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
                 f"{opened.path}: event = {event!r}, expected an end in a grazing of a single branch"
             )
         row = dataset.isel(orbit=_ENDS[event], firing=0)
-        return Start(
-            "grazing", *common, np.array([row["x"], row["v"]], dtype=np.float64), float(row["value"])
-        )
+        there = replace(regime, phase=float(row["orbit_phase"]))
+        state = np.array([row["x"], row["v"]], dtype=np.float64)
+        return Start("grazing", there, *common, state, float(row["value"]))
     number = _number(kinds, located, event, str(opened.path))
     row = dataset.isel(event=number)
     state = np.array([row["event_x"], row["event_v"]], dtype=np.float64)
-    return Start(kinds[number], *common, state, float(row["event_value"]))
+    there = replace(regime, phase=float(row["event_phase"]))
+    return Start(kinds[number], there, *common, state, float(row["event_value"]))
 
 
 def _of_curve(opened: Reopened, point: int | str | None, regime: Regime) -> Start:

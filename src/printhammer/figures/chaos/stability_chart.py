@@ -43,9 +43,9 @@ def plot(chart: StabilityChart) -> Figure:
         from matplotlib.colors import ListedColormap
 
         shown = np.where(chart.settled == chart.firings, 1, np.where(chart.settled < 0, 2, 0))
-        edges = [edges(axis) * factors[k] for k, axis in enumerate(chart.grid)]
+        sides = [edges(axis) * factors[k] for k, axis in enumerate(chart.grid)]
         colours = ListedColormap(["white", _REGION, style.FAINT])
-        ax.pcolormesh(*edges, shown, cmap=colours, vmin=0, vmax=2, zorder=0.5, rasterized=True)
+        ax.pcolormesh(*sides, shown, cmap=colours, vmin=0, vmax=2, zorder=0.5, rasterized=True)
         name = f"from rest: period {chart.firings}"
         handles.append(Patch(facecolor=_REGION, edgecolor="none", label=name))
         if (shown == 2).any():
