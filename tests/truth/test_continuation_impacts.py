@@ -164,7 +164,7 @@ def test_an_oscillation_ends_where_it_grazes_a_rigid_stop() -> None:
         phase=0.25,
     )
     assert [stop.reason for stop in branch.stops] == ["bound", "grazing"]
-    assert branch.stops[1].parameter == pytest.approx(case.grazing, rel=1e-6)
+    assert branch.stops[1].parameter == pytest.approx(case.grazing, rel=1e-10)
     assert "grazes" in branch.message
     speeds = [-case.gain(value) * case.omega for value in branch.values]
     np.testing.assert_allclose(branch.v[:, 0], speeds, atol=1e-9)
@@ -186,12 +186,14 @@ def test_a_branch_goes_on_where_its_impact_meets_the_section() -> None:
     )
     # Beyond the fold to where the speed of the impact vanishes.
     assert [stop.reason for stop in branch.stops] == ["grazing", "bound"]
-    assert branch.stops[0].parameter == pytest.approx(case.grazing, rel=1e-7)
+    assert branch.stops[0].parameter == pytest.approx(case.grazing, rel=1e-10)
     assert [event.kind for event in branch.events] == ["section", "fold"]
     moved, fold = branch.events
     assert "nears the section, which moves to the phase" in moved.message
     assert fold.value == pytest.approx(case.fold, rel=SHARP)
-    assert set(branch.phases) == {phase, moved.phase}
+    # In order along the branch it moves to where the branch began.
+    assert moved.phase == phase
+    assert len(set(branch.phases)) == 2
     for value, x, v, at in zip(branch.values, branch.x, branch.v, branch.phases, strict=True):
         exact = [
             case.state(value, b, angle, ((2.0 * math.pi * at - angle) / case.omega) % case.period)

@@ -22,6 +22,7 @@ from printhammer.chaos.continuation.branch_points import (
 from printhammer.chaos.continuation.events import BranchEvent, event_of
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
+from printhammer.chaos.continuation.flights import grazing_of, near_touches
 from printhammer.chaos.strobe.quiet import quiet_section
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
@@ -36,9 +37,10 @@ PRECISION: Final = 1e-10
 
 _PARTS: Final = 5.0
 """Parts of the range of the constant that count as much as half a width of the strobe window."""
-_MARGIN_STEP: Final = 1e-6
-_NEAR: Final = 1e-4
-"""Change of the margin from which its slope is known; part of the range within which its zero is a stop."""
+_LOST: Final = ("lost", "jump", "no value")
+_GENTLE: Final = 1e-2
+_NEAR: Final = 1e-2
+"""Distances in half-widths of the window, and scales of the constant, from the grazing in which one ends."""
 _SHORTER: Final = 1e-6
 """Scaled distance of an orbit from itself after a part of its firings, up to which it repeats then."""
 _DIGITS: Final = ".9g"
@@ -108,7 +110,7 @@ class Tracer:
         that before it, looked at where it is farthest from its contacts.
         """
         pieces: list[tuple[RegimeFamily, list[Node]]] = []
-        while stop.reason in ("lost", "jump", "no value") and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
+        while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
             node = nodes[0] if backward else nodes[-1]
             regime = family.regime.with_(self.parameter, node.parameter)
             quiet = quiet_section(regime, node.state, family.firings, self.tolerance)
@@ -147,35 +149,25 @@ class Tracer:
         return self if same else replace(self, regime=replace(self.regime, phase=phase))
 
     def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
-        """Return a curve that is lost where it grazes a rigid backstop with that as the reason.
-
-        The margin passes through 0 there, linearly on this side; its zero is the place.
-        """
+        """Return a curve that is lost where it grazes a rigid backstop with that as the reason."""
         if not rigid_backstop(self.regime):
             return curve
         stops = []
-        for stop, nodes in zip(curve.stops, (curve.nodes, curve.nodes[::-1]), strict=True):
-            place = self.zero_margin(family, nodes) if stop.reason in ("lost", "jump", "no value") else None
+        for stop, node in zip(curve.stops, (curve.nodes[0], curve.nodes[-1]), strict=True):
+            place = self.grazing_near(family, node) if stop.reason in _LOST else None
             sentence = "it grazes the rigid backstop, where the strobe map has no derivative"
-            stops.append(stop if place is None else Stop("grazing", place, nodes[0].state, sentence))
+            stops.append(stop if place is None else Stop("grazing", place, node.state, sentence))
         return Curve(curve.nodes, (stops[0], stops[1]))
 
-    def zero_margin(self, family: RegimeFamily, nodes: list[Node]) -> float | None:
-        """Return where the margin of the first node goes to 0, continued from a later one; None if far."""
-        last = family.margin(nodes[0].state, nodes[0].parameter)
-        for node in nodes[1:]:
-            margin = family.margin(node.state, node.parameter)
-            if abs(margin - last) > _MARGIN_STEP:
-                break
-        else:
-            return None
-        if last > 0.0 and margin > 0.0:
-            # The margin of an impact goes with the square of its speed, which vanishes linearly.
-            last, margin = math.sqrt(last), math.sqrt(margin)
-        slope = (nodes[0].parameter - node.parameter) / (last - margin)
-        place = nodes[0].parameter - last * slope
-        near = abs(place - nodes[0].parameter) < _NEAR * (self.bounds[1] - self.bounds[0])
-        return place if abs(last) < abs(margin) and near else None
+    def grazing_near(self, family: RegimeFamily, node: Node) -> float | None:
+        """Return where the orbit that is nearly grazing grazes; None where it is far from that."""
+        regime = family.regime.with_(self.parameter, node.parameter)
+        for touch in near_touches(regime, node.state, family.firings, self.tolerance)[:1]:
+            width = float(self.scales[-1])
+            place = grazing_of(regime, self.parameter, touch, family.firings, self.tolerance, width)
+            if touch.gap < _GENTLE and place is not None and abs(place - node.parameter) < _NEAR * width:
+                return place
+        return None
 
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
         """Return the branch born at a period doubling of an orbit of so many firings."""

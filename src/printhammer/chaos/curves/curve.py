@@ -114,9 +114,7 @@ class BifurcationCurve(Result, rows="point"):
         """What the curve is, what happens on it, and why it ends, in one line."""
         count = len(self)
         spans = " and ".join(
-            f"{name} from {values.min():.9g} to {values.max():.9g} {unit}".rstrip(" 1")
-            if unit == "1"
-            else f"{name} from {values.min():.9g} to {values.max():.9g} {unit}"
+            f"{name} from {values.min():.9g} to {values.max():.9g} {unit}".removesuffix(" 1")
             for name, values, unit in zip(self.names, (self.first, self.second), self.units, strict=True)
         )
         what = f"{self.kind} of the period-{self.firings} orbit, {count} points, {spans}"

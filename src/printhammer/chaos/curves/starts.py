@@ -160,13 +160,15 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
 
 def _of_curve(opened: Reopened, point: int | str | None, regime: Regime) -> Start:
     dataset, notes = opened.dataset, opened.attributes
-    count = dataset.sizes["point"]
+    # Of a table the points are its rows.
+    (along,) = dataset["first"].dims
+    count = dataset.sizes[along]
     number: Any = _ENDS.get(point, point) if isinstance(point, str) else point or 0
     if not isinstance(number, int | np.integer) or not -1 <= number < count:
         raise InputError(
             f"{opened.path}: event = {point!r}, expected a point of the curve from 0 to {count - 1}"
         )
-    row = dataset.isel(point=int(number))
+    row = dataset.isel({along: int(number)})
     names, bounds = notes["names"], notes["bounds"]
     return Start(
         str(notes["kind"]),

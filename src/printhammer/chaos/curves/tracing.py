@@ -11,6 +11,7 @@ import numpy as np
 from printhammer.chaos.continuation.arclength import Steps, Stop, follow
 from printhammer.chaos.continuation.family import rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
+from printhammer.chaos.continuation.flights import near_touches
 from printhammer.chaos.curves.codimension import (
     CodimensionTwo,
     meeting,
@@ -20,7 +21,7 @@ from printhammer.chaos.curves.codimension import (
 )
 from printhammer.chaos.curves.normal_forms import doubling_coefficient
 from printhammer.chaos.curves.systems import GRAZING, TESTS, MultiplierSystem, Place, Plane, place_of
-from printhammer.chaos.curves.touches import GrazingSystem, ImpactSystem, near_touches
+from printhammer.chaos.curves.touches import GrazingSystem, ImpactSystem
 from printhammer.chaos.strobe.quiet import quiet_section
 from printhammer.errors import InputError
 from printhammer.support.threads import mapped
@@ -317,7 +318,7 @@ class CurveTracer:
     def at_value(self, which: int, value: float) -> str:
         """Return a value of one of the constants with its name and unit."""
         name = self.plane.names[which]
-        return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}"
+        return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}".removesuffix(" 1")
 
     def in_words(self, stop: Stop, points: list[CodimensionTwo], end: int) -> Stop:
         """Return a stop whose sentence names the constants and, where there is one, the point of its end."""
