@@ -120,11 +120,16 @@ def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], flo
 
 
 def points_along(
-    kind: str, rigid: bool, nodes: list[Node], follower: Corrector, coefficients: FloatArray
+    kind: str,
+    rigid: bool,
+    nodes: list[Node],
+    follower: Corrector,
+    coefficients: FloatArray,
+    coefficient: Callable[[Place], float],
 ) -> list[CodimensionTwo]:
     """Return the points of codimension two on a curve, in order.
 
-    `coefficients` are those of the normal form of a period doubling at the nodes.
+    `coefficients` are those of the normal form of a period doubling at the nodes; `coefficient` returns one.
     """
     points: list[CodimensionTwo] = []
     tests = _tests(kind, rigid)
@@ -147,8 +152,9 @@ def points_along(
                 points.append(point_of("cusp", place_of(node), after))
         pair = coefficients[after : after + 2]
         if kind == "period doubling" and pair[0] * pair[1] < 0.0:
-            nearer = (here, ahead)[int(np.argmin(np.abs(pair)))]
-            points.append(point_of("degenerate doubling", place_of(nearer), after))
+            _, node = zero_between(follower, here, ahead, lambda node: coefficient(place_of(node)))
+            if node is not None:
+                points.append(point_of("degenerate doubling", place_of(node), after))
     return points
 
 

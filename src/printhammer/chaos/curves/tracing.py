@@ -121,14 +121,12 @@ class CurveTracer:
             nodes = [node for _, part in pieces for node in part]
         coefficients = np.full(len(nodes), np.nan)
         if self.kind == "period doubling":
-            coefficients[:] = mapped(
-                lambda node: doubling_coefficient(self.plane, place_of(node)), nodes, threads
-            )
+            coefficients[:] = mapped(lambda node: self.coefficient(place_of(node)), nodes, threads)
         points, begin = [], 0
         for own, part in pieces:
             corrector = Corrector(own, own.scales, self.steps.precision)
             some = coefficients[begin : begin + len(part)]
-            found = points_along(self.kind, self.rigid, part, corrector, some)
+            found = points_along(self.kind, self.rigid, part, corrector, some, self.coefficient)
             points += [replace(point, after=point.after + begin) for point in found]
             points += self.meetings(part, begin)
             begin += len(part)
@@ -138,6 +136,10 @@ class CurveTracer:
         surface = system.surface if isinstance(system, GrazingSystem) else ""
         first, last = (self.in_words(stop, points, end) for end, stop in enumerate(stops))
         return Traced(self.kind, surface, nodes, (first, last), points, coefficients, pieces)
+
+    def coefficient(self, place: Place) -> float:
+        """Return the coefficient of the normal form of a period doubling."""
+        return doubling_coefficient(self.plane, place)
 
     def begin(self, start: Start, second: float) -> tuple[System, FloatArray]:
         """Return the system of a curve and its unknowns at the start."""
