@@ -13,6 +13,8 @@ from tests.truth.damped_impacts import Array, DampedImpacts, newton
 
 import printhammer as ph
 from printhammer.chaos import BifurcationCurve, Branch
+from printhammer.chaos.continuation.fixed_points import MapValue
+from printhammer.chaos.curves.touches import ImpactSystem
 from printhammer.chaos.strobe.map import strobe_map
 from printhammer.errors import InputError
 from printhammer.run.regime import Regime
@@ -238,6 +240,22 @@ def test_bad_input_is_refused_in_one_sentence(tmp_path: Path) -> None:
     other = Regime.of(oscillator().replace("mass", 1.1), drive=sine(0.85, 0.325))
     with pytest.raises(InputError, match="hammer_fingerprint = "):
         ph.bifurcation_curve(tmp_path / "branch.nc", "rate", BOUNDS, regime=other)
+
+
+def test_what_a_point_of_a_curve_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In evaluations of the map with its derivatives, which do not depend on the machine."""
+    calls = 0
+    evaluate = ImpactSystem.__call__
+
+    def counted(system: ImpactSystem, whole: Array, other: float) -> MapValue:
+        nonlocal calls
+        calls += 1
+        return evaluate(system, whole, other)
+
+    monkeypatch.setattr(ImpactSystem, "__call__", counted)
+    branch = branch_of(0.85, 0.325, (3.19, 0.34), 0.02, 10)
+    curve = ph.bifurcation_curve(branch, "rate", BOUNDS, event="period doubling", first=FORCES)
+    assert calls < 8 * len(curve)
 
 
 @pytest.mark.slow

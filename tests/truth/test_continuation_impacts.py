@@ -117,6 +117,40 @@ def test_bouncing_ball_doubled() -> None:
     assert set(doubled.contacts) == {"BB"}
 
 
+def test_four_doublings_lead_to_a_branch_that_does_not_jump() -> None:
+    case = BouncingBall(GRAVITY, 0.5, FREQUENCY)
+    weight = MASS * GRAVITY
+    branch = bounces(case, 1.4, (0.9 * case.doubling, 1.18 * case.doubling))
+    for _ in range(4):
+        (event, *_) = [event for event in branch.events if event.kind == "period doubling"]
+        branch = branch.doubled(event)
+    assert (branch.firings, branch.stops[1].reason) == (16, "bound")
+    sizes = branch.multipliers[:, 0].real
+    # From 1 through -1 to -2e4 without a turn.
+    assert (np.diff(sizes) < 0.0).all()
+    assert sizes[-1] < -1e4
+    for number in (len(branch) // 2, len(branch) - 1):
+        orbit, push = branch.orbit(number), branch.values[number] / MASS
+        impacts = [(contact.t_in, contact.v_in) for contact in orbit.contacts]
+        assert len(impacts) == 16
+        matrix = np.eye(2)
+        omega, e = case.omega, case.restitution
+        for i, (t, v) in enumerate(impacts):
+            after, arrival = impacts[(i + 1) % 16]
+            after += 16.0 / case.frequency if i == 15 else 0.0
+            dt, up = after - t, -e * v
+            turned = math.cos(omega * after) - math.cos(omega * t)
+            path = push / omega**2 * (math.sin(omega * t) - math.sin(omega * after))
+            y = (up + push / omega * math.cos(omega * t)) * dt - 0.5 * GRAVITY * dt * dt + path
+            assert y == pytest.approx(0.0, abs=1e-12)
+            assert up - GRAVITY * dt - push / omega * turned == pytest.approx(arrival, abs=1e-9)
+            force = push * math.sin(omega * after) - GRAVITY
+            saltation = np.array([[-e, 0.0], [(1.0 + e) * force / arrival, -e]])
+            matrix = saltation @ np.array([[1.0, dt], [0.0, 1.0]]) @ matrix
+        assert np.trace(matrix) == pytest.approx(sizes[number], rel=1e-5)
+    assert branch.values[-1] == pytest.approx(1.18 * case.doubling * weight)
+
+
 @pytest.mark.parametrize(
     ("omega", "stop", "restitution"), [(3.2, 0.1, 0.5), (3.2, 0.1, 0.8), (2.6, 0.1, 0.8), (1.7, -0.1, 0.5)]
 )

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 _SPACING: Final = 1e-6
 """Relative change of the parameter by which the slope is taken; it only steers, and need not be exact."""
+_MUCH: Final = 1e3
+"""Multiplier from which on that change is made smaller."""
 _BESIDE: Final = 1e-7
 _GENTLE: Final = 3e-4
 """Change of a state, and speed of a pack touch, in units of the scales of the run."""
@@ -134,8 +136,12 @@ class RegimeFamily:
             if not reached.ok:
                 return MapValue.none(2, _IN_PACK if reached.status == IN_PACK else reached.status)
             image, jacobian = reached.state, reached.jacobian
-        slope = self._slope(state, parameter, image)
-        if slope is None or jacobian is None or not np.isfinite(jacobian).all():
+        if jacobian is None or not np.isfinite(jacobian).all():
+            slope = None
+        else:
+            growth = float(np.abs(np.linalg.eigvals(jacobian)).max())
+            slope = self._slope(state, parameter, image, growth)
+        if slope is None or jacobian is None:
             return MapValue.none(2, "the runs with a slightly different constant or state ended early")
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
@@ -162,8 +168,11 @@ class RegimeFamily:
             columns.append((ends[1] - ends[0]) / (2.0 * move.sum()))
         return np.column_stack(columns)
 
-    def _slope(self, state: FloatArray, parameter: float, image: FloatArray) -> FloatArray | None:
-        step = _SPACING * (abs(parameter) or 1.0)
+    def _slope(
+        self, state: FloatArray, parameter: float, image: FloatArray, growth: float
+    ) -> FloatArray | None:
+        # What grows much bends much as well.
+        step = _SPACING * min(1.0, _MUCH / max(growth, 1.0)) * (abs(parameter) or 1.0)
         beside = [self.end_of(state, parameter + sign * step) for sign in (-1.0, 1.0)]
         if beside[0] is not None and beside[1] is not None:
             return np.asarray((beside[1] - beside[0]) / (2.0 * step))
