@@ -38,8 +38,8 @@ def read_event(written: str, name: str) -> int | str:
 
 @verb(
     "curve",
-    "printhammer curve hendriks-1983 --rate '745 Hz' --from '735 Hz' --to '760 Hz' --event fold"
-    " --second backstop.damping --second-from '4e10 N*s/m^2.5' --second-to '4.2e10 N*s/m^2.5'"
+    "printhammer curve hendriks-1983 --rate '745 Hz' --from '740 Hz' --to '750 Hz'"
+    " --second backstop.damping --second-from '3.6e10 N*s/m^2.5' --second-to '3.7e10 N*s/m^2.5'"
     " --out curve.png",
     {
         "most": opt.whole("Steps in either direction.", default=200),
