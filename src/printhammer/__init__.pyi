@@ -5,7 +5,8 @@ from .chaos.basins.quench import quench_map as quench_map
 from .chaos.bifurcation.bifurcation import bifurcation as bifurcation
 from .chaos.continuation.continuation import continuation as continuation
 from .chaos.continuation.regimes import regimes as regimes
-from .chaos.continuation.stability_chart import stability_chart as stability_chart
+from .chaos.curves.bifurcation_curve import bifurcation_curve as bifurcation_curve
+from .chaos.curves.stability_chart import stability_chart as stability_chart
 from .chaos.exponents.correlation import correlation_dimension as correlation_dimension
 from .chaos.exponents.finite_time import finite_time as finite_time
 from .chaos.exponents.lyapunov import lyapunov as lyapunov

@@ -23,6 +23,12 @@ def damping(hammer: ph.Hammer) -> Result:
     return ph.stability_chart(branch(hammer), "backstop.damping", bounds, grid=(2, 3), most=2)
 
 
+def curve(hammer: ph.Hammer) -> Result:
+    wide = ph.continuation(hammer, "period", (1.2e-3, 1.35e-3), period=1.25e-3, most=60)
+    own = hammer.constants["backstop.damping"].si
+    return ph.bifurcation_curve(wide, "backstop.damping", (0.99 * own, 1.01 * own), grid=(2, 3), most=2)
+
+
 def sensitivities(hammer: ph.Hammer) -> Sensitivities:
     drive = ph.PulseTrain(hammer.waveform)
     return ph.sensitivities(hammer, drive, constants=["mass", "pack.stiffness"])
@@ -41,6 +47,7 @@ CHAOS: dict[str, Callable[[ph.Hammer], Result]] = {
     "Bifurcation": lambda hammer: ph.bifurcation(
         hammer, periods=[1.2e-3, PERIOD], firings=20, transient=10, direction="both", refine=0
     ),
+    "BifurcationCurve": curve,
     "Branch": branch,
     "Branches": lambda hammer: Branches((branch(hammer),)),
     "CorrelationDimension": lambda _hammer: ph.correlation_dimension(np.sqrt(2.0) * np.arange(400.0) % 1.0),

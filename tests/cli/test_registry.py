@@ -20,6 +20,7 @@ from printhammer.cli.runner import Verb
 NAMES = [verb.name for verb in VERBS]
 # What a verb cannot do without, so that it comes to see what is wrong beside it.
 NEEDED = {
+    "curve": ("--second", "backstop.damping"),
     "figure": ("3",),
     "measure": ("magnet",),
     "fit magnet": ("t.csv",),
@@ -37,7 +38,7 @@ NEEDED = {
     "reconstruct ship": ("a.jsonl", "b.jsonl"),
 }
 # Examples that take more than a few seconds.
-LONG = {"basins", "bifurcation", "continue", "orbits", "energy", "feedback", "tune", "sweep"}
+LONG = {"basins", "bifurcation", "continue", "curve", "orbits", "energy", "feedback", "tune", "sweep"}
 LONG |= {f"reconstruct {verb}" for verb in ("judge", "front", "predictions", "schemes", "family")}
 # Examples that are part of other tests, or take minutes.
 ELSEWHERE = {

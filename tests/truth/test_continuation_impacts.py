@@ -9,7 +9,7 @@ from tests.truth.impact_orbits import BouncingBall, LinearImpacts
 import printhammer as ph
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.continuation import continuation
-from printhammer.chaos.continuation.stability_chart import stability_chart
+from printhammer.chaos.curves.stability_chart import stability_chart
 
 SHARP = 1e-8
 MASS, GRAVITY, FREQUENCY = 1e-3, 9.80665, 50.0
@@ -117,6 +117,40 @@ def test_bouncing_ball_doubled() -> None:
     assert set(doubled.contacts) == {"BB"}
 
 
+def test_four_doublings_lead_to_a_branch_that_does_not_jump() -> None:
+    case = BouncingBall(GRAVITY, 0.5, FREQUENCY)
+    weight = MASS * GRAVITY
+    branch = bounces(case, 1.4, (0.9 * case.doubling, 1.18 * case.doubling))
+    for _ in range(4):
+        (event, *_) = [event for event in branch.events if event.kind == "period doubling"]
+        branch = branch.doubled(event)
+    assert (branch.firings, branch.stops[1].reason) == (16, "bound")
+    sizes = branch.multipliers[:, 0].real
+    # From 1 through -1 to -2e4 without a turn.
+    assert (np.diff(sizes) < 0.0).all()
+    assert sizes[-1] < -1e4
+    for number in (len(branch) // 2, len(branch) - 1):
+        orbit, push = branch.orbit(number), branch.values[number] / MASS
+        impacts = [(contact.t_in, contact.v_in) for contact in orbit.contacts]
+        assert len(impacts) == 16
+        matrix = np.eye(2)
+        omega, e = case.omega, case.restitution
+        for i, (t, v) in enumerate(impacts):
+            after, arrival = impacts[(i + 1) % 16]
+            after += 16.0 / case.frequency if i == 15 else 0.0
+            dt, up = after - t, -e * v
+            turned = math.cos(omega * after) - math.cos(omega * t)
+            path = push / omega**2 * (math.sin(omega * t) - math.sin(omega * after))
+            y = (up + push / omega * math.cos(omega * t)) * dt - 0.5 * GRAVITY * dt * dt + path
+            assert y == pytest.approx(0.0, abs=1e-12)
+            assert up - GRAVITY * dt - push / omega * turned == pytest.approx(arrival, abs=1e-9)
+            force = push * math.sin(omega * after) - GRAVITY
+            saltation = np.array([[-e, 0.0], [(1.0 + e) * force / arrival, -e]])
+            matrix = saltation @ np.array([[1.0, dt], [0.0, 1.0]]) @ matrix
+        assert np.trace(matrix) == pytest.approx(sizes[number], rel=1e-5)
+    assert branch.values[-1] == pytest.approx(1.18 * case.doubling * weight)
+
+
 @pytest.mark.parametrize(
     ("omega", "stop", "restitution"), [(3.2, 0.1, 0.5), (3.2, 0.1, 0.8), (2.6, 0.1, 0.8), (1.7, -0.1, 0.5)]
 )
@@ -164,10 +198,43 @@ def test_an_oscillation_ends_where_it_grazes_a_rigid_stop() -> None:
         phase=0.25,
     )
     assert [stop.reason for stop in branch.stops] == ["bound", "grazing"]
-    assert branch.stops[1].parameter == pytest.approx(case.grazing, rel=1e-6)
+    assert branch.stops[1].parameter == pytest.approx(case.grazing, rel=1e-10)
     assert "grazes" in branch.message
     speeds = [-case.gain(value) * case.omega for value in branch.values]
     np.testing.assert_allclose(branch.v[:, 0], speeds, atol=1e-9)
+
+
+def test_a_branch_goes_on_where_its_impact_meets_the_section() -> None:
+    case = LinearImpacts(1.7, -0.1, 0.8)
+    force = 0.756
+    (b, angle), _ = case.roots(force)
+    phase = (0.5 * angle / math.pi + 0.45) % 1.0
+    late = (2.0 * math.pi * phase - angle) / case.omega % case.period
+    branch = continuation(
+        oscillator_of(case),
+        "drive.amplitude",
+        (0.1 * case.grazing, 1.05 * force),
+        drive=ph.SineForce(force, case.omega / (2.0 * math.pi), phase=0.5 * math.pi),
+        state=case.state(force, b, angle, late),
+        phase=phase,
+    )
+    # Beyond the fold to where the speed of the impact vanishes.
+    assert [stop.reason for stop in branch.stops] == ["grazing", "bound"]
+    assert branch.stops[0].parameter == pytest.approx(case.grazing, rel=1e-10)
+    assert [event.kind for event in branch.events] == ["section", "fold"]
+    moved, fold = branch.events
+    assert "nears the section, which moves to the phase" in moved.message
+    assert fold.value == pytest.approx(case.fold, rel=SHARP)
+    # In order along the branch it moves to where the branch began.
+    assert moved.phase == phase
+    assert len(set(branch.phases)) == 2
+    for value, x, v, at in zip(branch.values, branch.x, branch.v, branch.phases, strict=True):
+        exact = [
+            case.state(value, b, angle, ((2.0 * math.pi * at - angle) / case.omega) % case.period)
+            for b, angle in case.roots(value)
+        ]
+        if value > 1.0001 * case.fold:
+            assert min(math.dist((x[0], v[0]), state) for state in exact) < 1e-7
 
 
 def test_an_oscillation_goes_on_where_it_grazes_a_pack() -> None:

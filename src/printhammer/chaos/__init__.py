@@ -9,7 +9,10 @@ from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.continuation import continuation
 from printhammer.chaos.continuation.events import BranchEvent
 from printhammer.chaos.continuation.regimes import Branches, regimes
-from printhammer.chaos.continuation.stability_chart import LossCurve, StabilityChart, stability_chart
+from printhammer.chaos.curves.bifurcation_curve import bifurcation_curve
+from printhammer.chaos.curves.codimension import CodimensionTwo
+from printhammer.chaos.curves.curve import BifurcationCurve
+from printhammer.chaos.curves.stability_chart import StabilityChart, stability_chart
 from printhammer.chaos.exponents.chart import LyapunovChart, lyapunovs
 from printhammer.chaos.exponents.correlation import CorrelationDimension, correlation_dimension
 from printhammer.chaos.exponents.finite_time import FiniteTime, finite_time
@@ -29,13 +32,14 @@ __all__ = [
     "BasinEntropy",
     "Basins",
     "Bifurcation",
+    "BifurcationCurve",
     "Branch",
     "BranchEvent",
     "Branches",
+    "CodimensionTwo",
     "CorrelationDimension",
     "FiniteTime",
     "ImpactTrain",
-    "LossCurve",
     "Lyapunov",
     "LyapunovChart",
     "Manifolds",
@@ -51,6 +55,7 @@ __all__ = [
     "basin_entropy",
     "basins",
     "bifurcation",
+    "bifurcation_curve",
     "continuation",
     "correlation_dimension",
     "finite_time",

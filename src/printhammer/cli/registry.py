@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from printhammer.cli.verbs.chaos.basins import basins
 from printhammer.cli.verbs.chaos.bifurcation import bifurcation
 from printhammer.cli.verbs.chaos.continuation import continue_
+from printhammer.cli.verbs.chaos.curve import curve
 from printhammer.cli.verbs.chaos.lyapunov import lyapunov
 from printhammer.cli.verbs.chaos.orbits import orbits
 from printhammer.cli.verbs.chaos.strobe import strobe
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from printhammer.cli.runner import Verb
 
 VERBS: Final[tuple[Verb, ...]] = (
-    *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, lyapunov),
+    *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),
     *(print_, energy, feedback, quality, tune, bench, studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped),
     *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion),

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 PLOTS: Final = {
     "Basins": "chaos.basins.plot",
     "Bifurcation": "chaos.bifurcation.plot",
+    "BifurcationCurve": "chaos.bifurcation_curve.plot",
     "Branch": "chaos.continuation.plot",
     "Branches": "chaos.continuation.plot",
     "CompensationTable": "control.compensation.plot",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
 import numpy as np
 
@@ -225,6 +225,14 @@ class Problem:
         from printhammer.kernel.compile.specialise import specialise
 
         return specialise(self.laws)
+
+    def leave_out(self, surface: Literal["pack", "backstop"]) -> None:
+        """Have the armature never meet a surface: put it out of reach, all forces else being as they were."""
+        away = FAR * self.scales[0]
+        if surface == "pack":
+            self.constants[layout.FRONT] += away
+        else:
+            self.constants[layout.POSITION] -= away
 
     def drive_arrays(self) -> tuple[Any, ...]:
         """Return what the kernel needs of the drive, with working space: see its `Train`."""

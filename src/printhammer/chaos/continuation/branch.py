@@ -51,6 +51,13 @@ class Branch(Result):
     firings: int = column("1", "firings after which the orbits repeat", "", dtype=np.int32)
     tolerance: float = part("tolerance of the integration")
     values: FloatArray = column("SI", "value of the constant", "orbit", name="value")
+    phases: FloatArray = column(
+        "1",
+        "part of the period between a firing and the section",
+        "orbit",
+        more="that of the regime but where a contact comes near it",
+        name="orbit_phase",
+    )
     x: FloatArray = column("m", "displacement at the section", "orbit firing")
     v: FloatArray = column("m/s", "velocity at the section", "orbit firing")
     multipliers: npt.NDArray[np.complex128] = part(
@@ -106,7 +113,7 @@ class Branch(Result):
     @property
     @derived("1", "part of the period between a firing and the section")
     def phase(self) -> float:
-        """Part of the period between a firing and the section."""
+        """Part of the period between a firing and the section at the start; see `phases`."""
         return self.regime.phase
 
     @property
@@ -167,6 +174,7 @@ class Branch(Result):
             ("located", "1", "whether it was located", -1, lambda event: event.sharp),
             ("x", "m", "displacement at the section there", np.nan, lambda event: event.state[0]),
             ("v", "m/s", "velocity at the section there", np.nan, lambda event: event.state[1]),
+            ("phase", "1", "part of the period to the section", np.nan, lambda event: event.phase),
             ("text", "", "what happens, in a few words", "", lambda event: event.message),
             ("contacts_before", "", "sequence of contacts before it", "", lambda event: event.contacts[0]),
             ("contacts_after", "", "sequence of contacts after it", "", lambda event: event.contacts[1]),
@@ -193,7 +201,8 @@ class Branch(Result):
         number : int
             Its place along the branch.
         """
-        regime = self.regime.with_(self.parameter, float(self.values[number]))
+        regime = replace(self.regime, phase=float(self.phases[number]))
+        regime = regime.with_(self.parameter, float(self.values[number]))
         state = self.curve.nodes[number].state
         return orbit(regime, state, firings=self.firings, tolerance=self.tolerance)
 

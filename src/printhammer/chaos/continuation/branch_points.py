@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change"]
+Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change", "section"]
 
 BIRTH: Final = "period doubling"
 """Reason of the stop of an orbit of even period where it comes from a doubling."""
@@ -73,7 +73,7 @@ _HALF_DOUBLES: Final = 0.5
 class BranchPoint(Declared):
     """A point at which something happens to a curve of fixed points."""
 
-    kind: Kind = part('"fold", "period doubling", "Neimark-Sacker", "branching" or "change"')
+    kind: Kind = part('"fold", "period doubling", "Neimark-Sacker", "branching", "change" or "section"')
     node: Node = part("the fixed point there")
     after: int = part("number of the node of the curve that it follows")
     labels: tuple[Hashable, Hashable] = part("labels of the motion before and after it")
@@ -156,7 +156,7 @@ def points_of(
             kinds = [kind for kind in kinds if kind not in ("fold", "branching")]
         points = []
         for kind in kinds:
-            locate = _branching if kind == "branching" else _crossing
+            locate = _branching if kind == "branching" else zero_between
             share, node = locate(follower, here, ahead, tests[kind])
             if kind == "Neimark-Sacker" and not _has_pair(node if node is not None else here):
                 continue
@@ -191,7 +191,7 @@ def _has_pair(node: Node) -> bool:
     return bool((pair & (np.abs(np.abs(node.multipliers) - 1.0) < 1e-3)).any())
 
 
-def _crossing(
+def zero_between(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
     """Return where between two nodes a test function is zero, as a share of the way, and the node there.
@@ -230,7 +230,7 @@ def _crossing(
 def _branching(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Return where two curves cross, as `_crossing`.
+    """Return where two curves cross, as `zero_between`.
 
     Newton's method fails at the crossing itself: it is bracketed ever closer and met by interpolation.
     """

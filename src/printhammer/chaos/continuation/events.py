@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch_points import BranchPoint
     from printhammer.support.arrays import BoolArray, FloatArray
 
-EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing"]
+EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing", "section"]
 KINDS: Final[tuple[str, ...]] = get_args(EventKind)
 
 Change = Literal["", "appears", "vanishes", "splits", "merges", "several"]
@@ -30,10 +30,12 @@ class BranchEvent(Declared, eq=False):
     kind: EventKind = part(
         '"fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are'
         ' born; "Neimark-Sacker": a complex pair of multipliers crosses the unit circle, a torus is born;'
-        ' "branching": two branches cross; "grazing": a contact appears or vanishes'
+        ' "branching": two branches cross; "grazing": a contact appears or vanishes; "section": nothing'
+        " to the orbit, but a contact comes near the section, which moves to another phase"
     )
     value: float = part("of the constant, SI")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
+    phase: float = part("part of the period from a firing to the section")
     multipliers: npt.NDArray[np.complex128] = part("the multipliers there, shape (2,)")
     surface: str = part('of a grazing: "pack", "backstop" or, where several contacts change at once, ""')
     change: Change = part(
@@ -48,6 +50,8 @@ class BranchEvent(Declared, eq=False):
     @property
     def message(self) -> str:
         """What happens, in a few words."""
+        if self.kind == "section":
+            return f"a contact nears the section, which moves to the phase {self.phase:.4g}"
         if self.kind != "grazing":
             return self.kind
         if self.change == "several":
@@ -56,13 +60,14 @@ class BranchEvent(Declared, eq=False):
         return f"grazing: {f'two {whose}s merge' if self.change == 'merges' else f'a {whose} {self.change}'}"
 
 
-def event_of(point: BranchPoint) -> BranchEvent:
-    """Return a point of a curve in the words of a hammer."""
+def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
+    """Return a point of a curve, looked at at a phase, in the words of a hammer."""
     surface, change = ("", "") if point.sides is None else _grazing(point)
     return BranchEvent(
         kind="grazing" if point.kind == "change" else point.kind,
         value=point.parameter,
         state=np.array(point.node.state),
+        phase=phase,
         multipliers=point.node.multipliers,
         surface=surface,
         change=change,  # type: ignore[arg-type]
@@ -112,7 +117,7 @@ def stable_ranges(
     along: FloatArray, stable: BoolArray, events: Sequence[BranchEvent]
 ) -> list[tuple[float, float]]:
     """Return the ranges of the constant over which the orbits of a branch are stable, ascending."""
-    limits = [event for event in events if event.kind != "grazing"]
+    limits = [event for event in events if event.kind not in ("grazing", "section")]
     values = along.tolist()
     ranges: list[tuple[float, float]] = []
     begin: float | None = None

@@ -20,12 +20,16 @@ from printhammer.run.problem import Problem, Record
 from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 1e-6
 """Relative change of the parameter by which the slope is taken; it only steers, and need not be exact."""
+_MUCH: Final = 1e3
+"""Multiplier from which on that change is made smaller."""
 _BESIDE: Final = 1e-7
 _GENTLE: Final = 3e-4
 """Change of a state, and speed of a pack touch, in units of the scales of the run."""
@@ -34,6 +38,14 @@ _MOST_TOUCHES: Final = 100
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
 
 Surface = Literal["pack", "backstop"]
+
+
+def cyclic(surfaces: Iterable[str]) -> str:
+    """Return a sequence of surfaces touched, P or B each, from where it is first in the alphabet."""
+    word = "".join("P" if surface == "pack" else "B" for surface in surfaces)
+    if len(word) > _MOST_TOUCHES:
+        return _MANY
+    return min((word[i:] + word[:i] for i in range(len(word))), default="")
 
 
 class Touch(Declared):
@@ -64,10 +76,7 @@ class Passage(Declared):
 
         A touch that moves through the section changes nothing: of an orbit, the beginning is arbitrary.
         """
-        word = "".join("P" if touch.surface == "pack" else "B" for touch in self.touches)
-        if len(word) > _MOST_TOUCHES:
-            return _MANY
-        return min((word[i:] + word[:i] for i in range(len(word))), default="")
+        return cyclic(touch.surface for touch in self.touches)
 
     @property
     def dots(self) -> list[tuple[float, float] | None]:
@@ -128,8 +137,12 @@ class RegimeFamily:
             if not reached.ok:
                 return MapValue.none(2, _IN_PACK if reached.status == IN_PACK else reached.status)
             image, jacobian = reached.state, reached.jacobian
-        slope = self._slope(state, parameter, image)
-        if slope is None or jacobian is None or not np.isfinite(jacobian).all():
+        if jacobian is None or not np.isfinite(jacobian).all():
+            slope = None
+        else:
+            growth = float(np.abs(np.linalg.eigvals(jacobian)).max())
+            slope = self._slope(state, parameter, image, growth)
+        if slope is None or jacobian is None:
             return MapValue.none(2, "the runs with a slightly different constant or state ended early")
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
@@ -156,8 +169,11 @@ class RegimeFamily:
             columns.append((ends[1] - ends[0]) / (2.0 * move.sum()))
         return np.column_stack(columns)
 
-    def _slope(self, state: FloatArray, parameter: float, image: FloatArray) -> FloatArray | None:
-        step = _SPACING * (abs(parameter) or 1.0)
+    def _slope(
+        self, state: FloatArray, parameter: float, image: FloatArray, growth: float
+    ) -> FloatArray | None:
+        # What grows much bends much as well.
+        step = _SPACING * min(1.0, _MUCH / max(growth, 1.0)) * (abs(parameter) or 1.0)
         beside = [self.end_of(state, parameter + sign * step) for sign in (-1.0, 1.0)]
         if beside[0] is not None and beside[1] is not None:
             return np.asarray((beside[1] - beside[0]) / (2.0 * step))

@@ -38,6 +38,11 @@ class MapValue(Declared):
     )
     trouble: str = part("why the map has no value there; empty where it has one", default="")
     extra: Any = part("whatever else the map wants to keep of this evaluation", default=None, repr=False)
+    monodromy: FloatArray | None = part(
+        "derivative whose eigenvalues are the multipliers, where the map is larger than that of the orbit",
+        default=None,
+        repr=False,
+    )
 
     @classmethod
     def none(cls, count: int, trouble: str) -> MapValue:
@@ -62,8 +67,10 @@ class Node(Declared):
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:
-        """Eigenvalues of dG/du, largest absolute value first."""
-        values = np.linalg.eigvals(self.value.jacobian).astype(np.complex128)
+        """Eigenvalues of dG/du or of the monodromy matrix, largest absolute value first."""
+        value = self.value
+        matrix = value.jacobian if value.monodromy is None else value.monodromy
+        values = np.linalg.eigvals(matrix).astype(np.complex128)
         return values[np.argsort(-np.abs(values), kind="stable")]
 
     @property

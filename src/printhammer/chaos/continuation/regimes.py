@@ -263,7 +263,7 @@ class _Collected:
     def known(self, orbit: Orbit) -> bool:
         """Return whether an orbit lies on a branch that was found."""
         alike = [branch for branch in self.found if branch.firings == orbit.firings]
-        return any(_on(branch, orbit.regime.rate, _state_at(orbit, branch.phase)) for branch in alike)
+        return any(_on(branch, orbit) for branch in alike)
 
     def double(self, level: int) -> None:
         """Follow what is born at the period doublings of all branches found so far."""
@@ -279,9 +279,9 @@ class _Collected:
                 except InputError as error:
                     self.refused.append(f"level {level + 1}, period doubling at {event.value:.9g}: {error}")
                     continue
-                middle = born.curve.nodes[len(born) // 2]
+                middle = born.orbit(len(born) // 2)
                 alike = [other for other in self.found if other.firings == born.firings]
-                if not any(_on(other, middle.parameter, middle.state) for other in alike):
+                if not middle.ok or not any(_on(other, middle) for other in alike):
                     self.found.append(born)
 
 
@@ -305,12 +305,19 @@ def _ends_at(branch: Branch, value: float, state: FloatArray) -> bool:
     )
 
 
-def _on(branch: Branch, value: float, state: FloatArray) -> bool:
-    """Return whether an orbit with a state at one of its sections lies on a branch."""
+def _on(branch: Branch, orbit: Orbit) -> bool:
+    """Return whether an orbit lies on a branch."""
+    return any(_at_section(branch, orbit, float(phase)) for phase in np.unique(branch.phases))
+
+
+def _at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
+    """Return whether an orbit lies on what a branch has at a section of this phase."""
+    value, state = orbit.regime.value(branch.parameter), _state_at(orbit, phase)
     half_widths = branch.regime.window.half_widths
     values = branch.values
-    between = np.flatnonzero((values[:-1] - value) * (values[1:] - value) <= 0.0)
-    work = Tracer(branch.regime, branch.parameter, branch.bounds, branch.tolerance, 1)
+    there = (branch.phases[:-1] == phase) & (branch.phases[1:] == phase)
+    between = np.flatnonzero(((values[:-1] - value) * (values[1:] - value) <= 0.0) & there)
+    work = Tracer(branch.regime, branch.parameter, branch.bounds, branch.tolerance, 1).at_phase(phase)
     for i in between:
         for k in range(branch.firings):
             # A rough look at the chord first, then the orbit itself.

@@ -13,6 +13,7 @@ from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, follow
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.branch_points import (
     BIRTH,
+    BranchPoint,
     birth_of,
     doubling_near,
     follow_doubled,
@@ -21,6 +22,8 @@ from printhammer.chaos.continuation.branch_points import (
 from printhammer.chaos.continuation.events import BranchEvent, event_of
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
+from printhammer.chaos.continuation.flights import grazing_of, near_touches
+from printhammer.chaos.strobe.quiet import quiet_section
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.support.threads import Progress, mapped
@@ -34,12 +37,17 @@ PRECISION: Final = 1e-10
 
 _PARTS: Final = 5.0
 """Parts of the range of the constant that count as much as half a width of the strobe window."""
-_MARGIN_STEP: Final = 1e-6
-_NEAR: Final = 1e-4
-"""Change of the margin from which its slope is known; part of the range within which its zero is a stop."""
+_LOST: Final = ("lost", "jump", "no value")
+_GENTLE: Final = 1e-2
+_NEAR: Final = 1e-2
+"""Distances in half-widths of the window, and scales of the constant, from the grazing in which one ends."""
 _SHORTER: Final = 1e-6
 """Scaled distance of an orbit from itself after a part of its firings, up to which it repeats then."""
 _DIGITS: Final = ".9g"
+_MOST_SECTIONS: Final = 8
+_SAME_PHASE: Final = 1e-3
+"""Sections that a branch is followed at beyond an end; parts of the period within which they are the same."""
+_NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 
 
 def read_bounds(
@@ -87,38 +95,84 @@ class Tracer:
             steps=steps,
             watch=self.watch(firings, steps, progress),
         )
-        return self.described(family, self.grazed(family, curve), steps, self.threads)
+        curve = self.grazed(family, curve)
+        pieces, (first, last) = [(family, curve.nodes)], curve.stops
+        before, first = self.resumed(family, curve.nodes, first, steps, backward=True)
+        after, last = self.resumed(family, curve.nodes, last, steps, backward=False)
+        return self.described([*reversed(before), *pieces, *after], (first, last), steps, self.threads)
+
+    def resumed(
+        self, family: RegimeFamily, nodes: list[Node], stop: Stop, steps: Steps, *, backward: bool
+    ) -> tuple[list[tuple[RegimeFamily, list[Node]]], Stop]:
+        """Return how a branch goes on from an end at other sections, piece by piece, and its new stop.
+
+        A branch is lost where an impact meets its section. Each piece begins or ends with the last orbit of
+        that before it, looked at where it is farthest from its contacts.
+        """
+        pieces: list[tuple[RegimeFamily, list[Node]]] = []
+        while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
+            node = nodes[0] if backward else nodes[-1]
+            regime = family.regime.with_(self.parameter, node.parameter)
+            quiet = quiet_section(regime, node.state, family.firings, self.tolerance)
+            if quiet is None or abs(quiet[0].phase - regime.phase) < _SAME_PHASE:
+                break
+            tracer = self.at_phase(quiet[0].phase)
+            family = tracer.family(family.firings)
+            up = (node.tangent[-1] > 0.0) != backward
+            try:
+                curve = follow(
+                    family,
+                    quiet[1],
+                    node.parameter,
+                    scales=self.scales,
+                    bounds=self.bounds,
+                    steps=steps,
+                    directions="up",
+                    row=np.array([0.0, 0.0, 1.0 if up else -1.0]),
+                    watch=tracer.watch(family.firings, steps, None),
+                )
+            except InputError:
+                break
+            if len(curve.nodes) < 2:
+                break
+            curve = tracer.grazed(family, curve)
+            stop, nodes = curve.stops[1], curve.nodes
+            if backward:
+                nodes = [replace(each, tangent=-each.tangent, arc=-each.arc) for each in reversed(nodes)]
+            nodes = [replace(each, arc=each.arc + node.arc) for each in nodes]
+            pieces.append((family, nodes))
+        return pieces, stop
+
+    def at_phase(self, phase: float) -> Tracer:
+        """Return the same at another section."""
+        same = phase == self.regime.phase
+        return self if same else replace(self, regime=replace(self.regime, phase=phase))
 
     def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
-        """Return a curve that is lost where it grazes a rigid backstop with that as the reason.
-
-        The margin passes through 0 there, linearly on this side; its zero is the place.
-        """
+        """Return a curve that is lost where it grazes a rigid backstop with that as the reason."""
         if not rigid_backstop(self.regime):
             return curve
         stops = []
-        for stop, nodes in zip(curve.stops, (curve.nodes, curve.nodes[::-1]), strict=True):
-            place = self.zero_margin(family, nodes) if stop.reason in ("lost", "jump", "no value") else None
+        for stop, node in zip(curve.stops, (curve.nodes[0], curve.nodes[-1]), strict=True):
+            place = self.grazing_near(family, node) if stop.reason in _LOST else None
             sentence = "it grazes the rigid backstop, where the strobe map has no derivative"
-            stops.append(stop if place is None else Stop("grazing", place, nodes[0].state, sentence))
+            stops.append(stop if place is None else Stop("grazing", place, node.state, sentence))
         return Curve(curve.nodes, (stops[0], stops[1]))
 
-    def zero_margin(self, family: RegimeFamily, nodes: list[Node]) -> float | None:
-        """Return where the margin of the first node goes to 0, continued from a later one; None if far."""
-        last = family.margin(nodes[0].state, nodes[0].parameter)
-        for node in nodes[1:]:
-            margin = family.margin(node.state, node.parameter)
-            if abs(margin - last) > _MARGIN_STEP:
-                break
-        else:
-            return None
-        slope = (nodes[0].parameter - node.parameter) / (last - margin)
-        place = nodes[0].parameter - last * slope
-        near = abs(place - nodes[0].parameter) < _NEAR * (self.bounds[1] - self.bounds[0])
-        return place if abs(last) < abs(margin) and near else None
+    def grazing_near(self, family: RegimeFamily, node: Node) -> float | None:
+        """Return where the orbit that is nearly grazing grazes; None where it is far from that."""
+        regime = family.regime.with_(self.parameter, node.parameter)
+        for touch in near_touches(regime, node.state, family.firings, self.tolerance)[:1]:
+            width = float(self.scales[-1])
+            place = grazing_of(regime, self.parameter, touch, family.firings, self.tolerance, width)
+            if touch.gap < _GENTLE and place is not None and abs(place - node.parameter) < _NEAR * width:
+                return place
+        return None
 
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
         """Return the branch born at a period doubling of an orbit of so many firings."""
+        if event.phase != self.regime.phase:
+            return self.at_phase(event.phase).doubled(firings, event, most, threads)
         family = self.family(2 * firings)
         steps = Steps(most=most, precision=PRECISION)
         curve = follow_doubled(
@@ -138,7 +192,7 @@ class Tracer:
             way = np.append(nodes[0].state - state, nodes[0].parameter - value) / self.scales
             arc = nodes[0].arc - float(np.linalg.norm(way))
             nodes = [Node(state, value, nodes[0].tangent, arc, at_birth, 0.0), *nodes]
-        return self.described(family, Curve(nodes, (born, curve.stops[1])), steps, threads)
+        return self.described([(family, nodes)], (born, curve.stops[1]), steps, threads)
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
         """Return the orbit near a state at one value of the constant; None if there is none."""
@@ -203,10 +257,21 @@ class Tracer:
         sentence = f"it merges with an orbit of {longest.firings} firings"
         return Stop("merged", here.parameter, here.state, sentence, here)
 
-    def described(self, family: RegimeFamily, curve: Curve, steps: Steps, threads: int | None) -> Branch:
-        """Return a branch with all about its orbits."""
-        nodes = curve.nodes
-        courses = mapped(lambda node: family.course(node.state, node.parameter), nodes, threads)
+    def described(
+        self,
+        pieces: list[tuple[RegimeFamily, list[Node]]],
+        stops: tuple[Stop, Stop],
+        steps: Steps,
+        threads: int | None,
+    ) -> Branch:
+        """Return a branch with all about its orbits, of pieces at sections of their own."""
+        family = pieces[0][0]
+        # A piece begins with the orbit with which the one before it ends.
+        owned = [
+            (own, node) for k, (own, part) in enumerate(pieces) for node in (part if k == 0 else part[1:])
+        ]
+        nodes = [node for _, node in owned]
+        courses = mapped(lambda pair: pair[0].course(pair[1].state, pair[1].parameter), owned, threads)
         count = len(nodes)
         passages: list[Passage] = [node.value.extra for node in nodes]
         dots = [passage.dots for passage in passages]
@@ -219,15 +284,26 @@ class Tracer:
             return np.array([getattr(course, name) for course in courses], dtype=np.float64)
 
         states = of_courses("states").reshape(count, family.firings, 2)
-        points = points_of(
-            family,
-            curve,
-            self.scales,
-            steps.precision,
-            lambda node: family.margin(node.state, node.parameter),
-        )
+        events: list[BranchEvent] = []
+        begin = 0
+        for k, (own, part) in enumerate(pieces):
+            if k:
+                moved = BranchPoint("section", part[0], begin, (part[0].value.label, part[0].value.label))
+                events.append(event_of(moved, own.regime.phase))
+            inside = stops[0] if k == 0 else _NO_STOP, stops[1] if k + 1 == len(pieces) else _NO_STOP
+            points = points_of(
+                own,
+                Curve(part, inside),
+                self.scales,
+                steps.precision,
+                lambda node, own=own: own.margin(node.state, node.parameter),  # type: ignore[misc]
+            )
+            events += [
+                event_of(replace(point, after=point.after + begin), own.regime.phase) for point in points
+            ]
+            begin += len(part) - 1
         lost = np.array([sum(dot is None for dot in row) for row in dots], dtype=np.int64)
-        first, last = curve.stops
+        first, last = stops
         return Branch(
             regime=self.regime,
             parameter=self.parameter,
@@ -236,6 +312,7 @@ class Tracer:
             firings=family.firings,
             tolerance=self.tolerance,
             values=np.array([node.parameter for node in nodes]),
+            phases=np.array([own.regime.phase for own, _ in owned]),
             x=states[:, :, 0],
             v=states[:, :, 1],
             multipliers=np.array([node.multipliers for node in nodes]).reshape(count, 2),
@@ -253,9 +330,9 @@ class Tracer:
             damping_loss=of_courses("damping_loss"),
             residual=np.array([node.residual for node in nodes]),
             contacts=tuple(row.sequence for row in passages),
-            events=tuple(event_of(point) for point in points),
+            events=tuple(events),
             stops=(self.in_words(first), self.in_words(last)),
-            curve=curve,
+            curve=Curve(nodes, stops),
             follow_doubled=partial(self.doubled, family.firings),
         )
 

@@ -304,7 +304,7 @@ def margin_of(problem: Problem, record: Record) -> float:
     """Return the signed nearness of a grazing in a run, see `Image`."""
     hammer, (way, speed) = problem.hammer, problem.scales
     surfaces = [place for place in (hammer.position, hammer.front) if place is not None]
-    x, sign = _turns(problem, record)
+    _, x, sign = turns(problem, record)
     margins = [sign * (x - place) / way for place in surfaces]
     nodes = record.nodes
     rebound = (nodes[1:, 0] == nodes[:-1, 0]) & (nodes[:-1, 2] < 0.0) & (nodes[1:, 2] >= 0.0)
@@ -313,8 +313,8 @@ def margin_of(problem: Problem, record: Record) -> float:
     return float(every[np.argmin(np.abs(every))]) if every.size else math.nan
 
 
-def _turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray]:
-    """Return the displacements of all local extrema, m, and 1 for a maximum, -1 for a minimum."""
+def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return times, s, and displacements, m, of all local extrema, and 1 for a maximum, -1 for a minimum."""
     nodes = record.nodes
     before, after = nodes[:-1, 2], nodes[1:, 2]
     rows = np.flatnonzero(
@@ -322,7 +322,7 @@ def _turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray]:
     )
     sign = np.sign(before[rows])
     if not rows.size:
-        return np.zeros(0), sign
+        return np.zeros(0), np.zeros(0), sign
     low, high = nodes[rows, 0].copy(), nodes[rows + 1, 0].copy()
     f_low, f_high = before[rows].copy(), after[rows].copy()
     time, kept = high.copy(), np.zeros(len(rows))
@@ -343,4 +343,4 @@ def _turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray]:
         low, f_low = np.where(left, time, low), np.where(left, v, f_low)
         high, f_high = np.where(right, time, high), np.where(right, v, f_high)
         kept = np.where(left, -1.0, np.where(right, 1.0, kept))
-    return table[:, 0], sign
+    return time, table[:, 0], sign

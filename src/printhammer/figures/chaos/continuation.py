@@ -37,6 +37,7 @@ _MARKS: Final[dict[str, dict[str, Any]]] = {
     "branching": {"marker": "x", "ms": 5.0},
     "grazing": {"marker": "|", "ms": 13.0},
 }
+_TURNS: Final = ("fold", "period doubling", "Neimark-Sacker", "branching")
 _UNSTABLE: Final[dict[str, Any]] = {"lw": style.HAIR, "ls": (0, (4, 2)), "zorder": 2.0}
 _AXIS: Final = {"s": ("ms", 1e3), "1": ("", 1.0)}
 
@@ -123,12 +124,17 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
     values, rows, stable = [branch.values[0]], [table[0]], []
     inside: dict[int, list[Any]] = {}
     for event in branch.events:
-        if event.kind != "grazing":
+        if event.kind in _TURNS:
             inside.setdefault(event.after, []).append(event)
     for i in range(len(branch) - 1):
         for event in inside.get(i, []):
             values.append(event.value)
             rows.append(_at_event(branch, event, table))
+            stable.append(bool(branch.stable[i]))
+        if show in ("x", "v") and branch.phases[i] != branch.phases[i + 1]:
+            # The state at another section: nothing jumps but what is looked at.
+            values.append(branch.values[i])
+            rows.append(np.full_like(table[i], np.nan))
             stable.append(bool(branch.stable[i]))
         values.append(branch.values[i + 1])
         rows.append(table[i + 1])
@@ -152,7 +158,7 @@ def _mark(
     for branch in branches:
         table = getattr(branch, show)
         for event in branch.events:
-            if event.kind == "grazing" and not grazings:
+            if event.kind not in _MARKS or (event.kind == "grazing" and not grazings):
                 continue
             row = _at_event(branch, event, table)
             colour = style.INK if event.kind == "grazing" else colour_of(branch.firings)

@@ -14,13 +14,15 @@ from printhammer.figures.elements.style import new_panel, sign, styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.chaos.continuation.stability_chart import StabilityChart
+    from printhammer.chaos.curves.stability_chart import StabilityChart
 
-_STYLES: Final = {
+CURVES: Final = {
     "fold": (style.BLUE, "-"),
     "period doubling": (style.ORANGE, (0, (5, 1.5))),
     "Neimark-Sacker": (style.GREEN, (0, (1, 1))),
+    "grazing": (style.INK, "-"),
 }
+"""Colour and dashes of the curves of a kind."""
 _REGION: Final = "#cfe3f1"
 
 
@@ -41,15 +43,15 @@ def plot(chart: StabilityChart) -> Figure:
         from matplotlib.colors import ListedColormap
 
         shown = np.where(chart.settled == chart.firings, 1, np.where(chart.settled < 0, 2, 0))
-        edges = [_edges(axis) * factors[k] for k, axis in enumerate(chart.grid)]
+        sides = [edges(axis) * factors[k] for k, axis in enumerate(chart.grid)]
         colours = ListedColormap(["white", _REGION, style.FAINT])
-        ax.pcolormesh(*edges, shown, cmap=colours, vmin=0, vmax=2, zorder=0.5, rasterized=True)
+        ax.pcolormesh(*sides, shown, cmap=colours, vmin=0, vmax=2, zorder=0.5, rasterized=True)
         name = f"from rest: period {chart.firings}"
         handles.append(Patch(facecolor=_REGION, edgecolor="none", label=name))
         if (shown == 2).any():
             handles.append(Patch(facecolor=style.FAINT, edgecolor="none", label="run stopped"))
     for curve in chart.curves:
-        colour, dash = _STYLES[curve.kind]
+        colour, dash = CURVES[curve.kind]
         x, y = factors[0] * curve.first, factors[1] * curve.second
         limits = np.where(curve.limits, y, np.nan)
         ax.plot(x, y, color=colour, lw=style.HAIR, ls=dash, alpha=0.5, zorder=2.0)
@@ -57,7 +59,7 @@ def plot(chart: StabilityChart) -> Figure:
     kinds = {curve.kind for curve in chart.curves}
     handles += [
         Line2D([], [], color=colour, ls=dash, lw=style.LINE, label=kind)
-        for kind, (colour, dash) in _STYLES.items()
+        for kind, (colour, dash) in CURVES.items()
         if kind in kinds
     ]
     own = chart.regime.value(chart.names[1]) * factors[1]
@@ -74,7 +76,7 @@ def plot(chart: StabilityChart) -> Figure:
     return figure
 
 
-def _edges(axis: np.ndarray) -> np.ndarray:
+def edges(axis: np.ndarray) -> np.ndarray:
     """Return the edges of the cells around values that are evenly spaced."""
     half = 0.5 * (axis[1] - axis[0]) if len(axis) > 1 else 0.5 * abs(axis[0])
     return np.append(axis - half, axis[-1] + half)

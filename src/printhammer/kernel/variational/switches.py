@@ -17,7 +17,14 @@ from printhammer.kernel.variational.layout import BACKSTOP_LOSS, COIL, DRIVE, EN
 if TYPE_CHECKING:
     from printhammer.kernel.methods.quadrature import powers
     from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
-    from printhammer.kernel.model.laws import FORCE_DRIVE, FORCED, RIGID, backstop_rebound, magnet_force
+    from printhammer.kernel.model.laws import (
+        FORCE_DRIVE,
+        FORCED,
+        HAS_DAMPING,
+        RIGID,
+        backstop_rebound,
+        magnet_force,
+    )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
     from printhammer.kernel.single.resample import branch_of, memory_of
     from printhammer.kernel.variational.forcing import rebound_change
@@ -69,8 +76,8 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
     ) / (12.0 * spacing)
     a = acceleration(node[0], node[1], v_in, M.FREE, 0.0, hammer, drive)
-    # That after the impact is another where damping acts on the armature.
-    a_out = acceleration(node[0], node[1], v_out, M.FREE, 0.0, hammer, drive)
+    # Damping alone tells one side of the impact from the other.
+    jump = acceleration(node[0], node[1], v_out, M.FREE, 0.0, hammer, drive) - a if HAS_DAMPING else 0.0
     for k in range(columns.shape[1]):
         if FORCED:
             columns[0, k] -= forcing.moves[k, POSITION]
@@ -81,10 +88,12 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
             add_energies(columns, k, -earlier, before, behind)
             columns[BACKSTOP_LOSS, k] += v_in * (columns[1, k] - a * earlier) / hammer[INVERSE_MASS]
         columns[0, k] = earlier * v_out
-        columns[1, k] = slope * columns[1, k] + (1.0 - slope) * a * earlier + (a_out - a) * earlier
+        columns[1, k] = slope * columns[1, k] + (1.0 - slope) * a * earlier
+        if HAS_DAMPING:
+            columns[1, k] += jump * earlier
         if FORCED:
             columns[1, k] += rebound_change(v_in, k, forcing)
-            columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - a_out * earlier) / hammer[INVERSE_MASS]
+            columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - (a + jump) * earlier) / hammer[INVERSE_MASS]
             # The energy that is lost goes with the mass.
             lost = 0.5 * (v_in * v_in - v_out * v_out) / hammer[INVERSE_MASS]
             columns[BACKSTOP_LOSS, k] -= lost * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]

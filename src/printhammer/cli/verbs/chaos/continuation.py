@@ -84,17 +84,17 @@ def continue_(
     """
     from printhammer.chaos.continuation.regimes import InterruptedBranches
     from printhammer.chaos.continuation.regimes import regimes as all_regimes
-    from printhammer.chaos.continuation.stability_chart import stability_chart
+    from printhammer.chaos.curves.stability_chart import stability_chart
     from printhammer.run.regime import Regime
 
-    bounds = _both(lowest, highest, "--from", "--to", parameter)
+    bounds = both(lowest, highest, "--from", "--to", parameter)
     if regimes and (period, rate, firings, state, second) != (None,) * 5:
         raise InputError("--regimes: expected no --period, --rate, --firings, --state or --second beside it")
     if regimes and parameter != "rate":
         raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes")
     passed |= {"period": period, "rate": rate}
     firing = firing_of(job, hammer, passed, "--period '1.3 ms'", timed=not regimes)
-    ends = None if second is None else _both(second_from, second_to, "--second-from", "--second-to", second)
+    ends = None if second is None else both(second_from, second_to, "--second-from", "--second-to", second)
     interrupted = False
     try:
         if regimes:
@@ -133,7 +133,8 @@ def continue_(
     )
 
 
-def _both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
+def both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
+    """Return both ends of a range; InputError where one is missing."""
     if low is None or high is None:
         raise InputError(f"{first if low is None else last} is missing, expected the range of {parameter}")
     return low, high

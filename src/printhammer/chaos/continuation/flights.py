@@ -1,0 +1,195 @@
+"""Flights from one touch of a surface to the next, and the touches of an orbit that are nearest to a grazing.
+
+At a touch the displacement is that of the surface; what is left of the state is the velocity, 0 at a grazing.
+A rigid backstop bends the strobe map by a square root there; without the surface close to the touch the
+motion is smooth on both sides of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.continuation.family import rigid_backstop
+from printhammer.chaos.strobe.map import turns
+from printhammer.derivatives.states import follow
+from printhammer.errors import InputError
+from printhammer.results import Declared, part
+from printhammer.run.contacts import touches_of
+from printhammer.run.problem import Problem
+
+if TYPE_CHECKING:
+    from printhammer.chaos.continuation.family import Surface
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+_CLOSE: Final = 0.01
+"""Part of the period before and after a touch over which the surface is left out."""
+_STILL: Final = 1e-9
+_SPACING: Final = 1e-6
+_ROUNDS: Final = 20
+_PRECISION: Final = 1e-12
+_STAGNANT: Final = 1e3
+
+
+class Flight(Declared):
+    """A motion from a touch to the next, some firings later; the surface is left out close to both."""
+
+    end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
+    jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
+    accelerations: tuple[float, float] = part("at its start and at its end, m/s^2")
+    contacts: tuple[str, ...] = part("surfaces touched on the way")
+    surface: float = part("displacement of the surface, m")
+    rebound: float = part("coefficient of restitution; NaN without a rigid backstop")
+    trouble: str = part("why there is none; empty where there is")
+
+
+def fly(
+    regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
+) -> Flight:
+    """Return the flight that leaves a surface at a phase of the drive with a speed, m/s."""
+    hammer = regime.hammer
+    place = hammer.front if surface == "pack" else hammer.position
+    assert place is not None
+    train, _ = regime.train(firings + 1)
+    begin, *_, end = (float(time) for time in regime.moments(train, firings, phase % 1.0))
+    close = _CLOSE * regime.period
+    state, jacobian, trouble = np.array([place, speed]), np.eye(2), ""
+    contacts: list[str] = []
+    rigid = surface == "backstop" and rigid_backstop(regime)
+
+    def problem(start: float, *, alone: bool) -> Problem:
+        made = Problem(hammer, train, (float(state[0]), float(state[1])), start, tolerance)
+        if alone:
+            made.leave_out(surface)
+        return made
+
+    leaving = _acceleration(problem(begin, alone=True), close)
+    # Inside a contact, with a surface that gives way, there is nothing to leave out.
+    outside = rigid or (leaving < 0.0) == (surface == "pack")
+    cuts = [begin, begin + close, end - close, end] if outside else [begin, end]
+    for number, (start, stop) in enumerate(itertools.pairwise(cuts)):
+        alone = outside and number != 1
+        if rigid and not alone and state[0] < place:
+            trouble = "the armature does not leave the backstop after the touch"
+            break
+        made = problem(start, alone=alone)
+        flow = follow(made, np.array([start, stop]), np.eye(3), renormalise=False)
+        if flow.status_name != "ok":
+            trouble = str(flow.status_name)
+            break
+        state, jacobian = flow.states[-1, :2].copy(), flow.columns[:2, :2] @ jacobian
+        if not alone:
+            contacts = [name for name, _ in touches_of(made.run(stop))]
+    arriving = math.nan
+    if not trouble:
+        finite = np.isfinite(jacobian).all() and np.isfinite(state).all()
+        trouble = "" if finite else "no derivative"
+        arriving = _acceleration(problem(end, alone=True), close)
+    restitution = float(regime.value("backstop.restitution")) if rigid else math.nan
+    return Flight(state, jacobian, (leaving, arriving), tuple(contacts), place, restitution, trouble)
+
+
+def _acceleration(problem: Problem, time: float) -> float:
+    """Return the acceleration at the start of a run, m/s^2."""
+    record = problem.run(problem.start + time)
+    (row,) = problem.resample(record, np.array([problem.start]))
+    push = row[2] if problem.drive.quantity == "force" else 0.0
+    return float((push + row[3:9].sum()) / problem.hammer.mass)
+
+
+class NearTouch(Declared):
+    """Where an orbit touches a surface, or turns near it."""
+
+    surface: Surface = part('"pack" or "backstop"')
+    phase: float = part("part of the period from a firing to it")
+    gap: float = part("how far it is from a grazing, in half-widths of the window")
+    speed: float = part("with which it leaves a rigid backstop, m/s; 0 of a turn")
+
+
+def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> list[NearTouch]:
+    """Return the turns of an orbit, and its impacts on a rigid backstop, those nearest to a grazing first."""
+    train, _ = regime.train(firings + 1)
+    begin, *_, end = (float(time) for time in regime.moments(train, firings))
+    hammer = regime.hammer
+    problem = Problem(hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
+    record = problem.run(end)
+    way, fast = regime.window.half_widths
+    surfaces: list[tuple[Surface, float | None]] = [("pack", hammer.front), ("backstop", hammer.position)]
+    known = [(name, place) for name, place in surfaces if place is not None]
+
+    def phase(time: float) -> float:
+        return (regime.phase + (time - begin) / regime.period) % 1.0
+
+    touches = []
+    # An orbit may turn, or leave a surface, at the section itself.
+    for time, x in [*zip(*turns(problem, record)[:2], strict=True), *_still(state, begin, fast)]:
+        name, gap = min(((name, abs(x - place) / way) for name, place in known), key=lambda pair: pair[1])
+        touches.append(NearTouch(name, phase(float(time)), float(gap), 0.0))
+    if rigid_backstop(regime):
+        rows = [(float(row[1]), float(row[4])) for row in record.contacts if not row[6]]
+        if state[0] == hammer.position and state[1] > 0.0:
+            rows = [row for row in rows if row[0] < end - _CLOSE * regime.period]
+            rows.append((begin, float(state[1])))
+        touches += [NearTouch("backstop", phase(time), (v / fast) ** 2, v) for time, v in rows if v > 0.0]
+    return sorted(touches, key=lambda touch: touch.gap)
+
+
+def _still(state: FloatArray, begin: float, fast: float) -> list[tuple[float, float]]:
+    return [(begin, float(state[0]))] if abs(state[1]) < _STILL * fast else []
+
+
+def grazing_of(
+    regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
+) -> float | None:
+    """Return the value of a constant at which an orbit near a grazing touches without velocity.
+
+    Parameters
+    ----------
+    regime : Regime
+        With the value of the constant near that.
+    name : str
+        Of the constant.
+    touch : NearTouch
+        Of the orbit.
+    firings, tolerance
+        After which the orbit repeats; error allowed in one step.
+    width : float
+        By which the constant is divided, SI.
+
+    Returns
+    -------
+    float or None
+        None where Newton's method finds none.
+    """
+    own, scales = regime.value(name), regime.window.half_widths
+
+    def missed(z: FloatArray) -> FloatArray | None:
+        try:
+            moved = regime.with_(name, own + float(z[1]) * width)
+        except InputError:
+            return None
+        flight = fly(moved, touch.surface, touch.phase + float(z[0]), 0.0, firings, tolerance)
+        at = np.array([flight.surface, 0.0])
+        return None if flight.trouble else (flight.end - at) / scales
+
+    z, size = np.zeros(2), math.inf
+    for _ in range(_ROUNDS):
+        here, *beside = [missed(z + move) for move in (np.zeros(2), *(_SPACING * np.eye(2)))]
+        if here is None or beside[0] is None or beside[1] is None:
+            return None
+        matrix = np.column_stack([(beside[0] - here) / _SPACING, (beside[1] - here) / _SPACING])
+        try:
+            change = -np.linalg.solve(matrix, here)
+        except np.linalg.LinAlgError:
+            return None
+        last, size = size, float(np.abs(change).max())
+        if size <= _PRECISION or (size >= 0.5 * last and size <= _STAGNANT * _PRECISION):
+            return own + float(z[1]) * width
+        if not size < 1.0:
+            return None
+        z = z + change
+    return None

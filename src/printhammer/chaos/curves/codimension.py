@@ -1,0 +1,218 @@
+"""Points of codimension two on a curve of bifurcations, at which two things happen at once.
+
+| kind | on | what vanishes |
+|---|---|---|
+| cusp | fold | both components of the tangent of the curve in the plane: two folds meet and end |
+| fold-flip | fold, doubling | the other multiplier is -1, or 1 |
+| 1:1 resonance | fold, Neimark-Sacker | both multipliers are 1 |
+| 1:2 resonance | doubling, Neimark-Sacker | both multipliers are -1 |
+| degenerate doubling | doubling | c: it goes from super- to subcritical |
+| fold meets grazing, doubling meets grazing | all three | a contact appears while a multiplier is 1 or -1 |
+| resonant grazing | grazing, fold, doubling | the element 12 of A^n |
+| degenerate grazing | grazing | the acceleration at the touch |
+
+At a resonant grazing of a rigid backstop, A the derivative of the strobe map without the touch, the square
+root of n passages has no effect on the trace (A. P. Ivanov, J. Sound Vib. 162 (1993) 562; J. Molenaar, J. G.
+de Weger and W. van de Water, Nonlinearity 14 (2001) 301). There folds and doublings of the orbits with one
+touch in n periods begin.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, zero_between
+from printhammer.chaos.curves.systems import place_of
+from printhammer.chaos.curves.touches import GrazingSystem
+from printhammer.errors import InputError
+from printhammer.results import Declared, part
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy.typing as npt
+
+    from printhammer.chaos.continuation.family import Surface
+    from printhammer.chaos.continuation.fixed_points import Corrector, Node
+    from printhammer.chaos.curves.systems import Place, Plane
+    from printhammer.support.arrays import FloatArray
+
+RESONANCES: Final = 3
+"""Most passages of a grazing orbit that are tested for a resonance."""
+
+_LEVEL: Final = 1e-3
+"""Component of a tangent of length 1 below which a curve stands still in a constant."""
+_ROUNDS: Final = 20
+_MOVE: Final = 1e-6
+_PRECISION: Final = 1e-11
+_NOISE: Final = 1e-8
+
+
+class CodimensionTwo(Declared):
+    """A point of a curve at which a second thing happens."""
+
+    kind: str = part('such as "cusp", "fold-flip" or "resonant grazing"')
+    first: float = part("the first constant, SI")
+    second: float = part("the second constant, SI")
+    state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
+    phase: float = part("part of the period from the firing to the section")
+    multipliers: npt.NDArray[np.complex128] = part("of the orbit there, shape (2,)")
+    after: int = part("number of the point of the curve that it follows; -1 before the first")
+    passages: int = part("of a resonant grazing: n; else 1", default=1)
+
+    @property
+    def message(self) -> str:
+        """What happens, in a few words."""
+        return f"{self.kind} of {self.passages} passages" if self.passages > 1 else self.kind
+
+
+def point_of(kind: str, place: Place, after: int, passages: int = 1) -> CodimensionTwo:
+    """Return a place of a curve as a point of codimension two."""
+    multipliers = place.multipliers
+    return CodimensionTwo(
+        kind, place.first, place.second, place.state, place.phase, multipliers, after, passages
+    )
+
+
+def _determinant(node: Node) -> float:
+    return float(np.linalg.det(_matrix(node)))
+
+
+def _matrix(node: Node) -> FloatArray:
+    matrix = node.value.monodromy
+    assert matrix is not None
+    return matrix
+
+
+def _resonance(passages: int) -> Callable[[Node], float]:
+    test = resonance_test(passages)
+    return lambda node: test(_matrix(node))
+
+
+def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], float]]:
+    """Return what vanishes at points of codimension two, by their kind and number of passages."""
+    if kind == "fold":
+        return {
+            ("fold-flip", 1): lambda node: _determinant(node) + 1.0,
+            ("1:1 resonance", 1): lambda node: _determinant(node) - 1.0,
+        }
+    if kind == "period doubling":
+        return {
+            ("fold-flip", 1): lambda node: _determinant(node) + 1.0,
+            ("1:2 resonance", 1): lambda node: _determinant(node) - 1.0,
+        }
+    if kind == "Neimark-Sacker":
+        return {
+            ("1:1 resonance", 1): lambda node: float(np.trace(_matrix(node))) - 2.0,
+            ("1:2 resonance", 1): lambda node: float(np.trace(_matrix(node))) + 2.0,
+        }
+    tests: dict[tuple[str, int], Callable[[Node], float]] = {
+        ("fold meets grazing", 1): lambda node: fold_test(_matrix(node)),
+        ("doubling meets grazing", 1): lambda node: doubling_test(_matrix(node)),
+        ("degenerate grazing", 1): lambda node: place_of(node).acceleration,
+    }
+    if rigid:
+        tests |= {("resonant grazing", n): _resonance(n) for n in range(1, RESONANCES + 1)}
+    return tests
+
+
+def points_along(
+    kind: str,
+    rigid: bool,
+    nodes: list[Node],
+    follower: Corrector,
+    coefficients: FloatArray,
+    coefficient: Callable[[Place], float],
+) -> list[CodimensionTwo]:
+    """Return the points of codimension two on a curve, in order.
+
+    `coefficients` are those of the normal form of a period doubling at the nodes; `coefficient` returns one.
+    """
+    points: list[CodimensionTwo] = []
+    tests = _tests(kind, rigid)
+    for after, (here, ahead) in enumerate(itertools.pairwise(nodes)):
+        named = [
+            (name, passages, test)
+            for (name, passages), test in tests.items()
+            if test(here) * test(ahead) < 0.0 and max(abs(test(here)), abs(test(ahead))) > _NOISE
+        ]
+        # What one passage does, several do as well.
+        first = {name: passages for name, passages, _ in reversed(named)}
+        for name, passages, test in named:
+            if passages == first[name]:
+                share, node = zero_between(follower, here, ahead, test)
+                place = place_of(node if node is not None else (here, ahead)[int(share > 0.5)])
+                points.append(point_of(name, place, after, passages))
+        if kind == "fold" and (here.tangent[-2:] * ahead.tangent[-2:] < 0.0).all():
+            _, node = zero_between(follower, here, ahead, lambda node: float(node.tangent[-1]))
+            if node is not None and abs(node.tangent[-2]) < _LEVEL:
+                points.append(point_of("cusp", place_of(node), after))
+        pair = coefficients[after : after + 2]
+        if kind == "period doubling" and pair[0] * pair[1] < 0.0:
+            _, node = zero_between(follower, here, ahead, lambda node: coefficient(place_of(node)))
+            if node is not None:
+                points.append(point_of("degenerate doubling", place_of(node), after))
+    return points
+
+
+def meeting(
+    plane: Plane,
+    surface: Surface,
+    guess: FloatArray,
+    test: Callable[[FloatArray], float],
+) -> Place | None:
+    """Return the grazing near a guess at which a function of the derivative is zero; None if there is none.
+
+    Parameters
+    ----------
+    plane : Plane
+        With the firings after which the grazing orbit repeats.
+    surface : str
+        Which is touched.
+    guess : array, shape (3,)
+        Phase of the touch, first and second constant.
+    test : callable
+        Of the derivative of the strobe map without the touch.
+    """
+    system = GrazingSystem(plane, surface)
+    z = np.asarray(guess, dtype=np.float64) / system.scales
+    size = np.inf
+    for _ in range(_ROUNDS):
+        try:
+            here = _missed(system, z, test)
+            beside = [_missed(system, z + move, test) for move in _MOVE * np.eye(3)]
+        except InputError:
+            return None
+        if here is None or None in beside:
+            return None
+        matrix = np.column_stack([(near[1] - here[1]) / _MOVE for near in beside if near is not None])
+        try:
+            change = -np.linalg.solve(matrix, here[1])
+        except np.linalg.LinAlgError:
+            return None
+        last, size = size, float(np.abs(change).max())
+        if size <= _PRECISION or (size >= 0.5 * last and size <= 1e3 * _PRECISION):
+            return here[0]
+        if not size < 1.0:
+            return None
+        z = z + change
+    return None
+
+
+def _missed(
+    system: GrazingSystem, z: FloatArray, test: Callable[[FloatArray], float]
+) -> tuple[Place, FloatArray] | None:
+    phase, first, second = (float(value) for value in z * system.scales)
+    value = system.at(phase, first, second)
+    if isinstance(value, str):
+        return None
+    place, miss = value
+    return place, np.append(miss, test(place.jacobian))
+
+
+def resonance_test(passages: int) -> Callable[[FloatArray], float]:
+    """Return what vanishes at a resonant grazing of so many passages."""
+    return lambda jacobian: float(np.linalg.matrix_power(jacobian, passages)[0, 1])

@@ -1,0 +1,135 @@
+"""What a bifurcation does to the orbits beside it: coefficients of normal forms.
+
+*Period doubling.* With A = J, A q = -q, p A = -p, p . q = 1, and the second and third derivatives B and C of
+the strobe map
+
+    c = p . (C(q, q, q) + 3 B(q, (I - A)^-1 B(q, q))) / 6
+
+(Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer 2004, equation 5.35). With c > 0 it is
+supercritical: the orbits of twice the period are stable where the single one is not. B and C are differences
+of J along q, in half-widths of the window.
+
+*Grazing of a rigid backstop.* A touch of depth h adds the velocity (1 + e) sqrt(2 a h), with the acceleration
+a at the touch, so that the strobe map has a square root (A. B. Nordmark, J. Sound Vib. 145 (1991) 279). To
+first order the touching orbits lie where the square root of the depth is positive, and those without the
+touch where they stay off the surface.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.chaos.strobe.map import image_of
+from printhammer.chaos.strobe.quiet import quiet_section
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.chaos.curves.systems import Place, Plane
+    from printhammer.support.arrays import FloatArray
+
+MOST_PERIODS: Final = 4
+"""Most passages of a grazing after which an orbit with one touch is looked for."""
+
+_SPACINGS: Final = (2e-3, 2e-4, 5e-5)
+_AGREE: Final = 0.05
+"""Relative difference of coefficients from one spacing and from its half, within which they count."""
+_DOUBLES: Final = 1e-4
+"""Distance of a multiplier from -1 within which it is known well enough."""
+_FEW: Final = 1e-9
+
+
+def doubling_coefficient(plane: Plane, place: Place) -> float:
+    """Return c of an orbit that doubles its period; NaN where differences do not tell."""
+    regime = replace(plane.at(place.first, place.second), phase=place.phase)
+    quiet = quiet_section(regime, place.state, plane.firings, plane.tolerance)
+    if quiet is None:
+        return math.nan
+    regime, state = quiet
+    scales = plane.scales[:2]
+
+    def slope(away: FloatArray) -> tuple[FloatArray, tuple[str, ...]] | None:
+        image = image_of(regime, state + away * scales, plane.firings, plane.tolerance)
+        if not image.ok:
+            return None
+        return image.jacobian * scales / scales[:, np.newaxis], tuple(name for name, _ in image.contacts)
+
+    here = slope(np.zeros(2))
+    if here is None or not np.isfinite(here[0]).all():
+        return math.nan
+    matrix, contacts = here
+    values, right = np.linalg.eig(matrix)
+    if float(np.abs(values + 1.0).min()) > _DOUBLES:
+        return math.nan
+    q = right[:, int(np.argmin(np.abs(values + 1.0)))].real
+    values, left = np.linalg.eig(matrix.T)
+    p = left[:, int(np.argmin(np.abs(values + 1.0)))].real
+    if abs(float(p @ q)) < _FEW:
+        return math.nan
+    p = p / float(p @ q)
+
+    def coefficient(spacing: float) -> float:
+        ahead, behind = slope(spacing * q), slope(-spacing * q)
+        if ahead is None or behind is None or ahead[1] != contacts or behind[1] != contacts:
+            return math.nan
+        second = (ahead[0] - behind[0]) / (2.0 * spacing)
+        third = (ahead[0] - 2.0 * matrix + behind[0]) / spacing**2
+        turned = np.linalg.solve(np.eye(2) - matrix, second @ q)
+        return float(p @ (third @ q + 3.0 * second @ turned)) / 6.0
+
+    for spacing in _SPACINGS:
+        whole, half = coefficient(spacing), coefficient(0.5 * spacing)
+        if abs(half - whole) <= _AGREE * abs(half):
+            # The error goes with the square of the spacing.
+            return (4.0 * half - whole) / 3.0
+    return math.nan
+
+
+def root_coefficient(plane: Plane, place: Place) -> float:
+    """Return (1 + e) sqrt(2 a), m^(1/2)/s: the velocity by the root of the depth that a touch adds."""
+    try:
+        restitution = plane.at(place.first, place.second).value("backstop.restitution")
+    except InputError:
+        return math.nan
+    return (1.0 + restitution) * math.sqrt(2.0 * place.acceleration) if place.acceleration > 0.0 else math.nan
+
+
+def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
+    """Return on which side of a grazing of a rigid backstop orbits exist, as the first constant goes.
+
+    Returns
+    -------
+    tuple of int
+        Of the orbit without the touch, then of those with one touch in 1, 2, 3 and 4 of its periods: 1 for
+        larger values of the constant, -1 for smaller ones, 0 where there is none on either side.
+    """
+    matrix, root = place.jacobian, root_coefficient(plane, place)
+    if place.slope is None or not math.isfinite(root):
+        return (0,) * (MOST_PERIODS + 1)
+    free = float(np.linalg.solve(np.eye(2) - matrix, place.slope)[0])
+    kick = np.array([0.0, root])
+    passages = range(1, MOST_PERIODS + 1)
+    return int(np.sign(free)), *(_touching_side(matrix, place.slope, kick, n) for n in passages)
+
+
+def _touching_side(matrix: FloatArray, slope: FloatArray, kick: FloatArray, periods: int) -> int:
+    """Return on which side an orbit with one touch in so many periods exists, see `grazing_sides`.
+
+    In units of the root of the depth, u_0 = (0, v) and the move of the constant solve
+    u_0 = A^n (u_0 + kick) + (A^(n - 1) + ... + I) slope move; on the way the armature stays off the surface.
+    """
+    power = np.linalg.matrix_power(matrix, periods)
+    summed = sum((np.linalg.matrix_power(matrix, k) for k in range(periods)), np.zeros((2, 2))) @ slope
+    system = np.column_stack([power[:, 1] - np.array([0.0, 1.0]), summed])
+    if abs(float(np.linalg.det(system))) < _FEW * float(np.abs(system).max()) ** 2:
+        return 0
+    v, move = np.linalg.solve(system, -power @ kick)
+    u = np.array([0.0, v]) + kick
+    for _ in range(periods - 1):
+        u = matrix @ u + slope * move
+        if u[0] <= 0.0:
+            return 0
+    return int(np.sign(move))

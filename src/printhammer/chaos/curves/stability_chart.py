@@ -1,0 +1,245 @@
+"""The designer's chart: where in the plane of two constants an orbit is stable, and what ends it.
+
+An orbit loses its stability at a fold, a period doubling or a Neimark-Sacker point, each a curve in the plane
+(`printhammer.chaos.curves.systems`). Beside the curves the chart shows to what a train from rest settles, on
+a grid; a stable orbit need not be what is reached from there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
+
+import numpy as np
+
+from printhammer.chaos.continuation.arclength import Steps
+from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.continuation import continuation
+from printhammer.chaos.continuation.tracer import read_bounds
+from printhammer.chaos.curves.attractors import GRID_TOLERANCE, settled_plane
+from printhammer.chaos.curves.bifurcation_curve import MOST, curve_of
+from printhammer.chaos.curves.curve import SAME, BifurcationCurve
+from printhammer.chaos.curves.starts import Start, start_of
+from printhammer.chaos.curves.systems import TESTS, Plane
+from printhammer.chaos.curves.tracing import PRECISION, CurveTracer
+from printhammer.drive.input import read_count
+from printhammer.errors import InputError
+from printhammer.results import Column, Result, column, derived, part, provenance, scalar
+from printhammer.support.threads import Progress, mapped, thread_count
+
+if TYPE_CHECKING:
+    from printhammer.chaos.continuation.events import BranchEvent
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing, Regime
+    from printhammer.support.arrays import FloatArray, IntArray
+
+GRID: Final = (48, 32)
+"""Numbers of values of the two constants at which trains from rest are judged."""
+
+
+class StabilityChart(Result):
+    """Where in the plane of two constants an orbit is stable, and what ends it."""
+
+    regime: Regime = part("hammer and periodic drive of the branch it came from")
+    names: tuple[str, str] = scalar("", "the two constants")
+    units: tuple[str, str] = scalar("", "their SI units")
+    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "their ranges")
+    firings: int = scalar("1", "number of firings after which the orbit repeats")
+    curves: tuple[BifurcationCurve, ...] = part("on which it loses its stability", repr=False)
+    grid: tuple[FloatArray, FloatArray] = part(
+        "values of the two constants, shapes (m,) and (n,), at which trains from rest were judged", repr=False
+    )
+    settled: IntArray = column(
+        "1",
+        "firings after which the train from rest repeats",
+        "value main",
+        more="0 where it does not within the firings given to it, -1 where its run stopped",
+        dtype=np.int32,
+    )
+    refused: tuple[str, ...] = part("why a curve could not be followed, a sentence each", default=())
+
+    @property
+    def title(self) -> str:
+        """One line that says what the chart is."""
+        return f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
+
+    @property
+    @derived("", "what was found")
+    def message(self) -> str:
+        """What was found, in one line."""
+        kinds = [curve.kind for curve in self.curves]
+        counts = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
+        share = float(np.mean(self.settled == self.firings)) if self.settled.size else 0.0
+        missed = f"; {len(self.refused)} could not be followed" if self.refused else ""
+        return (
+            f"curves on which the period-{self.firings} orbit loses its stability: {counts}{missed};"
+            f" from rest {100.0 * share:.0f} % of the grid settles to period {self.firings}"
+        )
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the chart comes from; the tolerance is that of the trains from rest."""
+        regime, waveform = self.regime, self.regime.fired
+        return provenance(
+            hammer=regime.hammer,
+            waveform=waveform,
+            overlap=regime.overlap,
+            period=regime.period,
+            tolerance=GRID_TOLERANCE,
+        )
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return trains from rest over `value` and `main`, curves over `curve` and `point`."""
+        # At least one of each: a dimension of length 0 has another meaning in the classic NetCDF format.
+        most, count = max((len(curve.first) for curve in self.curves), default=1), max(len(self.curves), 1)
+        table = np.full((2, count, most), np.nan)
+        limits = np.full((count, most), -1, np.int32)
+        codes = np.full(count, -1, np.int32)
+        codes[: len(self.curves)] = [list(TESTS).index(curve.kind) for curve in self.curves]
+        for i, curve in enumerate(self.curves):
+            table[0, i, : len(curve.first)] = curve.first
+            table[1, i, : len(curve.second)] = curve.second
+            limits[i, : len(curve.limits)] = curve.limits
+        pair = ("curve", "point")
+        own = super().entries()
+        kind = Column("1", "how stability is lost", ("curve",), name="kind", codes=tuple(TESTS))
+        own["kind"] = kind, codes
+        own["limits"] = Column("1", "whether stability is lost", pair, name="limits"), limits
+        for k, (name, axis) in enumerate((("first", "main"), ("second", "value"))):
+            own[name] = Column(self.units[k], self.names[k], pair, name=name), table[k]
+            note = Column(self.units[k], self.names[k], (axis,), "coordinate", name=axis)
+            own[axis] = note, self.grid[k]
+        return own
+
+
+def stability_chart(
+    branch: Branch | Regime | Hammer,
+    second: str,
+    bounds: tuple[float | str, float | str],
+    *,
+    first: tuple[str, float | str, float | str] | None = None,
+    grid: tuple[int, int] = GRID,
+    most: SupportsIndex = MOST,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    **firing: Unpack[Firing],
+) -> StabilityChart:
+    """Follow the limits of stability of a branch through a second constant.
+
+    Parameters
+    ----------
+    branch : Branch, Regime or Hammer
+        From `printhammer.continuation`, usually in the rate; its constant is the first one, in its bounds. Of
+        a regime, or of a hammer with all that `firing` says of it, the branch along `first` is followed.
+    second : str
+        The second constant, such as "backstop.damping" or "waveform.amplitude".
+    bounds : tuple
+        Its least and largest value, SI or text with a unit.
+    first : tuple, optional
+        Of a regime or hammer: the first constant, its least and its largest value.
+    grid : tuple of int, optional
+        Numbers of values of the two constants at which trains from rest are judged; (0, 0) for none.
+    most : int, optional
+        Number of steps of a curve in either direction.
+    threads : int, optional
+        By default as many as there are cores; the chart does not depend on it.
+    progress : callable, optional
+        Called now and then with the number of curves that are done and of all.
+    **firing
+        How a hammer is fired, as for `printhammer.Regime.of`.
+
+    Returns
+    -------
+    StabilityChart
+        With the curves on which the branch's orbit loses its stability, one through each limit of a range of
+        stability that lies on no other curve, and what trains from rest settle to.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or both constants are the same.
+    """
+    if isinstance(branch, Branch):
+        if first is not None or firing:
+            raise InputError("a branch is given, expected no first constant and no firing beside it")
+    elif first is None:
+        raise InputError("first is missing, expected the first constant with its least and largest value")
+    else:
+        branch = continuation(branch, first[0], first[1:], threads=threads, **firing)
+    regime = branch.regime
+    if second == branch.parameter:
+        raise InputError(f"second = {second!r}, expected another constant than that of the branch")
+    ends = read_bounds(regime, second, bounds)
+    value = regime.value(second)
+    if not ends[0] <= value <= ends[1]:
+        raise InputError(f"bounds = {bounds!r}, expected a range around the hammer's own {second}, {value:g}")
+    chart = _Chart(branch, second, ends, Steps(most=read_count(most, "most"), precision=PRECISION))
+    # The other multiplier lies inside the unit circle there.
+    lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
+    limits = [event for event in lost if event.kind in TESTS]
+    curves, refused = chart.curves(limits, thread_count(threads), progress)
+    axes, settled = settled_plane(regime, chart.plane.names, chart.plane.bounds, grid, threads)
+    return StabilityChart(
+        regime=regime,
+        names=(branch.parameter, second),
+        units=(branch.unit, regime.quantity(second).si),
+        bounds=(branch.bounds, ends),
+        firings=branch.firings,
+        curves=tuple(curves),
+        grid=axes,
+        settled=settled,
+        refused=tuple(refused),
+    )
+
+
+class _Chart:
+    """The curves of one chart."""
+
+    def __init__(self, branch: Branch, second: str, bounds: tuple[float, float], steps: Steps) -> None:
+        self.branch, self.steps = branch, steps
+        names, own = (branch.parameter, second), (branch.bounds, bounds)
+        self.plane = Plane(branch.regime, names, own, branch.firings, branch.tolerance)
+        self.value = branch.regime.value(second)
+
+    def curves(
+        self, limits: list[BranchEvent], threads: int, progress: Progress | None
+    ) -> tuple[list[BifurcationCurve], list[str]]:
+        """Return a curve through each limit, but those that lie on one already."""
+        curves: list[BifurcationCurve] = []
+        refused: list[str] = []
+        left = [start_of(self.branch, event, None) for event in limits]
+        while left:
+            left = [start for start in left if not any(self.on(curve, start) for curve in curves)]
+            # As many at once whatever the number of threads, so that the outcome is the same.
+            now, left = left[:2], left[2:]
+            for start, curve in zip(now, mapped(self.curve, now, threads, length=1), strict=True):
+                if isinstance(curve, str):
+                    refused.append(curve)
+                elif not any(self.on(other, start) for other in curves):
+                    curves.append(curve)
+            if progress is not None:
+                progress(len(limits) - len(left), len(limits))
+        return curves, refused
+
+    def curve(self, start: Start) -> BifurcationCurve | str:
+        """Return the curve through an event of the branch, or why there is none."""
+        try:
+            traced = CurveTracer(self.plane, start.kind, self.steps).trace(start, self.value, 1)
+        except InputError as error:
+            return str(error)
+        return curve_of(self.plane, traced, (0, 0), 1)
+
+    def on(self, curve: BifurcationCurve, start: Start) -> bool:
+        """Return whether an event of the branch lies on a curve, between two of its points."""
+        if curve.kind != start.kind:
+            return False
+        event = CurveTracer(self.plane, start.kind, self.steps).state_at(start, self.value)
+        points = np.column_stack([curve.state, curve.first, curve.second]) / self.plane.scales
+        place = np.array([*event, start.value, self.value]) / self.plane.scales
+        along = np.diff(points, axis=0)
+        lengths = (along**2).sum(axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shares = np.clip(((place - points[:-1]) * along).sum(axis=1) / lengths, 0.0, 1.0)
+        feet = points[:-1] + np.nan_to_num(shares)[:, np.newaxis] * along
+        # A chord leaves its curve by a part of its length.
+        near = np.sqrt(((feet - place) ** 2).sum(axis=1)) <= 0.1 * np.sqrt(lengths) + SAME
+        return bool(near.any())

@@ -1,0 +1,192 @@
+"""Where a curve begins: an event of a branch, also of one from a file, or a point of a saved curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.events import KINDS as EVENTS
+from printhammer.chaos.continuation.events import BranchEvent
+from printhammer.chaos.curves.systems import KINDS
+from printhammer.errors import InputError
+from printhammer.results import Reopened, reopen
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from printhammer.chaos.continuation.arclength import Stop
+    from printhammer.run.regime import Regime
+    from printhammer.support.arrays import FloatArray
+
+FIRST: Final = "first"
+LAST: Final = "last"
+_ENDS: Final = {FIRST: 0, LAST: -1}
+_LIST: Final = ", ".join(KINDS)
+
+
+@dataclass(frozen=True)
+class Start:
+    """A bifurcation of an orbit, as far as it is known before Newton's method."""
+
+    kind: str
+    regime: Regime
+    """With the phase at which the state is known."""
+    first: str
+    """The constant along which it was found."""
+    bounds: tuple[float, float]
+    firings: int
+    tolerance: float
+    state: FloatArray
+    value: float
+    other: float | None = None
+    """The second constant, where it is not that of the regime."""
+
+
+def start_of(
+    source: Branch | Reopened | str | Path, event: BranchEvent | int | str | None, regime: Regime | None
+) -> Start:
+    """Return where a curve begins.
+
+    Parameters
+    ----------
+    source : Branch, Reopened or path
+        A branch, or a file with a branch, branches or a curve.
+    event : BranchEvent, int or str, optional
+        An event of the branch; its number in the table of events, from 0 on; "first" or "last", where the
+        branch ends in a grazing; or a kind, of which the first event counts. By default the first that can
+        be followed. Of a curve the number of a point, "first" or "last"; by default the first one.
+    regime : Regime, optional
+        Of a file: the hammer and how it is fired.
+
+    Raises
+    ------
+    InputError
+        There is no such event, the file holds something else, or is of another hammer.
+    """
+    if isinstance(source, Branch):
+        if regime is not None:
+            raise InputError("a branch is given, expected no regime beside it")
+        return _of_branch(source, event)
+    opened = source if isinstance(source, Reopened) else reopen(source)
+    if regime is None:
+        raise InputError(f"{opened.path}: expected a regime beside the file, the hammer and how it is fired")
+    if isinstance(event, BranchEvent):
+        raise InputError(f"{opened.path}: expected the number or kind of an event beside a file")
+    return _of_file(opened, event, regime)
+
+
+def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
+    at = (branch.parameter, branch.bounds, branch.firings, branch.tolerance)
+    if isinstance(event, str) and event in _ENDS:
+        stop: Stop = branch.stops[_ENDS[event]]
+        if stop.reason != "grazing":
+            raise InputError(
+                f"event = {event!r}: the branch does not end in a grazing there, {stop.sentence}"
+            )
+        regime = replace(branch.regime, phase=float(branch.phases[_ENDS[event]]))
+        return Start("grazing", regime, *at, np.array(stop.state), stop.parameter)
+    if isinstance(event, BranchEvent):
+        if not any(event is own for own in branch.events):
+            raise InputError(f"event = {event.kind!r}, expected one of the events of the branch")
+        chosen = event
+    else:
+        kinds = [own.kind for own in branch.events]
+        chosen = branch.events[_number(kinds, [own.sharp for own in branch.events], event, "the branch")]
+    regime = replace(branch.regime, phase=chosen.phase)
+    return Start(chosen.kind, regime, *at, np.array(chosen.state), chosen.value)
+
+
+def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, whose: str) -> int:
+    """Return the number of the event that is meant."""
+    known = ", ".join(dict.fromkeys(kinds)) or "none"
+    if isinstance(event, int | np.integer):
+        if not 0 <= event < len(kinds):
+            raise InputError(f"event = {event}, expected the number of one of {len(kinds)} events of {whose}")
+        if kinds[event] not in KINDS or not located[event]:
+            why = "" if located[event] else " that was not located"
+            raise InputError(f"event = {event} is a {kinds[event]}{why}, expected a located one of {_LIST}")
+        return int(event)
+    if event is not None and event not in KINDS:
+        raise InputError(f"event = {event!r}, expected a number, first, last, or one of {_LIST}")
+    for number, kind in enumerate(kinds):
+        if located[number] and (kind == event or (event is None and kind in KINDS)):
+            return number
+    raise InputError(f"event = {event or _LIST}: {whose} has none, its events are: {known}")
+
+
+def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start:
+    dataset, notes = opened.dataset, opened.attributes
+    known = notes.get("hammer_fingerprint")
+    if known is not None and known != regime.hammer.fingerprint:
+        raise InputError(
+            f"{opened.path}: hammer_fingerprint = {known[:12]}, expected that of {regime.hammer.name},"
+            f" {regime.hammer.fingerprint[:12]}"
+        )
+    if "names" in notes and "first" in dataset:
+        return _of_curve(opened, event, regime)
+    needed = ("event_kind", "event_value", "event_x", "event_v", "event_phase", "firings")
+    if any(name not in dataset for name in needed) or "parameter" not in notes:
+        raise InputError(f"{opened.path}: expected a branch or branches with their events, or a curve")
+    if "branch" in dataset["event_kind"].dims:
+        # Of several branches the first is meant, which is the one that was asked for.
+        dataset = dataset.isel(branch=0)
+    kinds = [EVENTS[code] if code >= 0 else "" for code in dataset["event_kind"].values]
+    located = [bool(value == 1) for value in dataset["event_located"].values]
+    common = (
+        str(notes["parameter"]),
+        _pair(notes["bounds"]),
+        int(dataset["firings"]),
+        _tolerance(notes),
+    )
+    if isinstance(event, str) and event in _ENDS:
+        if "graz" not in str(notes.get(f"{event}_end", "")):
+            raise InputError(
+                f"{opened.path}: event = {event!r}, expected an end in a grazing of a single branch"
+            )
+        row = dataset.isel(orbit=_ENDS[event], firing=0)
+        there = replace(regime, phase=float(row["orbit_phase"]))
+        state = np.array([row["x"], row["v"]], dtype=np.float64)
+        return Start("grazing", there, *common, state, float(row["value"]))
+    number = _number(kinds, located, event, str(opened.path))
+    row = dataset.isel(event=number)
+    state = np.array([row["event_x"], row["event_v"]], dtype=np.float64)
+    there = replace(regime, phase=float(row["event_phase"]))
+    return Start(kinds[number], there, *common, state, float(row["event_value"]))
+
+
+def _of_curve(opened: Reopened, point: int | str | None, regime: Regime) -> Start:
+    dataset, notes = opened.dataset, opened.attributes
+    # Of a table the points are its rows.
+    (along,) = dataset["first"].dims
+    count = dataset.sizes[along]
+    number: Any = _ENDS.get(point, point) if isinstance(point, str) else point or 0
+    if not isinstance(number, int | np.integer) or not -1 <= number < count:
+        raise InputError(
+            f"{opened.path}: event = {point!r}, expected a point of the curve from 0 to {count - 1}"
+        )
+    row = dataset.isel({along: int(number)})
+    names, bounds = notes["names"], notes["bounds"]
+    return Start(
+        str(notes["kind"]),
+        replace(regime, phase=float(row["phase"])),
+        str(names[0]),
+        _pair(bounds[0]),
+        int(notes["firings"]),
+        _tolerance(notes),
+        np.array([row["x"], row["v"]], dtype=np.float64),
+        float(row["first"]),
+        float(row["second"]),
+    )
+
+
+def _pair(bounds: Any) -> tuple[float, float]:
+    low, high = bounds
+    return float(low), float(high)
+
+
+def _tolerance(notes: dict[str, Any]) -> float:
+    return float(notes["tolerance"])
