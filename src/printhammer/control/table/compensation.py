@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.control.table.drive import COLUMNS, ROUNDING, Settings, print_pulse, pulses_of, sequence
-from printhammer.control.table.formats import HEAD, columns, csv_head, header_text, read_table
+from printhammer.control.table.drivers import driven_by
+from printhammer.control.table.formats import HEAD, OPTIONAL, columns, csv_head, header_text, read_table
 from printhammer.control.table.histories import (
     checked_size,
     entries_of,
@@ -18,10 +20,12 @@ from printhammer.control.table.histories import (
 )
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import nominal
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.outputs import write_file
 from printhammer.support.texts import read_text
 
@@ -40,6 +44,8 @@ if TYPE_CHECKING:
 JUMP: Final = 8e-6
 _NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
 _CELLS: Final = "rate history"
+ANY_UNIT: Final = "any"
+"""Serial number that stands for every unit, where a table that was learned on one is to drive others."""
 
 
 class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".nc", ".zarr", ".parquet")):
@@ -78,6 +84,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         more="of force or arrival; nan where it is not known, and 1 is on the limit",
     )
     largest_current: float = scalar("A", "bound on the current that was kept to")
+    driver: str = scalar("", "what switches the coil, see `printhammer.control.table.drivers`", default="own")
+    serial: str = scalar(
+        "", "serial number of the unit that it was learned on", more="empty for all units", default=""
+    )
 
     def __post_init__(self) -> None:
         checked_size(self.gaps, self.reach)
@@ -169,20 +179,48 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
         return Settings(*(between(getattr(self, name)) for name in COLUMNS))
 
-    def strategy(self, hammer: Hammer) -> TableStrategy:
+    def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
+        """Return this table, tuned on what a driver makes of a hammer, as one for the hammer.
+
+        The dot from rest takes another time with another driver; all pulses come as much earlier or later.
+        """
+        if driver == self.driver:
+            return self
+        own = nominal(hammer, tolerance=DISPLAY_TOLERANCE).flight_time
+        driven = driven_by(hammer, driver, self.largest_current)
+        later = own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time
+        delay = np.where(self.brake_width > 0.0, self.brake_delay + later, self.brake_delay)
+        return replace(
+            self,
+            fingerprint=hammer.fingerprint,
+            advance=self.advance - later,
+            brake_delay=delay,
+            driver=driver,
+        )
+
+    def strategy(self, hammer: Hammer, serial: str | None = None) -> TableStrategy:
         """Return the table as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
 
         Parameters
         ----------
         hammer : Hammer
             The hammer the table is made for. The strategy may then be tried on others that differ from it.
+        serial : str, optional
+            Serial number of the unit that is driven; `ANY_UNIT` drives any unit with a table that was learned
+            on one. A table that was not learned is for every unit.
 
         Raises
         ------
         InputError
-            The table is made for another one, of another fingerprint, or its pulses would need more than
-            `largest_current`.
+            The table is made for another one, of another fingerprint, or was learned on another unit, or its
+            pulses would need more than `largest_current`.
         """
+        if self.serial and serial not in (self.serial, ANY_UNIT):
+            unit = "no serial" if serial is None else f"serial = {serial!r}"
+            raise InputError(
+                f"{unit} is given: the table was learned on unit {self.serial!r}, expected this serial, or"
+                f" {ANY_UNIT!r} to drive another unit with it"
+            )
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
@@ -251,7 +289,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def _head(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in HEAD}
+        return {name: getattr(self, name) for name in (*HEAD, *OPTIONAL)}
 
     def save(self, path: str | Path) -> None:
         """Write the table, a C header (.h) among others, by the ending of the name; whole or not at all.
@@ -281,7 +319,8 @@ class TableStrategy:
 
     def __init__(self, table: CompensationTable, hammer: Hammer) -> None:
         self.table = table
-        self._pulse, widest = print_pulse(hammer, table.largest_current)
+        driven = driven_by(hammer, table.driver, table.largest_current)
+        self._pulse, widest = print_pulse(driven, table.largest_current)
         for name in ("width", "brake_width"):
             largest = float(getattr(table, name).max())
             if largest > widest * (1.0 + ROUNDING):

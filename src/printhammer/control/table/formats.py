@@ -42,6 +42,8 @@ NANOSECOND: Final = 1e-9  # Unit of the times in a C header, s
 DEVIATION: Final = "deviation"  # Name of the array that is no time
 # What a file says of the whole table
 HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}
+OPTIONAL: Final = {"driver": "own", "serial": ""}
+"""What a file may say besides, and what holds where it does not."""
 _FIRST: Final = f"# {KIND}, format {FORMAT}"
 _UNITS: Final = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
 _ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file
@@ -55,7 +57,8 @@ def columns(gaps: int) -> list[str]:
 
 def csv_head(head: Mapping[str, Any]) -> str:
     """Return the first lines of a CSV file: what it is, and what it is about."""
-    lines = [_FIRST, *(f"# {key} = {json.dumps(head[key], ensure_ascii=False)}" for key in HEAD)]
+    said = [*HEAD, *(key for key, value in OPTIONAL.items() if head[key] != value)]
+    lines = [_FIRST, *(f"# {key} = {json.dumps(head[key], ensure_ascii=False)}" for key in said)]
     return "\n".join(lines) + "\n"
 
 
@@ -118,7 +121,7 @@ def _of_json(text: str) -> tuple[Head, Rows]:
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON ({' '.join(str(error).split())})") from None
     if isinstance(data, dict) and isinstance(data.get("columns"), dict):
-        head = {key: data[key] for key in HEAD if key in data}
+        head = {key: data[key] for key in (*HEAD, *OPTIONAL) if key in data}
         head |= {"fingerprint": data["hammer_fingerprint"]} if "hammer_fingerprint" in data else {}
         _check_head(head)
         entries: Any = _entries(data["columns"])
@@ -169,8 +172,10 @@ def _entries(arrays: Mapping[str, Any]) -> Rows:
 
 
 def _check_head(head: Mapping[str, Any]) -> None:
-    _check_keys(head, list(HEAD), "")
-    for key, kind in HEAD.items():
+    _check_keys({**OPTIONAL, **head}, [*HEAD, *OPTIONAL], "")
+    for key, kind in (HEAD | dict.fromkeys(OPTIONAL, str)).items():
+        if key not in head:
+            continue
         value = head[key]
         good = isinstance(value, int | float) if kind is float else isinstance(value, kind)
         if isinstance(value, bool) or not good:

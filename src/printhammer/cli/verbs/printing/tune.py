@@ -31,6 +31,9 @@ _ROWS: Final = 12
         "reach": opt.whole("Longest gap that counts, slots.", default=2),
         "brake": opt.switch("Allow brake pulses.", default=True),
         "robust": opt.switch("Tune on hammers that differ a little as well."),
+        "driver": opt.choice(
+            "own|switch", "The hammer's own pulse, or that of a fast switch.", default="own"
+        ),
         "largest_current": opt.text("CURRENT", "Bound on the current.", default="2 A"),
     },
     out=opt.results("Table", ".h"),
@@ -42,6 +45,7 @@ def tune(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     judge: bool = opt.switch("Judge the table beside open loop on what it was not tuned on.", default=True),
+    variability: bool = opt.switch("Choose for the spread of a production."),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
@@ -58,6 +62,10 @@ def tune(
         raise InputError(f"--report {job.wanted['report'][0]} is given, expected none beside --no-judge")
     if "rate" in passed and "rates" in passed:
         raise InputError("--rate and --rates are given, expected one of them")
+    if variability:
+        from printhammer.printing.rates.variability import Variability
+
+        passed["variability"] = Variability()
     options = opt.given(tolerance=tolerance, threads=threads)
     with job.counting("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)
