@@ -54,5 +54,5 @@ def test_bad_numbers_are_refused() -> None:
 def test_where_no_hammer_rests_the_draw_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     name = "printhammer.printing.rates.variability.changed"
     monkeypatch.setattr(name, lambda hammer, rows: ([hammer] * len(rows), ["no hammer"] * len(rows)))
-    with pytest.raises(ph.InputError, match="0 of 40 hammers .* expected a smaller variability"):
+    with pytest.raises(ph.InputError, match=r"0 of 40 hammers .* expected a smaller variability"):
         Variability().draw(crude(), 4, 1)

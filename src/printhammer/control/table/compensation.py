@@ -10,7 +10,8 @@ import numpy as np
 
 from printhammer.control.table.drive import COLUMNS, ROUNDING, Settings, print_pulse, pulses_of, sequence
 from printhammer.control.table.drivers import driven_by
-from printhammer.control.table.formats import HEAD, OPTIONAL, columns, csv_head, header_text, read_table
+from printhammer.control.table.formats import HEAD, OPTIONAL, columns, csv_head, read_table
+from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
 from printhammer.control.table.histories import (
     checked_size,
     entries_of,
@@ -283,9 +284,44 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         rows = str(table.to_csv(index=False, header=False, lineterminator="\n"))
         return csv_head(self._head) + csv_text(table.iloc[:0]) + rows
 
-    def to_header(self) -> str:
-        """Return the text of the C header."""
-        return header_text(self._head, self.rates, {name: getattr(self, name) for name in COLUMNS})
+    def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
+        """Return the text of the C header.
+
+        Parameters
+        ----------
+        tick : float or str, optional
+            Tick of the timer, s, or text with a unit: a whole number of nanoseconds; by default one. With
+            longer ticks times are 16 bits long where they fit.
+        budget : int, optional
+            Most bytes that the arrays may take.
+
+        Raises
+        ------
+        InputError
+            The tick is no whole number of nanoseconds, or the table takes more bytes than there are.
+        """
+        unit, size = _checked_tick(tick), self.size(tick)
+        if budget is not None and size > budget:
+            raise InputError(
+                f"budget = {budget} bytes: the table takes {size}, expected a larger budget, a longer tick, a"
+                " shorter history, a shorter reach, or fewer rates"
+            )
+        return header_text(self._head, self.rates, self._times, unit)
+
+    def size(self, tick: float | str = NANOSECOND) -> int:
+        """Return how many bytes the arrays of the C header take with a tick, s, or text with a unit."""
+        bits = bits_of(self._times, _checked_tick(tick))
+        return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
+
+    def quantised(self, tick: float | str) -> CompensationTable:
+        """Return the table as a timer with a tick, s or text, fires it; deviations are unknown."""
+        unit = _checked_tick(tick)
+        times: dict[str, Any] = {name: np.rint(values / unit) * unit for name, values in self._times.items()}
+        return replace(self, **times, deviation=np.full_like(self.deviation, np.nan))
+
+    @property
+    def _times(self) -> dict[str, FloatArray]:
+        return {name: getattr(self, name) for name in COLUMNS}
 
     @property
     def _head(self) -> dict[str, Any]:
@@ -307,6 +343,15 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             write_file(Path(path), texts[suffix]())
         else:
             super().save(path)
+
+
+def _checked_tick(tick: float | str) -> float:
+    """Return a tick, s, as a whole number of nanoseconds."""
+    asked = read_positive(tick, "s", "tick")
+    count = round(asked / NANOSECOND)
+    if count < 1 or abs(asked / NANOSECOND - count) > _NEAR * count:
+        raise InputError(f"tick = {tick!r}, expected a whole number of nanoseconds")
+    return count * NANOSECOND
 
 
 class TableStrategy:
