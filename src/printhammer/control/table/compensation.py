@@ -167,18 +167,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         periods = 1.0 / self.rates[[first, second]]
         share = 0.0 if first == second else float((periods[0] - 1.0 / asked) / (periods[0] - periods[1]))
         share = min(max(share, 0.0), 1.0)
-        apart = np.abs(self.advance[first] - self.advance[second]) > JUMP
-        for values in (self.brake_delay, self.brake_width):
-            apart |= values[first] != values[second]
-        part = np.where(apart, float(share > 0.5), share)
-
-        def between(values: FloatArray) -> FloatArray:
-            # Exactly the values of the table at its own rates.
-            mixed = (1.0 - part) * values[first] + part * values[second]
-            upper = np.where(part == 1.0, values[second], mixed)
-            return np.asarray(np.where(part == 0.0, values[first], upper))
-
-        return Settings(*(between(getattr(self, name)) for name in COLUMNS))
+        low_row, high_row = (
+            Settings(*(values[row] for values in self._times.values())) for row in (first, second)
+        )
+        return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
         """Return this table, tuned on what a driver makes of a hammer, as one for the hammer.
@@ -189,11 +181,15 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             return self
         own = nominal(hammer, tolerance=DISPLAY_TOLERANCE).flight_time
         driven = driven_by(hammer, driver, self.largest_current)
-        later = own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time
+        return self.delayed(own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time, driver, hammer)
+
+    def delayed(self, later: float, driver: str, hammer: Hammer) -> CompensationTable:
+        """Return this table as one for a hammer and its driver, with all pulses so much later, s."""
         delay = np.where(self.brake_width > 0.0, self.brake_delay + later, self.brake_delay)
         return replace(
             self,
             fingerprint=hammer.fingerprint,
+            hammer=hammer.name,
             advance=self.advance - later,
             brake_delay=delay,
             driver=driver,
@@ -300,7 +296,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         InputError
             The tick is no whole number of nanoseconds, or the table takes more bytes than there are.
         """
-        unit, size = _checked_tick(tick), self.size(tick)
+        unit, size = checked_tick(tick), self.size(tick)
         if budget is not None and size > budget:
             raise InputError(
                 f"budget = {budget} bytes: the table takes {size}, expected a larger budget, a longer tick, a"
@@ -310,12 +306,12 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     def size(self, tick: float | str = NANOSECOND) -> int:
         """Return how many bytes the arrays of the C header take with a tick, s, or text with a unit."""
-        bits = bits_of(self._times, _checked_tick(tick))
+        bits = bits_of(self._times, checked_tick(tick))
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
         """Return the table as a timer with a tick, s or text, fires it; deviations are unknown."""
-        unit = _checked_tick(tick)
+        unit = checked_tick(tick)
         times: dict[str, Any] = {name: np.rint(values / unit) * unit for name, values in self._times.items()}
         return replace(self, **times, deviation=np.full_like(self.deviation, np.nan))
 
@@ -345,7 +341,25 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             super().save(path)
 
 
-def _checked_tick(tick: float | str) -> float:
+def mixed(first: Settings, second: Settings, share: float) -> Settings:
+    """Return settings between two, by the share of the second.
+
+    Where the two do not belong together, since their brake pulses differ or one fires before a rebound and
+    the other after it, the nearer one holds.
+    """
+    apart = np.abs(first.advance - second.advance) > JUMP
+    apart |= (first.brake_delay != second.brake_delay) | (first.brake_width != second.brake_width)
+    part = np.where(apart, float(share > 0.5), share)
+
+    def between(low: FloatArray, high: FloatArray) -> FloatArray:
+        # Exactly the values of the two at their own places.
+        upper = np.where(part == 1.0, high, (1.0 - part) * low + part * high)
+        return np.asarray(np.where(part == 0.0, low, upper))
+
+    return Settings(*map(between, first, second))
+
+
+def checked_tick(tick: float | str) -> float:
     """Return a tick, s, as a whole number of nanoseconds."""
     asked = read_positive(tick, "s", "tick")
     count = round(asked / NANOSECOND)

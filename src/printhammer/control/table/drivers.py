@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
+from printhammer.control.widths import of_width
 from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
@@ -56,20 +57,31 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
         raise InputError(f"{hammer.path}: the waveform is a {own.quantity}, expected a current")
     edge = max(float(getattr(own, "decay", _EDGE)), _LEAST_EDGE)
     force = nominal(hammer, tolerance=DISPLAY_TOLERANCE).force
-    low, high = 0.5 * edge, 2.0 * float(getattr(own, "width", own.support))
+    shape = Rectangle(amplitude=largest, width=edge, rise=edge, decay=edge)
+    return of_force(hammer, shape, force, 0.5 * edge, 2.0 * float(getattr(own, "width", own.support)))
+
+
+def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
+    """Return a hammer fired by a pulse of such a width, between two, s, that the dot has a force, N.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
     for _ in range(_ROUNDS):
-        widths = np.linspace(low, high, _GRID)
-        pulses = [Rectangle(amplitude=largest, width=width, rise=edge, decay=edge) for width in widths]
+        widths = np.linspace(low, high, _GRID).tolist()
+        pulses = [of_width(pulse, width) for width in widths]
         dots = single_pulses([hammer] * _GRID, pulses, tolerance=DISPLAY_TOLERANCE)
         hard = [dot is not None and dot.force >= force for dot in dots]
         if hard[0] or not any(hard):
             raise InputError(
-                f"{hammer.path}: no pulse of {largest:g} A of a fast switch makes the dot of the hammer's own"
-                " pulse, expected another largest_current"
+                f"{hammer.path}: no width of the pulse makes a dot of {force:.4g} N, expected another"
+                " largest_current, or a hammer nearer to its design"
             )
         first = hard.index(True)
-        low, high = float(widths[first - 1]), float(widths[first])
-    return with_pulse(hammer, Rectangle(amplitude=largest, width=high, rise=edge, decay=edge))
+        low, high = widths[first - 1], widths[first]
+    return with_pulse(hammer, of_width(pulse, high))
 
 
 def with_pulse(hammer: Hammer, pulse: Waveform) -> Hammer:
