@@ -152,9 +152,10 @@ def test_the_table_is_for_its_unit_only(tmp_path: Path) -> None:
     result.plot()
 
 
-def test_a_switch_prints_the_same_dot_at_the_same_time() -> None:
+@pytest.mark.parametrize("driver", ["switch", "bridge"])
+def test_another_driver_prints_the_same_dot_at_the_same_time(driver: str) -> None:
     hammer = nominal()
-    table = ph.tune(hammer, rate=RATE, history=1, driver="switch")
+    table = ph.tune(hammer, rate=RATE, history=1, driver=driver)
     drive = table.drive(hammer, (0,), RATE)
     (dot,) = ph.simulate(hammer, drive).dots
     (own,) = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=[1e-3])).dots
@@ -166,7 +167,7 @@ def test_a_switch_prints_the_same_dot_at_the_same_time() -> None:
 def test_bad_arguments_are_refused() -> None:
     hammer = nominal()
     for options, sentence in (
-        ({"driver": "bellows"}, "driver = 'bellows', expected own or switch"),
+        ({"driver": "bellows"}, "driver = 'bellows', expected own, switch or bridge"),
         ({"members": 3}, "members = 3, expected 50 to 5000"),
         ({"forgetting": 0.0}, "forgetting = 0.0, expected a number above 0 and below 1"),
         ({"serial": ""}, "serial = '', expected a text"),

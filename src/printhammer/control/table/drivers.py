@@ -16,10 +16,14 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
 
-Driver = Literal["own", "switch"]
+Driver = Literal["own", "switch", "bridge"]
 DRIVERS: Final = get_args(Driver)
 """The hammer's own pulse, with the rise of its supply; a fast unipolar switch, whose current rises as fast as
-that of the hammer falls."""
+that of the hammer falls; an H-bridge, which switches off against the reversed rail."""
+
+# Time constant of the decay against the reversed rail, in parts of that of the rise: the current falls as
+# 2 exp(-t) - 1 and is zero at ln 2; an exponential of this constant has the same charge.
+_REVERSED: Final = 1.0 - float(np.log(2.0))
 
 _EDGE: Final = 20e-6  # Time constant of a switch where the waveform of the hammer has no decay, s
 _LEAST_EDGE: Final = 1e-6  # Least time constant of a switch, s
@@ -36,14 +40,14 @@ def checked_driver(driver: str) -> Driver:
         There is none of that name.
     """
     if driver not in DRIVERS:
-        raise InputError(f"driver = {driver!r}, expected {' or '.join(DRIVERS)}")
+        raise InputError(f"driver = {driver!r}, expected {', '.join(DRIVERS[:-1])} or {DRIVERS[-1]}")
     return driver  # type: ignore[return-value]
 
 
 def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
     """Return a hammer with the pulse of a driver, of a width at which the dot is as hard as before.
 
-    `largest` is the current of a switch, A.
+    `largest` is the current of a switch or a bridge, A.
 
     Raises
     ------
@@ -57,7 +61,8 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
         raise InputError(f"{hammer.path}: the waveform is a {own.quantity}, expected a current")
     edge = max(float(getattr(own, "decay", _EDGE)), _LEAST_EDGE)
     force = nominal(hammer, tolerance=DISPLAY_TOLERANCE).force
-    shape = Rectangle(amplitude=largest, width=edge, rise=edge, decay=edge)
+    decay = edge * (_REVERSED if driver == "bridge" else 1.0)
+    shape = Rectangle(amplitude=largest, width=edge, rise=edge, decay=decay)
     return of_force(hammer, shape, force, 0.5 * edge, 2.0 * float(getattr(own, "width", own.support)))
 
 

@@ -94,8 +94,8 @@ def tune(
         of on this hammer alone.
     driver : str, optional
         What switches the coil, of `DRIVERS` in `printhammer.control.table.drivers`: "own", the pulse of the
-        hammer, or "switch", a fast unipolar switch. With a switch the dot from rest is as hard as with the
-        own pulse, and is fired so much later that it arrives as it does.
+        hammer, "switch", a fast unipolar switch, or "bridge", an H-bridge. With these the dot from rest is as
+        hard as with the own pulse, and is fired so much later that it arrives as it does.
     variability : Variability, optional
         How the constants of a production are spread. The way is then taken in which a row of dots is least
         off in the mean square, over this hammer and the sigma points of the variability.

@@ -81,7 +81,8 @@ def stages(result: Learning, units: Units) -> Table:
     import numpy as np
 
     def worst(values: Any) -> float:
-        return float(np.nanmax(np.abs(values)))
+        known = np.abs(values[np.isfinite(values)])
+        return float(known.max()) if known.size else float("nan")
 
     columns: tuple[Column[int], ...] = (
         Column("test dots", lambda row: int(result.dots[row])),
