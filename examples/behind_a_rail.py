@@ -21,7 +21,7 @@ wanted = pulse.value(t)
 
 
 def behind(voltage, logarithms):
-    """The hammer with a coil behind a rail: ohms, henries, on-time, resistor of the decay."""
+    """The hammer behind a rail: resistance, inductance, on-time, resistor of the decay."""
     resistance, inductance, width, decay = np.exp(logarithms)
     return hammer.replace(
         {
@@ -50,6 +50,8 @@ def current(device):
 
 
 def fitted(voltage):
+    """The hammer behind a rail with the best current, and its largest deviation."""
+
     def deviation(logarithms):
         return (current(behind(voltage, logarithms)) - wanted) / wanted.max()
 
@@ -64,9 +66,9 @@ devices = {voltage: fitted(voltage) for voltage in (48.0, 100.0, 200.0)}
 for voltage, (device, worst) in devices.items():
     coil, rail = device.coil, device.waveform
     print(
-        f"{voltage:5.0f} V  {coil.resistance:6.2f} ohm  {1e3 * coil.inductance:6.3f} mH "
-        f" on for {1e6 * rail.width:6.2f} us  decay through {rail.decay_resistance:6.1f} ohm "
-        f" within {100 * worst:.2f} % of the peak"
+        f"{voltage:5.0f} V  {coil.resistance:6.2f} ohm  {1e3 * coil.inductance:6.3f} mH"
+        f"  on for {1e6 * rail.width:6.2f} us  decay {rail.decay_resistance:6.1f} ohm"
+        f"  within {100 * worst:.2f} % of the peak"
     )
 
 # %%
@@ -87,6 +89,5 @@ below.set(xlabel="time (µs)", ylabel="voltage across the coil (V)")
 energy = motion.energy
 for name in ("supply_work", "copper_loss", "driver_loss", "coil_work", "field"):
     print(f"{name:12s} {1e3 * getattr(energy, name):9.4f} mJ")
-print(
-    f"{'residual':12s} {energy.electric_residual / energy.throughput:9.1e} of the throughput"
-)
+share = energy.electric_residual / energy.throughput
+print(f"{'residual':12s} {share:9.1e} of the throughput")

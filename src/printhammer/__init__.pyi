@@ -18,6 +18,8 @@ from .chaos.orbits.manifolds import manifolds as manifolds
 from .chaos.orbits.search import orbits as orbits
 from .chaos.strobe.points import strobe as strobe
 from .control.feedback.comparison import feedback as feedback
+from .control.learning.learn import learn as learn
+from .control.learning.sensor import ImpactSensor as ImpactSensor
 from .control.least_work.burst import least_work as least_work
 from .control.table.compensation import CompensationTable as CompensationTable
 from .control.table.compensation import load_table as load_table

@@ -15,6 +15,7 @@ from printhammer.cli.verbs.laboratory import fit, hammer, reconstruct
 from printhammer.cli.verbs.laboratory.measure import measure
 from printhammer.cli.verbs.printing.energy import energy
 from printhammer.cli.verbs.printing.feedback import feedback
+from printhammer.cli.verbs.printing.learn import learn
 from printhammer.cli.verbs.printing.print_ import print_
 from printhammer.cli.verbs.printing.quality import quality
 from printhammer.cli.verbs.printing.tune import tune
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),
-    *(print_, energy, feedback, quality, tune, bench, studio, sweep, measure, warm),
+    *(print_, energy, feedback, quality, tune, learn, bench, studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped),
     *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),

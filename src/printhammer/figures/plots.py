@@ -23,6 +23,7 @@ PLOTS: Final = {
     "Fit": "fit.plot",
     "Front": "front.plot",
     "ImpactTrain": "chaos.impact_train.plot",
+    "Learning": "control.learning.plot",
     "LeastWork": "control.energy.plot",
     "LeastWorkRates": "control.energy.plot_rates",
     "Lyapunov": "chaos.lyapunov.plot",

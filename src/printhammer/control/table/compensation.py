@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.control.table.drive import COLUMNS, ROUNDING, Settings, print_pulse, pulses_of, sequence
-from printhammer.control.table.formats import HEAD, columns, csv_head, header_text, read_table
+from printhammer.control.table.drivers import driven_by
+from printhammer.control.table.formats import HEAD, OPTIONAL, columns, csv_head, read_table
+from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
 from printhammer.control.table.histories import (
     checked_size,
     entries_of,
@@ -18,10 +21,12 @@ from printhammer.control.table.histories import (
 )
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import nominal
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.outputs import write_file
 from printhammer.support.texts import read_text
 
@@ -40,6 +45,8 @@ if TYPE_CHECKING:
 JUMP: Final = 8e-6
 _NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
 _CELLS: Final = "rate history"
+ANY_UNIT: Final = "any"
+"""Serial number that stands for every unit, where a table that was learned on one is to drive others."""
 
 
 class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".nc", ".zarr", ".parquet")):
@@ -78,6 +85,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         more="of force or arrival; nan where it is not known, and 1 is on the limit",
     )
     largest_current: float = scalar("A", "bound on the current that was kept to")
+    driver: str = scalar("", "what switches the coil, see `printhammer.control.table.drivers`", default="own")
+    serial: str = scalar(
+        "", "serial number of the unit that it was learned on", more="empty for all units", default=""
+    )
 
     def __post_init__(self) -> None:
         checked_size(self.gaps, self.reach)
@@ -156,33 +167,57 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         periods = 1.0 / self.rates[[first, second]]
         share = 0.0 if first == second else float((periods[0] - 1.0 / asked) / (periods[0] - periods[1]))
         share = min(max(share, 0.0), 1.0)
-        apart = np.abs(self.advance[first] - self.advance[second]) > JUMP
-        for values in (self.brake_delay, self.brake_width):
-            apart |= values[first] != values[second]
-        part = np.where(apart, float(share > 0.5), share)
+        low_row, high_row = (
+            Settings(*(values[row] for values in self._times.values())) for row in (first, second)
+        )
+        return mixed(low_row, high_row, share)
 
-        def between(values: FloatArray) -> FloatArray:
-            # Exactly the values of the table at its own rates.
-            mixed = (1.0 - part) * values[first] + part * values[second]
-            upper = np.where(part == 1.0, values[second], mixed)
-            return np.asarray(np.where(part == 0.0, values[first], upper))
+    def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
+        """Return this table, tuned on what a driver makes of a hammer, as one for the hammer.
 
-        return Settings(*(between(getattr(self, name)) for name in COLUMNS))
+        The dot from rest takes another time with another driver; all pulses come as much earlier or later.
+        """
+        if driver == self.driver:
+            return self
+        own = nominal(hammer, tolerance=DISPLAY_TOLERANCE).flight_time
+        driven = driven_by(hammer, driver, self.largest_current)
+        return self.delayed(own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time, driver, hammer)
 
-    def strategy(self, hammer: Hammer) -> TableStrategy:
+    def delayed(self, later: float, driver: str, hammer: Hammer) -> CompensationTable:
+        """Return this table as one for a hammer and its driver, with all pulses so much later, s."""
+        delay = np.where(self.brake_width > 0.0, self.brake_delay + later, self.brake_delay)
+        return replace(
+            self,
+            fingerprint=hammer.fingerprint,
+            hammer=hammer.name,
+            advance=self.advance - later,
+            brake_delay=delay,
+            driver=driver,
+        )
+
+    def strategy(self, hammer: Hammer, serial: str | None = None) -> TableStrategy:
         """Return the table as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
 
         Parameters
         ----------
         hammer : Hammer
             The hammer the table is made for. The strategy may then be tried on others that differ from it.
+        serial : str, optional
+            Serial number of the unit that is driven; `ANY_UNIT` drives any unit with a table that was learned
+            on one. A table that was not learned is for every unit.
 
         Raises
         ------
         InputError
-            The table is made for another one, of another fingerprint, or its pulses would need more than
-            `largest_current`.
+            The table is made for another one, of another fingerprint, or was learned on another unit, or its
+            pulses would need more than `largest_current`.
         """
+        if self.serial and serial not in (self.serial, ANY_UNIT):
+            unit = "no serial" if serial is None else f"serial = {serial!r}"
+            raise InputError(
+                f"{unit} is given: the table was learned on unit {self.serial!r}, expected this serial, or"
+                f" {ANY_UNIT!r} to drive another unit with it"
+            )
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
@@ -245,13 +280,48 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         rows = str(table.to_csv(index=False, header=False, lineterminator="\n"))
         return csv_head(self._head) + csv_text(table.iloc[:0]) + rows
 
-    def to_header(self) -> str:
-        """Return the text of the C header."""
-        return header_text(self._head, self.rates, {name: getattr(self, name) for name in COLUMNS})
+    def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
+        """Return the text of the C header.
+
+        Parameters
+        ----------
+        tick : float or str, optional
+            Tick of the timer, s, or text with a unit: a whole number of nanoseconds; by default one. With
+            longer ticks times are 16 bits long where they fit.
+        budget : int, optional
+            Most bytes that the arrays may take.
+
+        Raises
+        ------
+        InputError
+            The tick is no whole number of nanoseconds, or the table takes more bytes than there are.
+        """
+        unit, size = checked_tick(tick), self.size(tick)
+        if budget is not None and size > budget:
+            raise InputError(
+                f"budget = {budget} bytes: the table takes {size}, expected a larger budget, a longer tick, a"
+                " shorter history, a shorter reach, or fewer rates"
+            )
+        return header_text(self._head, self.rates, self._times, unit)
+
+    def size(self, tick: float | str = NANOSECOND) -> int:
+        """Return how many bytes the arrays of the C header take with a tick, s, or text with a unit."""
+        bits = bits_of(self._times, checked_tick(tick))
+        return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
+
+    def quantised(self, tick: float | str) -> CompensationTable:
+        """Return the table as a timer with a tick, s or text, fires it; deviations are unknown."""
+        unit = checked_tick(tick)
+        times: dict[str, Any] = {name: np.rint(values / unit) * unit for name, values in self._times.items()}
+        return replace(self, **times, deviation=np.full_like(self.deviation, np.nan))
+
+    @property
+    def _times(self) -> dict[str, FloatArray]:
+        return {name: getattr(self, name) for name in COLUMNS}
 
     @property
     def _head(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in HEAD}
+        return {name: getattr(self, name) for name in (*HEAD, *OPTIONAL)}
 
     def save(self, path: str | Path) -> None:
         """Write the table, a C header (.h) among others, by the ending of the name; whole or not at all.
@@ -271,6 +341,33 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             super().save(path)
 
 
+def mixed(first: Settings, second: Settings, share: float) -> Settings:
+    """Return settings between two, by the share of the second.
+
+    Where the two do not belong together, since their brake pulses differ or one fires before a rebound and
+    the other after it, the nearer one holds.
+    """
+    apart = np.abs(first.advance - second.advance) > JUMP
+    apart |= (first.brake_delay != second.brake_delay) | (first.brake_width != second.brake_width)
+    part = np.where(apart, float(share > 0.5), share)
+
+    def between(low: FloatArray, high: FloatArray) -> FloatArray:
+        # Exactly the values of the two at their own places.
+        upper = np.where(part == 1.0, high, (1.0 - part) * low + part * high)
+        return np.asarray(np.where(part == 0.0, low, upper))
+
+    return Settings(*map(between, first, second))
+
+
+def checked_tick(tick: float | str) -> float:
+    """Return a tick, s, as a whole number of nanoseconds."""
+    asked = read_positive(tick, "s", "tick")
+    count = round(asked / NANOSECOND)
+    if count < 1 or abs(asked / NANOSECOND - count) > _NEAR * count:
+        raise InputError(f"tick = {tick!r}, expected a whole number of nanoseconds")
+    return count * NANOSECOND
+
+
 class TableStrategy:
     """A compensation table as a way to drive a hammer, as `CompensationTable.strategy` makes it.
 
@@ -281,7 +378,8 @@ class TableStrategy:
 
     def __init__(self, table: CompensationTable, hammer: Hammer) -> None:
         self.table = table
-        self._pulse, widest = print_pulse(hammer, table.largest_current)
+        driven = driven_by(hammer, table.driver, table.largest_current)
+        self._pulse, widest = print_pulse(driven, table.largest_current)
         for name in ("width", "brake_width"):
             largest = float(getattr(table, name).max())
             if largest > widest * (1.0 + ROUNDING):

@@ -1,7 +1,7 @@
-"""Compensation tables as text: CSV and JSON, which are read back, and a C header for the firmware.
+"""Compensation tables as text: CSV and JSON, which are read back.
 
 The formats are described in docs/howto/tables.md. Times are in seconds with all their digits, so that what is
-read back is the same table to the last bit; in the C header they are whole nanoseconds.
+read back is the same table to the last bit.
 """
 
 from __future__ import annotations
@@ -31,17 +31,16 @@ from printhammer.support.sheets import sheet_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from printhammer.support.arrays import FloatArray
-
     Head = dict[str, Any]
     Rows = list[dict[str, Any]]
 
 FORMAT: Final = 1  # Version of the CSV format, and of the JSON files of former versions
 KIND: Final = "printhammer compensation table"  # What the first line of a CSV file says
-NANOSECOND: Final = 1e-9  # Unit of the times in a C header, s
 DEVIATION: Final = "deviation"  # Name of the array that is no time
 # What a file says of the whole table
 HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}
+OPTIONAL: Final = {"driver": "own", "serial": ""}
+"""What a file may say besides, and what holds where it does not."""
 _FIRST: Final = f"# {KIND}, format {FORMAT}"
 _UNITS: Final = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
 _ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file
@@ -55,7 +54,8 @@ def columns(gaps: int) -> list[str]:
 
 def csv_head(head: Mapping[str, Any]) -> str:
     """Return the first lines of a CSV file: what it is, and what it is about."""
-    lines = [_FIRST, *(f"# {key} = {json.dumps(head[key], ensure_ascii=False)}" for key in HEAD)]
+    said = [*HEAD, *(key for key, value in OPTIONAL.items() if head[key] != value)]
+    lines = [_FIRST, *(f"# {key} = {json.dumps(head[key], ensure_ascii=False)}" for key in said)]
     return "\n".join(lines) + "\n"
 
 
@@ -118,7 +118,7 @@ def _of_json(text: str) -> tuple[Head, Rows]:
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON ({' '.join(str(error).split())})") from None
     if isinstance(data, dict) and isinstance(data.get("columns"), dict):
-        head = {key: data[key] for key in HEAD if key in data}
+        head = {key: data[key] for key in (*HEAD, *OPTIONAL) if key in data}
         head |= {"fingerprint": data["hammer_fingerprint"]} if "hammer_fingerprint" in data else {}
         _check_head(head)
         entries: Any = _entries(data["columns"])
@@ -169,8 +169,10 @@ def _entries(arrays: Mapping[str, Any]) -> Rows:
 
 
 def _check_head(head: Mapping[str, Any]) -> None:
-    _check_keys(head, list(HEAD), "")
-    for key, kind in HEAD.items():
+    _check_keys({**OPTIONAL, **head}, [*HEAD, *OPTIONAL], "")
+    for key, kind in (HEAD | dict.fromkeys(OPTIONAL, str)).items():
+        if key not in head:
+            continue
         value = head[key]
         good = isinstance(value, int | float) if kind is float else isinstance(value, kind)
         if isinstance(value, bool) or not good:
@@ -235,65 +237,3 @@ def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
     if history != plain(history):
         raise InputError(f"{where}gaps = {'-'.join(texts)}, expected only rest after a rest")
     return history
-
-
-def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, FloatArray]) -> str:
-    """Return a C header (C99) with the table in nanoseconds and a function for the number of a history.
-
-    `head` is what is said of the whole table, see `HEAD`; `times` are arrays (rates, entries) by name, s.
-    Every number of a history is there, so that the firmware needs no search.
-    """
-    gaps, reach = head["gaps"], head["reach"]
-    prefix = re.sub(r"\W+", "_", f"printhammer_{head['hammer']}", flags=re.ASCII).lower()
-    guard, upper = f"{prefix}_table_h".upper(), prefix.upper()
-    entries, fingerprint = entries_of(gaps, reach), re.sub(r"[^0-9a-zA-Z]", "", head["fingerprint"])
-    name = head["hammer"].encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
-    name = "".join(letter if letter.isprintable() else " " for letter in name)
-    arrays = ""
-    for column, values in times.items():
-        rows = "\n".join(f"  {{\n{_numbers(row)}\n  }}," for row in np.rint(values / NANOSECOND))
-        arrays += f"\nstatic const int32_t {prefix}_{column}[{rates.size}][{entries}] = {{\n{rows}\n}};\n"
-    return f"""\
-#ifndef {guard}
-#define {guard}
-
-/* Compensation table for the hammer {name},
-   fingerprint {fingerprint}.
-   Times are in nanoseconds. [rate][history]; a history is the gaps in slots to the dots before,
-   the latest first, 0 (rest) where a gap is longer than REACH. A dot is fired `advance` before its
-   slot with a pulse of `width`; a brake pulse of `brake_width`, where not 0, comes `brake_delay`
-   after the slot of the dot before. */
-
-#include <stdint.h>
-
-#define {upper}_RATES {rates.size}
-#define {upper}_GAPS {gaps}
-#define {upper}_REACH {reach}
-#define {upper}_HISTORIES {entries}
-#define {upper}_FINGERPRINT "{fingerprint}"
-
-/* Slots per second, in millihertz. */
-static const uint32_t {prefix}_rate[{rates.size}] = {{
-{_numbers(np.rint(1e3 * rates))}
-}};
-{arrays}
-/* Number of a history; what lies before a rest does not count. */
-static inline unsigned {prefix}_history(const unsigned *gaps)
-{{
-  unsigned number = 0, rested = 0;
-  for (unsigned i = 0; i < {gaps}u; i++) {{
-    unsigned gap = gaps[i] > {reach}u ? 0u : gaps[i];
-    rested |= gap == 0u;
-    number = number * {reach + 1}u + (rested ? 0u : gap);
-  }}
-  return number;
-}}
-
-#endif
-"""
-
-
-def _numbers(values: FloatArray) -> str:
-    """Write whole numbers, ten a line."""
-    texts = [str(int(value)) for value in values]
-    return ",\n".join("    " + ", ".join(texts[at : at + 10]) for at in range(0, len(texts), 10))

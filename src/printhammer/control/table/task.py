@@ -91,6 +91,8 @@ class Task:
     tolerance: float
     threads: int | None
     report: Callable[[], None]
+    mean_square: bool = False
+    """Whether the cost of a way is the root of the mean square over all hammers, not that of the worst."""
 
     @property
     def width(self) -> float:

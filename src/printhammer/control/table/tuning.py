@@ -9,6 +9,7 @@ import numpy as np
 
 from printhammer.control.table.draft import Draft, blank
 from printhammer.control.table.drive import LARGEST_CURRENT, clearance, print_pulse
+from printhammer.control.table.drivers import driven_by
 from printhammer.control.table.histories import checked_size, histories, number_of
 from printhammer.control.table.newton import ROUNDS
 from printhammer.control.table.polish import polish
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.rates.variability import Variability
     from printhammer.support.arrays import FloatArray
 
 FIRST: Final = 100.0  # Lowest rate of a table over all rates, Hz: every dot is printed from rest
@@ -53,6 +55,8 @@ def tune(
     limits: Limits | None = None,
     brake: bool = True,
     robust: bool = False,
+    driver: str = "own",
+    variability: Variability | None = None,
     largest_current: float | str = LARGEST_CURRENT,
     tolerance: float = DISPLAY_TOLERANCE,
     threads: int | None = None,
@@ -88,6 +92,13 @@ def tune(
     robust : bool, optional
         Tune width and advance on the hammers that differ as well, for the least mean square of all, instead
         of on this hammer alone.
+    driver : str, optional
+        What switches the coil, of `DRIVERS` in `printhammer.control.table.drivers`: "own", the pulse of the
+        hammer, "switch", a fast unipolar switch, or "bridge", an H-bridge. With these the dot from rest is as
+        hard as with the own pulse, and is fired so much later that it arrives as it does.
+    variability : Variability, optional
+        How the constants of a production are spread. The way is then taken in which a row of dots is least
+        off in the mean square, over this hammer and the sigma points of the variability.
     largest_current : float or str, optional
         Bound on the current, A, or text with a unit.
     tolerance : float, optional
@@ -111,8 +122,9 @@ def tune(
     gaps, far = checked_size(read_count(history, "history"), read_count(reach, "reach"))
     bounds = Limits() if limits is None else limits
     largest = read_positive(largest_current, "A", "largest_current")
-    pulse, widest = print_pulse(hammer, largest)
-    single = single_of(hammer, pulse, tolerance)
+    driven = driven_by(hammer, driver, largest)
+    pulse, widest = print_pulse(driven, largest)
+    single = single_of(driven, pulse, tolerance)
     if rate is not None and rates is not None:
         raise InputError("rate and rates are given, expected one of them")
     asked = [rate] if rate is not None else rates
@@ -120,11 +132,15 @@ def tune(
     nodes = len(spaced(_periods(grid, far, single), SPACING))
     # Once a time at which ways are looked for, once a step of Newton's method, with and without long rows.
     steps = nodes + 3 + 2 * (ROUNDS + 1) * gaps
+    if variability is not None:
+        spread = others = variability.sigma_points(driven)
+    else:
+        spread, others = _spread(driven), [perturbed(driven, by) for by in SPREAD] if robust else []
     task = Task(
         gaps=gaps,
         reach=far,
-        hammers=[hammer, *([perturbed(hammer, by) for by in SPREAD] if robust else [])],
-        spread=_spread(hammer),
+        hammers=[driven, *(others if robust else [])],
+        spread=spread,
         pulse=pulse,
         largest=largest,
         widest=widest,
@@ -135,10 +151,11 @@ def tune(
         tolerance=tolerance,
         threads=threads,
         report=_counter(progress, steps),
+        mean_square=variability is not None,
     )
     draft = _tuned(task, grid, open_ended=asked is None)
     if asked is None:
-        return refined(draft.rows(np.arange(_usable(draft)))).table()
+        return refined(draft.rows(np.arange(_usable(draft)))).table().fired_by(driver, hammer)
     _tune_again(draft)
     lost = np.flatnonzero(~np.isfinite(draft.worst))
     if lost.size:
@@ -147,7 +164,7 @@ def tune(
             f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before,"
             " expected a lower rate"
         )
-    return draft.table()
+    return draft.table().fired_by(driver, hammer)
 
 
 def _spread(hammer: Hammer) -> list[Hammer]:

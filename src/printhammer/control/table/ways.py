@@ -27,6 +27,7 @@ _STEPS: Final = (1e-6, 0.5e-6)  # Differences of firing time and width from whic
 # Deviation of the second dot, in parts of the limits, above which a way does not make it right
 _RIGHT: Final = 0.02
 _WRONG: Final = 1.0  # What such a way costs more, so that any that makes it right comes first
+_FAR_OFF: Final = 5.0  # Deviation, in parts of the limits, beyond which a row is no worse in a mean square
 _ROUNDING: Final = 1e-12
 
 
@@ -117,9 +118,10 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     """Return how far off rows of dots made in some ways are, in parts of the limits.
 
     That is the largest deviation of any dot of a row of `ROW`, on the hammers that differ a little from the
-    one the table is made for; what that one itself does counts `NOMINAL` times. A way that cannot make even
-    the second dot right is put behind others. Infinite where a dot is lost, or the pulses do not fit between
-    each other.
+    one the table is made for; what that one itself does counts `NOMINAL` times. Where a variability is stated
+    it is the root of the mean square of the largest deviations on its sigma points and on that hammer. A way
+    that cannot make even the second dot right is put behind others. Infinite where a dot is lost, or the
+    pulses do not fit between each other.
     """
     cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
@@ -127,9 +129,12 @@ def costs(task: Task, ways: Ways) -> FloatArray:
         part = ways.take(some)
         drives = rows_of(task, part, ROW)
         own = _deviations(task, task.hammers[0], part, drives)
-        worst = NOMINAL * largest_of(own)
-        for hammer in task.spread:
-            worst = np.maximum(worst, largest_of(_deviations(task, hammer, part, drives)))
+        spread = [largest_of(_deviations(task, hammer, part, drives)) for hammer in task.spread]
+        if task.mean_square:
+            every = np.minimum([largest_of(own), *spread], _FAR_OFF)
+            worst = np.where(np.isfinite(largest_of(own)), np.sqrt((every**2).mean(axis=0)), np.inf)
+        else:
+            worst = np.maximum.reduce([NOMINAL * largest_of(own), *spread])
         cost[some] = worst + np.where(largest_of(own[:, 1]) > _RIGHT, _WRONG, 0.0)
     return cost
 

@@ -10,7 +10,7 @@ from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import facts
 from printhammer.cli.units import Units, with_unit
-from printhammer.cli.verbs.printing.strategy import FEEDBACK, TABLE, chosen_strategy
+from printhammer.cli.verbs.printing.strategy import FEEDBACK, SERIAL, TABLE, chosen_strategy
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ def print_(
     ),
     limits: str | None = opt.text("NAME", "Limits: slots (default), dot-matrix or engraved."),
     table: Path | None = TABLE,
+    serial: str | None = SERIAL,
     feedback: bool = FEEDBACK,
     units: Units = opt.UNITS,
     **passed: Any,
@@ -91,7 +92,7 @@ def print_(
     )
     if limits is not None:
         passed["limits"] = limits_named(limits)
-    passed |= chosen_strategy(job, hammer, table, feedback)[0]
+    passed |= chosen_strategy(job, hammer, table, feedback, serial)[0]
     with job.telling("printing"):
         page = print_page(hammer, asked, often, head=head, **passed)
     save = page.save

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.verbs.printing.strategy import FEEDBACK, TABLE, chosen_strategy
+from printhammer.cli.verbs.printing.strategy import FEEDBACK, SERIAL, TABLE, chosen_strategy
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def quality(
     pulses: int | None = opt.whole("Dots without a gap, instead of a pattern.", panel="Report"),
     pitch: str | None = _report("LENGTH", "Distance of neighbouring slots (1/60 in)."),
     table: Path | None = TABLE,
+    serial: str | None = SERIAL,
     feedback: bool = FEEDBACK,
     safe_rate: bool = _instead("Find the rate up to which all patterns of eight slots print well."),
     yield_: int | None = opt.whole(
@@ -77,7 +78,7 @@ def quality(
         raise InputError(f"--{tasks[0]} and --{tasks[1]}: expected one of them")
     task = tasks[0]
     of_report = opt.given(rate=rate, pattern=pattern, pulses=pulses, pitch=pitch)
-    of_drive = opt.given(table=table, feedback=feedback or None)
+    of_drive = opt.given(table=table, serial=serial, feedback=feedback or None)
     of_grid = opt.given(first=first, last=last, step=step)
     of_draw = opt.given(spread=spread, judged_by=judged_by, seed=seed)
     _only(task, {*of_report, *of_drive, *of_grid, *of_draw, *opt.given(current=current, threads=threads)})
@@ -87,7 +88,7 @@ def quality(
         raise InputError("--pattern and --pulses: expected one of them")
     share = None if force_limit is None else opt.read_share(force_limit, "--force-limit")
     bounds = replace(limits_named(limits), **opt.given(force=share, arrival=arrival_limit))
-    strategy, loaded_table = chosen_strategy(job, hammer, table, feedback)
+    strategy, loaded_table = chosen_strategy(job, hammer, table, feedback, serial)
     common: dict[str, Any] = {"limits": bounds, **opt.given(tolerance=tolerance), **strategy}
     many: dict[str, Any] = {**common, **of_grid, "threads": threads}
     if loaded_table is not None:
@@ -133,9 +134,9 @@ def quality(
 
 
 _TAKES: Final = {
-    "report": {"rate", "pattern", "pulses", "pitch", "table", "feedback"},
-    "safe-rate": {"table", "feedback", "first", "last", "step", "threads"},
-    "yield": {"table", "rate", "spread", "judged_by", "seed", "first", "last", "step", "threads"},
+    "report": {"rate", "pattern", "pulses", "pitch", "table", "serial", "feedback"},
+    "safe-rate": {"table", "serial", "feedback", "first", "last", "step", "threads"},
+    "yield": {"table", "serial", "rate", "spread", "judged_by", "seed", "first", "last", "step", "threads"},
     "damping": {"current", "first", "last", "step", "threads"},
 }
 

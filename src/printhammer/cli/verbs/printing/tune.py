@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
@@ -10,6 +11,8 @@ from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.table import Table
 
     from printhammer.cli.units import Units
@@ -31,6 +34,9 @@ _ROWS: Final = 12
         "reach": opt.whole("Longest gap that counts, slots.", default=2),
         "brake": opt.switch("Allow brake pulses.", default=True),
         "robust": opt.switch("Tune on hammers that differ a little as well."),
+        "driver": opt.choice(
+            "own|switch", "The hammer's own pulse, or that of a fast switch.", default="own"
+        ),
         "largest_current": opt.text("CURRENT", "Bound on the current.", default="2 A"),
     },
     out=opt.results("Table", ".h"),
@@ -42,6 +48,11 @@ def tune(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     judge: bool = opt.switch("Judge the table beside open loop on what it was not tuned on.", default=True),
+    tick: float | None = opt.quantity(
+        "s", "TIME", "Tick of the timer, such as '1 us' (1 ns).", positive=True
+    ),
+    budget: int | None = opt.whole("Most bytes that the arrays of the C header may take."),
+    variability: bool = opt.switch("Choose for the spread of a production."),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
@@ -58,11 +69,20 @@ def tune(
         raise InputError(f"--report {job.wanted['report'][0]} is given, expected none beside --no-judge")
     if "rate" in passed and "rates" in passed:
         raise InputError("--rate and --rates are given, expected one of them")
+    if variability:
+        from printhammer.printing.rates.variability import Variability
+
+        passed["variability"] = Variability()
     options = opt.given(tolerance=tolerance, threads=threads)
     with job.counting("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)
-    job.show(entries(made, units), note=f"tuned in {job.seconds:.2g} s")
-    files = {"out": Content.of(made)}
+    header = opt.given(tick=tick)
+    if tick is not None:
+        made = made.quantised(tick)
+    made.to_header(budget=budget, **header)
+    size = f", {made.size(**header)} bytes in a C header"
+    job.show(entries(made, units), note=f"tuned in {job.seconds:.2g} s{size}")
+    files = {"out": Content(partial(save_table, made, header), made.plot)}
     if not judge:
         return Answer(files=files)
     with job.counting("judging") as tell:
@@ -72,6 +92,16 @@ def tune(
     off = ", ".join(f"{each:g} Hz" for each in report.rates[~good].tolist())
     complaint = f"with the table not all dots are within the limits at {off}"
     return Answer(["", judged(report)], files=files, complaints=[] if good.all() else [complaint])
+
+
+def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> None:
+    """Write a table, a C header in ticks of the timer."""
+    from printhammer.support.outputs import write_file
+
+    if path.suffix.lower() == ".h":
+        write_file(path, made.to_header(**header))
+    else:
+        made.save(path)
 
 
 def entries(made: CompensationTable, units: Units) -> Table:

@@ -1,0 +1,311 @@
+"""Measure what each way to drive prints on hammers nobody has measured, and what learning adds.
+
+Run it with ``.venv/bin/python docs/measure/learning.py``. It draws hammers from the variability of a
+production, and counts the dots of the de Bruijn cycle of order 8 within limits at parts of the nominal
+hammer's open-loop safe rate: open loop, table and robust table, each with the hammer's own pulse and with a
+fast switch, and what is learned after some dots from times of impact with 5 us of noise, and with forces to 3
+% as well. It takes some ten minutes on two cores.
+
+``--units N`` draws another number, ``--feedback N`` lets feedback print a cycle of order 6 on as many of
+them. ``--sensors`` tries other sensors instead, ``--tolerance`` other variabilities, ``--drivers`` other
+drivers at 1.5 times, and ``--family`` units of two others of the family. ``--picture FILE`` only draws what
+one unit prints while it learns, ``--curves FILE`` how many units print all dots.
+"""
+
+import argparse
+import time
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from measured import MOTION, Cell, Column, read, write
+
+import printhammer as ph
+from printhammer.control.feedback.closed_loop import FeedbackStrategy
+from printhammer.control.feedback.controller import Controller
+from printhammer.control.feedback.driver import driver_of
+from printhammer.control.learning.calibrate import calibrate
+from printhammer.control.learning.preparation import law_for
+from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.table.drivers import DRIVERS, driven_by, with_pulse
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import Strategy, open_loop
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.rates.variability import Variability
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+
+SHARES = (1.0, 1.25, 1.5, 1.75)
+SAFE = 850.0
+"""Open-loop safe rate of the shipped hammer, Hz."""
+SENSORS = {"time": ImpactSensor(), "time and force": ImpactSensor(force=0.03)}
+OTHERS = {
+    "white noise": {},
+    "another seed": {"seed": 7},
+    "coloured noise, correlation 0.8": {"colour": 0.8},
+    "2 % gain error": {"gain": 0.02},
+    "1 of 100 missed": {"missed": 0.01},
+    "1 of 100 missed, 1 of 100 false": {"missed": 0.01, "false": 0.01},
+}
+SHOWN = 2
+"""Number of the unit in the picture: one of the many that an open loop does not print well."""
+FAMILY = {"02": 880.0, "06": 965.0}
+"""Two of the family, and their open-loop safe rates, Hz."""
+AFTER = (50, 200, 1000)
+ROOMS = (*MOTION, "control/learning", "control/widths", "printing/dots", "printing/rates")
+CYCLE = slots_of(cycle_with_lead_in())
+
+
+def shares(units: list[ph.Hammer], single: object, rate: float, way: Strategy) -> np.ndarray:
+    """Return the share of the dots of the cycle within limits, for each unit."""
+    trial = attempt(
+        [Case(unit, single, rate) for unit in units],
+        [CYCLE],
+        way,
+        limits=Limits(),
+        tolerance=DISPLAY_TOLERANCE,
+        judged_from=LEAD_IN,
+    )
+    return trial.judgement.good.sum(axis=1) / trial.judgement.wanted.sum(axis=1)
+
+
+def cells(good: np.ndarray, plain: np.ndarray | None = None) -> list[Cell]:
+    """Return the share of dots, of units that print all, and how many print fewer than in an open loop."""
+    fewer = None if plain is None else int((good < plain - 1e-12).sum())
+    return [100.0 * float(good.mean()), int((good == 1.0).sum()), fewer]
+
+
+def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:
+    """Return a row a way at a rate."""
+    rate, single, rows = share * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
+
+    def add(way: str, good: np.ndarray, plain: np.ndarray | None = None) -> None:
+        rows.append([share, way, *cells(good, plain)])
+        print(*rows[-1], flush=True)
+
+    for driver in ("own", "switch"):
+        driven = driven_by(hammer, driver, 2.0)
+        fired = [with_pulse(unit, driven.waveform) for unit in units]
+        plain = shares(fired, nominal(driven, tolerance=DISPLAY_TOLERANCE), rate, open_loop)
+        add(f"open loop, {driver}", plain)
+        for name, options in (("table", {}), ("robust table", {"variability": Variability()})):
+            table = ph.tune(hammer, rate=rate, driver=driver, **options)
+            add(f"{name}, {driver}", shares(units, single, rate, table.strategy(hammer)), plain)
+    for driver, sensors in (("own", SENSORS), ("switch", SENSORS)):
+        for name, sensor in sensors.items():
+            law, _base = law_for(hammer, rate, driver=driver, sensor=sensor)
+            stages = calibrate(law, units, sensor)[1]
+            first = stages[0].cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+            for stage in stages:
+                if stage.dots in AFTER:
+                    good = stage.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+                    add(f"learned from {name}, {driver}, {stage.dots} dots", good, first)
+    return rows
+
+
+def feedback(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
+    """Return what feedback prints, of a shorter cycle, with its sensor and with one that is blinded."""
+    controller = Controller(hammer, driver_of(hammer))
+    slots, rows = slots_of(cycle_with_lead_in(6, 0)), []
+    from printhammer.control.feedback.estimator.sensor import PositionSensor
+
+    for share in SHARES:
+        for name, noise in (("feedback", 0.01), ("feedback, sensor blinded", 100.0)):
+            way = FeedbackStrategy(controller, PositionSensor(noise=noise))
+            begin = time.time()
+            cases = [Case(unit, controller.single, share * SAFE) for unit in units]
+            trial = attempt(cases, [slots], way, limits=Limits(), tolerance=DISPLAY_TOLERANCE)
+            good = trial.judgement.good.mean(axis=1)
+            rows.append([share, name, *cells(good)])
+            print(*rows[-1], f"{time.time() - begin:.0f} s", flush=True)
+    return rows
+
+
+def sensors(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
+    """Return what is learned with other sensors at 1.5 times the safe rate."""
+    rows = []
+    for name, sensor in SENSORS.items():
+        law, _base = law_for(hammer, 1.5 * SAFE, sensor=sensor)
+        for other, options in OTHERS.items():
+            shown = ImpactSensor(**{"force": sensor.force, **options})
+            last = calibrate(law, units, shown)[1][-1]
+            good = last.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+            rows.append([name, other, *cells(good)[:2]])
+            print(*rows[-1], flush=True)
+    return rows
+
+
+def drivers(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
+    """Return what each driver prints, in an open loop, with a robust table and with one that was learned."""
+    rows, sensor = [], SENSORS["time and force"]
+    for share in (1.5,):
+        for driver in DRIVERS:
+            law, _base = law_for(hammer, share * SAFE, driver=driver, sensor=sensor)
+            table = ph.tune(hammer, rate=share * SAFE, driver=driver, variability=Variability())
+            alone = shares([hammer], nominal(hammer), share * SAFE, table.strategy(hammer))
+            robust = shares(units, nominal(hammer), share * SAFE, table.strategy(hammer))
+            stages = calibrate(law, units, sensor)[1]
+            first, last = (
+                stage.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+                for stage in (stages[0], stages[-1])
+            )
+            seen = [100.0 * float(each.mean()) for each in (first, alone, robust, last)]
+            rows.append([share, driver, *seen, int((last == 1.0).sum())])
+            print(*rows[-1], flush=True)
+    return rows
+
+
+def family(count: int, seed: int) -> list[list[Cell]]:
+    """Return what units of two hammers of the family print at 1.5 times their safe rates."""
+    from printhammer.reconstruction.family.family import family_hammers
+
+    rows = []
+    for hammer in family_hammers():
+        number = hammer.name.rpartition("-")[2]
+        if number not in FAMILY:
+            continue
+        rate, units = 1.5 * FAMILY[number], Variability().draw(hammer, count, seed)
+        single = nominal(hammer, tolerance=DISPLAY_TOLERANCE)
+        rows.append([number, "open loop, own", *cells(shares(units, single, rate, open_loop))[:2]])
+        table = ph.tune(hammer, rate=rate, driver="switch", variability=Variability()).strategy(hammer)
+        rows.append([number, "robust table, switch", *cells(shares(units, single, rate, table))[:2]])
+        for name, sensor in SENSORS.items():
+            law, _base = law_for(hammer, rate, sensor=sensor)
+            last = calibrate(law, units, sensor)[1][-1]
+            good = last.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+            rows.append([number, f"learned from {name}, switch, 1000 dots", *cells(good)[:2]])
+            print(*rows[-1], flush=True)
+    return rows
+
+
+def curves(path: Path) -> None:
+    """Draw which share of the units prints all dots, by rate and way, from the measured tables."""
+    from printhammer.figures.elements import style
+    from printhammer.figures.elements.style import foot, in_style, new_figure
+
+    looks = {
+        "open loop, own": (style.MUTED, "-", "o"),
+        "table, own": (style.YELLOW, "--", "s"),
+        "table, switch": (style.YELLOW, "-", "s"),
+        "robust table, switch": (style.ORANGE, "-", "^"),
+        "learned from time, switch, 1000 dots": (style.BLUE, "--", "D"),
+        "learned from time and force, switch, 1000 dots": (style.BLUE, "-", "D"),
+        "feedback, sensor blinded": (style.GREEN, "--", "v"),
+        "feedback": (style.GREEN, "-", "v"),
+    }
+    learned, seen = read("learning"), read("learning-feedback")
+    count = {row[1]: learned.settings["units"] for row in learned.rows}
+    count |= {row[1]: seen.settings["units"] for row in seen.rows}
+    with in_style():
+        figure = new_figure(3.6)
+        ax = figure.subplots()
+        for way, (colour, line, mark) in looks.items():
+            points = [
+                (row[0], 100.0 * row[3] / count[way]) for row in (*learned.rows, *seen.rows) if row[1] == way
+            ]
+            ax.plot(
+                *zip(*points, strict=True), color=colour, linestyle=line, marker=mark, markersize=4, label=way
+            )
+        ax.set_ylim(-3.0, 103.0)
+        ax.set_xticks(SHARES)
+        ax.set_xlabel("Rate, in open-loop safe rates of the nominal hammer")
+        ax.set_ylabel("Units that print all dots  [%]")
+        ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        foot(figure, f"hendriks-1983 · {learned.settings['units']} units, feedback {seen.settings['units']}")
+        drawn = BytesIO()
+        figure.savefig(drawn, dpi=110)
+    path.write_bytes(drawn.getvalue())
+
+
+def tolerance(hammer: ph.Hammer, count: int, seed: int) -> list[list[Cell]]:
+    """Return what is printed at 1.5 times the safe rate by units that are spread less and more."""
+    rows, rate, single = [], 1.5 * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE)
+    table = ph.tune(hammer, rate=rate, driver="switch")
+    for factor in (0.25, 0.5, 1.0, 1.5):
+        spread = Variability().times(factor)
+        units = spread.draw(hammer, count, seed)
+        robust = ph.tune(hammer, rate=rate, driver="switch", variability=spread)
+        ways = {
+            "open loop, own": shares(units, single, rate, open_loop),
+            "table, switch": shares(units, single, rate, table.strategy(hammer)),
+            "robust table, switch": shares(units, single, rate, robust.strategy(hammer)),
+        }
+        for name, sensor in SENSORS.items():
+            law, _base = law_for(hammer, rate, sensor=sensor, variability=spread)
+            last = calibrate(law, units, sensor)[1][-1]
+            ways[f"learned from {name}, switch"] = last.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(
+                axis=1
+            )
+        for name, good in ways.items():
+            rows.append([factor, name, *cells(good)[:2]])
+            print(*rows[-1], flush=True)
+    return rows
+
+
+def main() -> None:
+    """Measure what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--units", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--feedback", type=int)
+    parser.add_argument("--sensors", action="store_true")
+    parser.add_argument("--tolerance", action="store_true")
+    parser.add_argument("--drivers", action="store_true")
+    parser.add_argument("--family", action="store_true")
+    parser.add_argument("--picture", type=Path)
+    parser.add_argument("--curves", type=Path)
+    asked = parser.parse_args()
+    hammer = ph.load("hendriks-1983")
+    if asked.curves is not None:
+        curves(asked.curves)
+        return
+    if asked.picture is not None:
+        drawn = BytesIO()
+        unit = Variability().draw(hammer, asked.units, asked.seed)[SHOWN]
+        learning = ph.learn(hammer, unit, rate=1.5 * SAFE, sensor=ImpactSensor(force=0.03))
+        learning.plot().savefig(drawn, dpi=110)
+        asked.picture.write_bytes(drawn.getvalue())
+        return
+    units = Variability().draw(hammer, asked.units, asked.seed)
+    settings = {"units": asked.units, "seed": asked.seed}
+    rate = Column(name="rate, in open-loop safe rates", format="g")
+    good = [Column(name="dots within limits", unit="%", format=".1f"), Column(name="units that print all")]
+    if asked.sensors:
+        heads = [Column(name="learned from"), Column(name="sensor"), *good]
+        write("learning-sensors", heads, sensors(hammer, units), settings, ROOMS)
+    elif asked.drivers:
+        names = ("open loop", "table on the nominal hammer", "robust table", "learned from time and force")
+        heads = [
+            rate,
+            Column(name="driver"),
+            *(Column(name=f"{name}: dots within limits", unit="%", format=".1f") for name in names),
+        ]
+        heads.append(Column(name="units that print all in the end"))
+        write("learning-drivers", heads, drivers(hammer, units), settings, ROOMS)
+    elif asked.family:
+        heads = [Column(name="hammer of the family"), Column(name="way"), *good]
+        names = tuple(f"hendriks-1983-family-{number}" for number in FAMILY)
+        write("learning-family", heads, family(asked.units, asked.seed), settings, ROOMS, names)
+    elif asked.tolerance:
+        heads = [Column(name="standard deviations, in parts of those stated", format="g"), Column(name="way")]
+        write(
+            "learning-tolerance",
+            [*heads, *good],
+            tolerance(hammer, asked.units, asked.seed),
+            settings,
+            ROOMS,
+        )
+    elif asked.feedback:
+        settings["units"] = asked.feedback
+        rows = [row[:4] for row in feedback(hammer, units[: asked.feedback])]
+        heads = [rate, Column(name="way"), *good]
+        write("learning-feedback", heads, rows, settings, (*ROOMS, "control/feedback"))
+    else:
+        heads = [rate, Column(name="way"), *good, Column(name="units that print fewer than in the open loop")]
+        rows = [row for share in SHARES for row in measure(hammer, units, share)]
+        write("learning", heads, rows, settings, ROOMS)
+
+
+if __name__ == "__main__":
+    main()

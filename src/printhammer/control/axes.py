@@ -1,0 +1,187 @@
+"""Tables along one more axis that a firmware knows: the gap to the pack, or the number of forms in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.table.compensation import CompensationTable, checked_tick, mixed
+from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, Settings
+from printhammer.control.table.drivers import driven_by, of_force
+from printhammer.control.table.formats import HEAD
+from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
+from printhammer.control.table.tuning import tune
+from printhammer.drive.input import read_number
+from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
+from printhammer.results import save_dataset
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.support.outputs import write_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    import pandas as pd
+    import xarray as xr
+
+    from printhammer.hammer.hammer import Hammer
+
+_MILLIONTH: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Something that firmware knows and that changes the hammer; rail and temperature would be others."""
+
+    unit: str
+    meaning: str
+    change: Callable[[Hammer, float], Hammer]
+
+
+AXES: Final = {
+    "gap": Axis(
+        "m",
+        "by how much pack and platen lie farther away",
+        lambda hammer, value: perturbed(hammer, Perturbation(travel=value)),
+    ),
+    "forms": Axis(
+        "1",
+        "relative change of the thickness of the pack",
+        lambda hammer, value: perturbed(hammer, Perturbation(forms=value)),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class AxisTables:
+    """A table for each of some ascending values of an axis, in SI; between two it is interpolated."""
+
+    axis: str
+    values: tuple[float, ...]
+    tables: tuple[CompensationTable, ...]
+
+    def at(self, value: float | str) -> CompensationTable:
+        """Return the table for a value; where two ways do not belong together, that of the nearer value.
+
+        Raises
+        ------
+        InputError
+            The value is not between the first and the last.
+        """
+        asked = read_number(value, AXES[self.axis].unit, self.axis)
+        least, most = self.values[0], self.values[-1]
+        if not least <= asked <= most:
+            raise InputError(f"{self.axis} = {asked:g}: the tables are made for {least:g} to {most:g}")
+        after = int(np.clip(np.searchsorted(self.values, asked), 1, len(self.values) - 1))
+        first, second = self.tables[after - 1 : after + 1]
+        share = (asked - self.values[after - 1]) / (self.values[after] - self.values[after - 1])
+        low, high = (Settings(*(getattr(table, name) for name in COLUMNS)) for table in (first, second))
+        times: dict[str, Any] = mixed(low, high, share)._asdict()
+        return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
+
+    def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
+        """Return the text of the C header, arrays `[value][rate][history]`, as `CompensationTable` does.
+
+        Values of a gap are in nanometres, those of other axes in millionths.
+        """
+        unit, first = checked_tick(tick), self.tables[0]
+        times = {name: np.stack([getattr(table, name) for table in self.tables]) for name in COLUMNS}
+        size = self.size(tick)
+        if budget is not None and size > budget:
+            raise InputError(
+                f"budget = {budget} bytes: the tables take {size}, expected a larger budget or fewer"
+            )
+        scale = NANOSECOND if AXES[self.axis].unit == "m" else _MILLIONTH
+        head = {name: getattr(first, name) for name in HEAD}
+        along = self.axis, np.rint(np.array(self.values) / scale)
+        return header_text(head, first.rates, times, unit, along)
+
+    def size(self, tick: float | str = NANOSECOND) -> int:
+        """Return how many bytes the arrays of the C header take with a tick, s, or text with a unit."""
+        times = {name: np.stack([getattr(table, name) for table in self.tables]) for name in COLUMNS}
+        bits, first = bits_of(times, checked_tick(tick)), self.tables[0]
+        return size_of(first.rates.size, times[COLUMNS[0]].shape[-1], bits, len(self.values))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the rows of all tables, with the value of the axis in front."""
+        import pandas as pd
+
+        head = f"{self.axis} [{AXES[self.axis].unit}]"
+        parts = [table.to_dataframe() for table in self.tables]
+        for part, value in zip(parts, self.values, strict=True):
+            part.insert(0, head, value)
+        return pd.concat(parts, ignore_index=True)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return all tables with the axis as first dimension."""
+        import xarray as xr
+
+        along = xr.DataArray(np.array(self.values), dims=self.axis, name=self.axis)
+        along.attrs = {"units": AXES[self.axis].unit, "long_name": AXES[self.axis].meaning}
+        parts = [table.to_dataset() for table in self.tables]
+        return xr.concat(parts, along, combine_attrs="drop_conflicts")
+
+    def save(self, path: str | Path) -> None:
+        """Write the tables as a C header (.h), or as .csv, .json, .nc, .zarr or .parquet, by the ending.
+
+        Raises
+        ------
+        InputError
+            The name ends in none of these, or the file cannot be written.
+        """
+        suffix = Path(path).suffix.lower()
+        if suffix == ".h":
+            write_file(Path(path), self.to_header())
+        elif suffix == ".csv":
+            write_file(Path(path), str(self.to_dataframe().to_csv(index=False, lineterminator="\n")))
+        else:
+            save_dataset(self.to_dataset(), path)
+
+
+def tune_along(
+    hammer: Hammer,
+    axis: str,
+    values: Sequence[float | str],
+    *,
+    rate: float | str,
+    driver: str = "own",
+    largest_current: float = LARGEST_CURRENT,
+    **options: Any,
+) -> AxisTables:
+    """Tune a table for each of some values of an axis; every dot is like the single pulse of the hammer.
+
+    Parameters
+    ----------
+    hammer, rate, driver, largest_current, options
+        As for `printhammer.tune`.
+    axis : str
+        A name of `AXES`.
+    values : sequence of float or str
+        Ascending values, in SI, or texts with units; two at least.
+
+    Raises
+    ------
+    InputError
+        The axis is not known, the values do not ascend, or as for `printhammer.tune`.
+    """
+    if axis not in AXES:
+        raise InputError(f"axis = {axis!r}, expected {' or '.join(AXES)}")
+    places = tuple(read_number(value, AXES[axis].unit, axis) for value in values)
+    if len(places) < 2 or any(second <= first for first, second in pairwise(places)):
+        raise InputError(f"{axis} = {list(values)!r}, expected two values or more that ascend")
+    design = driven_by(hammer, driver, largest_current)
+    known, own = nominal(design, tolerance=DISPLAY_TOLERANCE), nominal(hammer, tolerance=DISPLAY_TOLERANCE)
+    pulse: Any = design.waveform
+    tables = []
+    for place in places:
+        other = AXES[axis].change(design, place)
+        fired = of_force(other, pulse, known.force, 0.5 * pulse.width, 1.5 * pulse.width)
+        table = tune(fired, rate=rate, largest_current=largest_current, **options)
+        later = own.flight_time - nominal(fired, tolerance=DISPLAY_TOLERANCE).flight_time
+        tables.append(table.delayed(later, driver, hammer))
+    return AxisTables(axis, places, tuple(tables))

@@ -1,0 +1,143 @@
+"""Learn a table on a unit: what it prints before, while and after."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, SupportsIndex
+
+import numpy as np
+
+from printhammer.control.learning.calibrate import calibrate
+from printhammer.control.learning.law import PRINTED, RUNS
+from printhammer.control.learning.preparation import FORGETTING, MEMBERS, law_for
+from printhammer.control.learning.result import Learning
+from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT
+from printhammer.drive.input import read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.printing.rates.variability import Variability
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.limits import Limits
+
+
+def learn(
+    hammer: Hammer,
+    unit: Hammer | None = None,
+    *,
+    rate: float | str,
+    driver: str = "switch",
+    sensor: ImpactSensor | None = None,
+    variability: Variability | None = None,
+    limits: Limits | None = None,
+    history: SupportsIndex = 2,
+    reach: SupportsIndex = 2,
+    largest_current: float | str = LARGEST_CURRENT,
+    members: SupportsIndex = MEMBERS,
+    forgetting: float = FORGETTING,
+    serial: str = "unit",
+    seed: int = 1983,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Learning:
+    """Let a hammer that nobody has measured calibrate its compensation table, from one number a dot.
+
+    The unit prints test lines; after each dot the learner is told when it struck, with noise, and perhaps how
+    hard. From run to run it corrects advance, width and brakes of a table that was tuned on the nominal
+    hammer for the stated variability. The first line is printed in an open loop, and wherever the evidence is
+    that the table would print fewer dots within limits, what is handed out stays the open loop.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The nominal hammer, which is all that the learner knows.
+    unit : Hammer, optional
+        The hammer that is driven; by default one drawn from the variability with the seed.
+    rate : float or str
+        Slots per second, Hz, or text with a unit.
+    driver, limits, history, reach, largest_current, threads
+        As for `printhammer.tune`; by default a fast switch.
+    sensor : ImpactSensor, optional
+        By default one that tells times with a noise of 5 us.
+    variability : Variability, optional
+        What is known of the production; by default `Variability()`.
+    members : int, optional
+        Number of simulated hammers on which the gains are designed, 50 to 5000.
+    forgetting : float, optional
+        By which part the corrections of the stages before are taken back at each stage, above 0: where the
+        sensor shows nothing of them, it is what keeps them from growing.
+    serial : str, optional
+        Serial number of the unit; the table is refused for another one.
+    seed : int, optional
+        Of the simulated hammers, and of the unit where none is given.
+    progress : callable, optional
+        Called now and then with the number of steps done and of all.
+
+    Returns
+    -------
+    Learning
+        The table that is learned, and what the unit prints before, while and after.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above.
+    """
+    speed = read_positive(rate, "Hz", "rate")
+    largest = read_positive(largest_current, "A", "largest_current")
+    count = read_count(members, "members")
+    if not 50 <= count <= 5000:
+        raise InputError(f"members = {count}, expected 50 to 5000")
+    if not serial:
+        raise InputError(f"serial = {serial!r}, expected a text")
+    shown = ImpactSensor() if sensor is None else sensor
+    spread = Variability() if variability is None else variability
+    steps, total = iter(range(1, len(RUNS) + 2)), len(RUNS) + 2
+
+    def report() -> None:
+        if progress is not None:
+            progress(next(steps, total), total)
+
+    law, base = law_for(
+        hammer,
+        speed,
+        driver=driver,
+        sensor=shown,
+        variability=spread,
+        limits=limits,
+        history=history,
+        reach=reach,
+        largest_current=largest,
+        members=count,
+        forgetting=forgetting,
+        seed=seed,
+        threads=threads,
+        report=report,
+    )
+    driven = spread.draw(hammer, 1, seed + 1)[0] if unit is None else unit
+    learners, stages = calibrate(law, [driven], shown)
+    entries = dict(zip(COLUMNS, learners[0].printed, strict=True))
+    unknown = np.full_like(base.deviation, np.nan)
+    table = replace(base, **{name: values[np.newaxis] for name, values in entries.items()}, deviation=unknown)
+    judged = [stage.cycle for stage in stages]
+    return Learning(
+        hammer=hammer,
+        unit=driven,
+        table=replace(table.fired_by(driver, hammer), serial=serial),
+        rate=speed,
+        driver=driver,
+        sensor=shown,
+        variability=spread,
+        limits=law.entries.task.limits,
+        dots=np.array([stage.dots for stage in stages]),
+        learned=np.array([bool(stage.learned[0]) for stage in stages]),
+        slot=np.array(PRINTED),
+        force_deviation=np.array([judgement.force_deviation[0] for judgement in judged]),
+        arrival_deviation=np.array([judgement.arrival_deviation[0] for judgement in judged]),
+        good=np.array([judgement.good[0] for judgement in judged]),
+        contraction=np.array([stage.contraction for stage in law.stages]),
+        seed=seed,
+    )

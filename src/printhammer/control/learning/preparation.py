@@ -1,0 +1,91 @@
+"""What is prepared before a unit is there: the robust table to start from, and the learning law."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.control.learning.law import LearningLaw, design
+from printhammer.control.learning.lines import Press
+from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.learning.settings import Adjustable
+from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, clearance, print_pulse
+from printhammer.control.table.drivers import driven_by
+from printhammer.control.table.task import Task, single_of
+from printhammer.control.table.tuning import tune
+from printhammer.errors import InputError
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.rates.variability import Variability
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.control.table.compensation import CompensationTable
+    from printhammer.hammer.hammer import Hammer
+
+FORGETTING: Final = 0.02  # By default
+MEMBERS: Final = 400
+"""Number of simulated hammers on which a law is designed."""
+
+
+def law_for(
+    hammer: Hammer,
+    rate: float,
+    *,
+    driver: str = "switch",
+    sensor: ImpactSensor | None = None,
+    variability: Variability | None = None,
+    limits: Limits | None = None,
+    history: SupportsIndex = 2,
+    reach: SupportsIndex = 2,
+    largest_current: float = LARGEST_CURRENT,
+    members: int = MEMBERS,
+    forgetting: float = FORGETTING,
+    seed: int = 1983,
+    threads: int | None = None,
+    report: Callable[[], None] = lambda: None,
+) -> tuple[LearningLaw, CompensationTable]:
+    """Return the learning law for a hammer at a rate, Hz, and the robust table that it starts from.
+
+    Arguments are those of `learn`.
+    """
+    if not 0.0 < forgetting < 1.0:
+        raise InputError(f"forgetting = {forgetting!r}, expected a number above 0 and below 1")
+    spread = Variability() if variability is None else variability
+    bounds = Limits() if limits is None else limits
+    driven = driven_by(hammer, driver, largest_current)
+    shared: dict[str, Any] = {"limits": bounds, "largest_current": largest_current, "threads": threads}
+    size: dict[str, Any] = {"history": history, "reach": reach, "variability": spread}
+    table = tune(driven, rate=rate, **size, **shared)
+    report()
+    pulse, widest = print_pulse(driven, largest_current)
+    task = Task(
+        gaps=table.gaps,
+        reach=table.reach,
+        hammers=[driven],
+        spread=[],
+        pulse=pulse,
+        largest=largest_current,
+        widest=widest,
+        wait=clearance(pulse, widest, largest_current),
+        single=single_of(driven, pulse, DISPLAY_TOLERANCE),
+        limits=bounds,
+        brake=True,
+        tolerance=DISPLAY_TOLERANCE,
+        threads=threads,
+        report=report,
+    )
+    base = np.array([getattr(table, name)[0] for name in COLUMNS])
+    press = Press(task, rate, spread.draw(driven, members, seed))
+    entries = Adjustable(task, rate, base)
+    law = design(
+        press,
+        entries,
+        ImpactSensor() if sensor is None else sensor,
+        forgetting=forgetting,
+        seed=seed,
+        report=report,
+    )
+    return law, table

@@ -1,0 +1,82 @@
+"""What is measured of a dot: the time from firing to impact, and, if asked for, its force.
+
+A microphone, a piezo element or the dip of the coil current gives the time; a load cell or the darkness of
+the dot the force. The noise depends on seed, unit and run only.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.results import Declared, part, scalar
+
+if TYPE_CHECKING:
+    from printhammer.support.arrays import FloatArray
+
+
+class Readings(NamedTuple):
+    """What a sensor shows of some dots, in the order of their firings; NaN where it saw no impact."""
+
+    time: FloatArray  # From firing to impact, s
+    force: FloatArray | None  # Largest force, in parts of what the nominal hammer does; None if not measured
+
+
+class ImpactSensor(Declared):
+    """A sensor that tells a time a dot, and a force where its noise is given.
+
+    Raises
+    ------
+    InputError
+        A number is not within its bounds, or the seed is not a whole number.
+    """
+
+    noise: float = scalar("s", "standard deviation of the time of impact", default=5e-6)
+    force: float | None = part(
+        "standard deviation of the force, relative; None where it is not measured", default=None
+    )
+    colour: float = part("correlation of the noise of a dot with that of the dot before", default=0.0)
+    gain: float = part("error of the scale of times and forces, relative", default=0.0)
+    missed: float = part("share of the impacts that are not seen", default=0.0)
+    false: float = part("share of the impacts before which something else is taken for one", default=0.0)
+    seed: int = part("of the noise", default=0)
+
+    def __post_init__(self) -> None:
+        bounds = {"noise": math.inf, "colour": 1.0, "missed": 1.0, "false": 1.0}
+        if self.force is not None:
+            bounds["force"] = math.inf
+        for name, most in bounds.items():
+            value = getattr(self, name)
+            if not 0.0 <= value < most:
+                limit = f" and below {most:g}" if math.isfinite(most) else ""
+                raise InputError(f"sensor: {name} = {value!r} is expected to be a number not below 0{limit}")
+        if not (math.isfinite(self.gain) and self.gain > -1.0):
+            raise InputError(f"sensor: gain = {self.gain!r} is expected to be a number above -1")
+        if type(self.seed) is not int or self.seed < 0:
+            raise InputError(f"sensor: seed = {self.seed!r} is expected to be a whole number not below 0")
+
+    def read(self, flight: FloatArray, force: FloatArray, unit: int, run: int) -> Readings:
+        """Return what is shown of dots (N,) by their true flight times, s, and forces; NaN if lost."""
+        rng = np.random.default_rng((self.seed, unit, run))
+        time = (1.0 + self.gain) * flight + self.noise * self._noise(rng, flight.size)
+        early = rng.random(flight.size) < self.false
+        time = np.where(early, rng.random(flight.size) * np.nan_to_num(flight), time)
+        unseen = rng.random(flight.size) < self.missed
+        time = np.where(unseen, np.nan, time)
+        if self.force is None:
+            return Readings(time, None)
+        shown = (1.0 + self.gain) * force + self.force * self._noise(rng, force.size)
+        return Readings(time, np.where(unseen | early, np.nan, shown))
+
+    def _noise(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return noise of standard deviation 1, each number correlated with the one before."""
+        white = rng.standard_normal(count)
+        if not self.colour:
+            return white
+        noise = white.copy()
+        for k in range(1, count):
+            noise[k] = self.colour * noise[k - 1] + math.sqrt(1.0 - self.colour**2) * white[k]
+        return noise

@@ -1,0 +1,88 @@
+"""Tables along the gap: dots are those of the design, between two values as well; the header compiles."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+from printhammer.control.axes import AxisTables, tune_along
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.rates.perturbation import Perturbation, perturbed
+
+RATE = 1275.0
+GAPS = ("-10 um", "0 um", "10 um")
+SLOTS = (0, 1, 2, 4, 5, 8)
+
+
+@pytest.fixture(scope="module")
+def tables() -> AxisTables:
+    return tune_along(ph.load("hendriks-1983"), "gap", GAPS, rate=RATE, history=1)
+
+
+@pytest.mark.parametrize("gap", [-10e-6, 5e-6, 10e-6])
+def test_dots_are_those_of_the_design(tables: AxisTables, gap: float) -> None:
+    hammer = ph.load("hendriks-1983")
+    single = nominal(hammer)
+    driven = perturbed(hammer, Perturbation(travel=gap))
+    drive = tables.at(gap).strategy(hammer)(driven, [SLOTS], RATE)[0]
+    dots = ph.simulate(driven, drive).dots
+    force = np.array([dot.peak_force for dot in dots], dtype=float) / single.force - 1.0
+    touched = np.array([dot.fired_at + (dot.flight_time or 0.0) for dot in dots])
+    late = touched - (1e-3 + np.array(SLOTS) / RATE) - single.flight_time
+    assert abs(force).max() < 0.05
+    assert abs(late).max() < 15e-6
+
+
+def test_files_and_the_header(tables: AxisTables, tmp_path: Path) -> None:
+    for name in ("t.h", "t.csv", "t.nc", "t.json"):
+        tables.save(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 0
+    assert len(tables.to_dataframe()) == 3 * len(tables.tables[0].to_dataframe())
+    text = tables.to_header("1 us", budget=tables.size("1 us"))
+    (tmp_path / "t.h").write_text(text)
+    prefix = "printhammer_hendriks_1983"
+    entries = tables.tables[0].advance.shape[1]
+    columns = [
+        f"{prefix}_{name}" for name in ("gap", "rate", "advance", "width", "brake_delay", "brake_width")
+    ]
+    main = f"""
+#include "t.h"
+#include <stdio.h>
+int main(void) {{
+  size_t size = {" + ".join(f"sizeof {name}" for name in columns)};
+  unsigned gaps[1] = {{1}};
+  printf("%lu %u %u\\n", (unsigned long)size, {prefix.upper()}_BYTES, {prefix}_history(gaps));
+  for (int i = 0; i < 3; i++) for (int j = 0; j < {entries}; j++)
+    printf("%d %d %d\\n", (int){prefix}_gap[i], (int){prefix}_advance[i][0][j], (int){prefix}_width[i][0][j]);
+  return 0;
+}}
+"""
+    (tmp_path / "main.c").write_text(main)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run(["cc", *flags, "-o", "main", "main.c"], cwd=tmp_path, check=True)
+    said = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout
+    first, *rows = [[int(word) for word in line.split()] for line in said.splitlines()]
+    assert first == [tables.size("1 us"), tables.size("1 us"), 1]
+    wanted = [
+        [round(value * 1e9), round(table.advance[0, j] * 1e6), round(table.width[0, j] * 1e6)]
+        for value, table in zip(tables.values, tables.tables, strict=True)
+        for j in range(entries)
+    ]
+    assert rows == wanted
+
+
+def test_bad_axes_are_refused(tables: AxisTables) -> None:
+    hammer = ph.load("hendriks-1983")
+    for axis, values, sentence in (
+        ("rail", GAPS, "axis = 'rail', expected gap or forms"),
+        ("gap", GAPS[:1], "expected two values or more that ascend"),
+        ("gap", GAPS[::-1], "expected two values or more that ascend"),
+    ):
+        with pytest.raises(ph.InputError, match=sentence):
+            tune_along(hammer, axis, values, rate=RATE)
+    with pytest.raises(ph.InputError, match="the tables are made for"):
+        tables.at("30 um")
+    with pytest.raises(ph.InputError, match="budget = 1 bytes"):
+        tables.to_header(budget=1)
