@@ -6,7 +6,7 @@ line and on the axes of figures. A unit is written as one writes it: "N/m^1.5", 
 
 Conversions are correctly rounded: a float stands for its shortest decimal, factors are exact fractions (60
 digits where an exponent is not whole), and the result is rounded once, so that 0.002 in is 5.08e-05 m to the
-last bit. Units with an offset (a temperature in degC) are not known.
+last bit. A temperature is in degC everywhere, a difference of temperatures in K.
 """
 
 from __future__ import annotations
@@ -48,6 +48,10 @@ DIMENSIONS: dict[str, str] = {
     "V": "a voltage",
     "ohm": "a resistance",
     "H": "an inductance",
+    "degC": "a temperature",
+    "K": "a difference of temperatures",
+    "K/W": "a thermal resistance",
+    "J/K": "a heat capacity",
     "1": "a pure number",
 }
 """Names of the dimensions that the program uses, by their SI unit; for messages."""

@@ -37,6 +37,8 @@ PLOTS: Final = {
     "StabilityChart": "chaos.stability_chart.plot",
     "Strobe": "chaos.strobe.plot",
     "TableReport": "control.compensation.plot_report",
+    "ThermalDuty": "control.duty.plot",
+    "ThermalLimit": "control.duty.plot_limit",
     "ToleranceYield": "printing.tolerance.plot",
     "ZeroOne": "chaos.lyapunov.plot_zero_one",
 }
