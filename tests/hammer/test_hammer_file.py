@@ -87,9 +87,18 @@ BAD = {
         ["platen.source = ' '", "expected a source"],
     ),
     "number for a source": (changed('source = "H[^"]*"', "source = 3"), ["platen.source = 3"]),
-    "no law": (changed("^law.*", ""), ["magnet.law is missing", "expected one of inverse-root, table"]),
-    "unknown law": (changed('"inverse-root"', '"cubic"'), ["magnet.law = 'cubic'", "inverse-root, table"]),
-    "list for a law": (changed('"inverse-root"', "[]"), ["magnet.law = []", "inverse-root, table"]),
+    "no law": (
+        changed("^law.*", ""),
+        ["magnet.law is missing", "expected one of inverse-root, moving-coil, reluctance, table"],
+    ),
+    "unknown law": (
+        changed('"inverse-root"', '"cubic"'),
+        ["magnet.law = 'cubic'", "inverse-root, moving-coil, reluctance, table"],
+    ),
+    "list for a law": (
+        changed('"inverse-root"', "[]"),
+        ["magnet.law = []", "inverse-root, moving-coil, reluctance, table"],
+    ),
     "unknown shape": (
         changed('"rectangle"', '"round"'),
         ["waveform.shape = 'round'", "half-sine, rectangle"],

@@ -26,6 +26,8 @@ from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.damping.viscous import ViscousDamping
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
+from printhammer.parts.magnet.moving_coil import MovingCoilMagnet
+from printhammer.parts.magnet.reluctance import ReluctanceMagnet
 from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
@@ -36,6 +38,10 @@ from printhammer.units import to_si
 ARGUMENTS = {
     "magnet_force": 3,
     "magnet_energy": 2,
+    "magnet_linkage": 3,
+    "magnet_emf": 3,
+    "magnet_inductance": 3,
+    "magnet_current": 4,
     "spring_force": 2,
     "spring_energy": 2,
     "pack_loading": 3,
@@ -55,6 +61,15 @@ EXAMPLES: list[Part] = [
         [1e-4, 2e-4, 3e-4, 4e-4],
         [-1.0, 0.0, 2.0],
         [[k * j + 0.1 * j * j for j in range(3)] for k in range(4)],
+    ),
+    MovingCoilMagnet(constant=4.2),
+    ReluctanceMagnet(
+        turns=400.0,
+        pole_area=3e-5,
+        closed_at=1e-3,
+        residual_gap=1e-4,
+        core_reluctance=4e5,
+        saturation_flux=5e-5,
     ),
     LinearSpring(Bs=14.0, As=4.7e-4),
     PreloadSpring(preload=14.0, stiffness=-3e4),
@@ -141,12 +156,24 @@ def test_part_is_frozen_and_travels(part: Part) -> None:
 def test_machine_code_agrees_with_python(part: Part) -> None:
     import numba
 
+    from printhammer.kernel.compile.specialise import _compile_law
+
     c = np.array(part.packed(5e-5))
-    values = {"x": 2.3e-4, "current": 0.4, "v": -0.7, "q": 2e5, "peak": 2.9e-4, "w": 3e-3, "v_in": -0.5}
+    values = {
+        "x": 2.3e-4,
+        "current": 0.4,
+        "linkage": 3e-3,
+        "inductance": 1e-3,
+        "v": -0.7,
+        "q": 2e5,
+        "peak": 2.9e-4,
+        "w": 3e-3,
+        "v_in": -0.5,
+    }
     for function in functions(import_module(part.module), part.role).values():
         names = [name for name in inspect.signature(function).parameters if name != "c"]  # type: ignore[arg-type]
         arguments = [values[name] for name in names]
-        compiled = numba.njit(function)
+        compiled = _compile_law(function, numba.njit)  # type: ignore[arg-type]
         assert compiled(c, *arguments) == pytest.approx(function(c, *arguments), rel=1e-14)  # type: ignore[operator]
 
 

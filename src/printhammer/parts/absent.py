@@ -21,6 +21,26 @@ def magnet_energy(c: Any, x: float) -> float:
     return 0.0
 
 
+def magnet_linkage(c: Any, x: float, current: float) -> float:
+    """Return the flux linkage of no magnet, 0 Wb."""
+    return 0.0
+
+
+def magnet_emf(c: Any, x: float, current: float) -> float:
+    """Return the back-EMF per speed of no magnet, 0 Wb/m."""
+    return 0.0
+
+
+def magnet_inductance(c: Any, x: float, current: float) -> float:
+    """Return the differential inductance of no magnet, 0 H."""
+    return 0.0
+
+
+def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
+    """Return the current of a linkage with a constant inductance alone, A."""
+    return linkage / inductance if inductance > 0.0 else 0.0
+
+
 def spring_force(c: Any, x: float) -> float:
     """Return the force of no spring, 0 N."""
     return 0.0

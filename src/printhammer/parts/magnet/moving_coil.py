@@ -1,0 +1,69 @@
+"""Moving coil (voice coil) in the field of a permanent magnet.
+
+    Fm = k i,    lambda = k x
+
+The coil of wire length l moves across a constant flux density B, k = B l; the back-EMF is k v. Force and
+linkage come from the coenergy W' = k x i.
+
+    [magnet]
+    law = "moving-coil"
+    constant = { value = 4.2, unit = "N/A", status = "stated", source = "data sheet of the voice coil" }
+
+Source: the force on a current across a field, F = B l i, and Faraday's law.
+Validity: the travel over which the field is constant. Weakness: k falls toward the ends of the travel, and
+the current's own field (reluctance force) is left out. A coil that a voltage drives needs an inductance:
+linkage alone does not tell the current.
+
+Packed constants: c = [k].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar
+
+from printhammer.parts.base import MagnetPart, register
+from printhammer.support.constants import quantity
+
+
+def magnet_force(c: Any, x: float, current: float) -> float:
+    """Return the force k i, N."""
+    return float(c[0] * current)
+
+
+def magnet_energy(c: Any, x: float) -> float:
+    """Return 0 J, the energy without current."""
+    return 0.0
+
+
+def magnet_linkage(c: Any, x: float, current: float) -> float:
+    """Return the linkage k x of the permanent field, Wb."""
+    return float(c[0] * x)
+
+
+def magnet_emf(c: Any, x: float, current: float) -> float:
+    """Return the back-EMF per speed, k, N/A."""
+    return float(c[0])
+
+
+def magnet_inductance(c: Any, x: float, current: float) -> float:
+    """Return 0 H: the permanent field does not depend on the current."""
+    return 0.0
+
+
+def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
+    """Return the current of a linkage, A; NaN for a coil without inductance."""
+    return float((linkage - c[0] * x) / inductance) if inductance > 0.0 else math.nan
+
+
+@register
+class MovingCoilMagnet(MagnetPart):
+    """The force constant of a moving coil."""
+
+    law: ClassVar[str] = "moving-coil"
+
+    constant: float = quantity("N/A", "k", "force per current, and back-EMF per speed")
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return (k,)."""
+        return (self.constant,)

@@ -1,0 +1,189 @@
+"""Solenoid or pot magnet as a magnetic circuit: gap with fringes, core that saturates, leakage.
+
+    N i = Phi / P(g) + Rc Phi / (1 - Phi / Phi_s),    P = mu0 [A / (g + g0) + (U / pi) ln(1 + 2 h / (g + g0))]
+    lambda = N Phi + Ls (1 - g / gs) i,               g = closed_at - x, or x - closed_at
+
+The flux Phi of N turns crosses the gap g and, in series, the residual gap g0 and the core. Beside the pole
+face of area A runs the fringe of half annuli between flanks of perimeter U and height h. The core follows
+Froehlich and Kennelly: reluctance Rc at first, no more than the flux Phi_s. The leakage Ls links the coil but
+passes the core; it falls with the gap, as that of a plunger that leaves the coil, and ends at gs. Force,
+linkage and their slopes come from one coenergy, with the Phi that makes it largest:
+
+    W' = N i Phi - Phi^2 / (2 P) + Rc Phi_s^2 [Phi / Phi_s + ln(1 - Phi / Phi_s)] + Ls (1 - g / gs) i^2 / 2
+
+Far from saturation F = (i^2 / 2) dL/dx. Flux from current, and current from linkage, are quadratic equations,
+solved without cancellation.
+
+    [magnet]
+    law = "reluctance"
+    turns = { value = 957, unit = "1", status = "stated", source = "winding sheet" }
+    pole_area = { value = 50, unit = "mm^2", status = "stated", source = "drawing" }
+    residual_gap = { value = 0.2, unit = "mm", status = "assumed", source = "air beside the armature" }
+    closed_at = { value = 5, unit = "mm", status = "stated", source = "drawing" }
+    saturation_flux = { value = 1.5e-4, unit = "Wb", status = "derived", source = "1.9 T in the core" }
+    core_reluctance = { value = 2e5, unit = "A/Wb", status = "derived", source = "length of the core" }
+
+Source: H. C. Roters, Electromagnetic Devices (1941), chapters 5 (permeances) and 8 (plungers);
+A. E. Kennelly, Trans. AIEE 8 (1891) 485 (core).
+Validity: quasi-static flux, gaps above -g0 and below gs. Weakness: one core of one cross section; hysteresis,
+remanence, the low permeability of iron at small fields, and eddy currents are left out (for these the coil
+may have a shorted turn).
+
+Packed constants: c = [dg/dx, closed_at, mu0 N^2 A, g0, mu0 N^2 U / pi, 2 h, Ls, Ls / gs, Rc / N^2,
+1 / (N Phi_s)].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Final, Literal
+
+from pydantic import Field, model_validator
+
+from printhammer.parts.base import MagnetPart, register
+from printhammer.support.constants import quantity
+
+MU0: Final = 4e-7 * math.pi
+"""Magnetic constant, H/m, to nine digits."""
+
+
+def _gap_inductance(c: Any, x: float) -> float:
+    """Return N^2 P, H; NaN where the law ends."""
+    g = c[0] * (x - c[1])
+    s = g + c[3]
+    if not (s > 0.0 and c[6] - c[7] * g >= 0.0):
+        return math.nan
+    return float(c[2] / s + c[4] * math.log1p(c[5] / s))
+
+
+def _gap_slope(c: Any, x: float) -> float:
+    """Return N^2 dP/dg, H/m."""
+    s = c[0] * (x - c[1]) + c[3]
+    return float(-(c[2] / s + c[4] * c[5] / (s + c[5])) / s)
+
+
+def _unsaturated(p: float, q: float, y: float) -> float:
+    """Return the v in [0, 1] that solves p (1 - v) + q (1 - v) / v = y, for p > 0, q >= 0, y >= 0."""
+    d = p - q - y
+    root = math.sqrt(d * d + 4.0 * p * q)
+    if d > 0.0:
+        return 0.5 * (d + root) / p
+    return 2.0 * q / (root - d) if root > d else 0.0
+
+
+def magnet_force(c: Any, x: float, current: float) -> float:
+    """Return the force, N; NaN where the law ends."""
+    length = _gap_inductance(c, x)
+    if not length > 0.0:
+        return math.nan
+    p = 1.0 / length
+    drop = p * current / (p + c[8] / _unsaturated(p, c[8], c[9] * abs(current)))
+    return float(0.5 * c[0] * (drop * drop * _gap_slope(c, x) - c[7] * current * current))
+
+
+def magnet_energy(c: Any, x: float) -> float:
+    """Return 0 J, the energy without current; NaN where the law ends."""
+    return 0.0 * _gap_inductance(c, x)
+
+
+def magnet_linkage(c: Any, x: float, current: float) -> float:
+    """Return the flux linkage, Wb; NaN where the law ends."""
+    length = _gap_inductance(c, x)
+    if not length > 0.0:
+        return math.nan
+    p = 1.0 / length
+    main = current / (p + c[8] / _unsaturated(p, c[8], c[9] * abs(current)))
+    return float(main + (c[6] - c[7] * c[0] * (x - c[1])) * current)
+
+
+def magnet_emf(c: Any, x: float, current: float) -> float:
+    """Return the slope of the linkage along x, Wb/m; NaN where the law ends."""
+    length = _gap_inductance(c, x)
+    if not length > 0.0:
+        return math.nan
+    p = 1.0 / length
+    v = _unsaturated(p, c[8], c[9] * abs(current))
+    main = current / (p + c[8] / v) * p * p / (p + c[8] / (v * v))
+    return float(c[0] * (main * _gap_slope(c, x) - c[7] * current))
+
+
+def magnet_inductance(c: Any, x: float, current: float) -> float:
+    """Return the differential inductance, H; NaN where the law ends."""
+    length = _gap_inductance(c, x)
+    if not length > 0.0:
+        return math.nan
+    p = 1.0 / length
+    v = _unsaturated(p, c[8], c[9] * abs(current))
+    return float(1.0 / (p + c[8] / (v * v)) + (c[6] - c[7] * c[0] * (x - c[1])))
+
+
+def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
+    """Return the current of a linkage with a constant inductance in series, A.
+
+    NaN where the law ends, and without any leakage at the saturation flux and beyond it.
+    """
+    length = _gap_inductance(c, x)
+    if not length > 0.0:
+        return math.nan
+    p = 1.0 / length
+    stray = inductance + (c[6] - c[7] * c[0] * (x - c[1]))
+    v = _unsaturated(1.0 + stray * p, stray * c[8], c[9] * abs(linkage))
+    if not v > 0.0:
+        return math.nan
+    turned = p + c[8] / v
+    return float(linkage * turned / (1.0 + stray * turned))
+
+
+@register
+class ReluctanceMagnet(MagnetPart):
+    """Constants of a magnetic circuit with one gap."""
+
+    law: ClassVar[str] = "reluctance"
+
+    turns: float = quantity("1", "N", "turns of the coil", gt=0)
+    pole_area: float = quantity("m^2", "A", "area of the pole face", gt=0)
+    closed_at: float = quantity("m", "x_c", "displacement at which the gap is closed")
+    residual_gap: float = quantity("m", "g0", "air that stays in series with the gap", ge=0, default=0.0)
+    fringe_perimeter: float = quantity("m", "U", "perimeter of the pole that fringes", ge=0, default=0.0)
+    fringe_height: float = quantity("m", "h", "height of the flanks that fringe", ge=0, default=0.0)
+    core_reluctance: float = quantity("A/Wb", "Rc", "reluctance of the core at small flux", ge=0, default=0.0)
+    saturation_flux: float | None = quantity(
+        "Wb", "Phi_s", "flux that the core cannot exceed", gt=0, default=None
+    )
+    leakage: float = quantity("H", "Ls", "leakage of the coil at the closed gap", ge=0, default=0.0)
+    leakage_reach: float | None = quantity("m", "gs", "gap at which the leakage ends", gt=0, default=None)
+    pull: Literal["paper", "backstop"] = Field("paper", description="toward what the magnet pulls")
+
+    @model_validator(mode="after")
+    def _constants_belong_together(self) -> ReluctanceMagnet:
+        if self.saturation_flux is not None and self.core_reluctance == 0.0:
+            raise ValueError("saturation_flux is given without a core_reluctance, expected both or none")
+        if (self.fringe_perimeter == 0.0) != (self.fringe_height == 0.0):
+            raise ValueError("expected both fringe_perimeter and fringe_height or none of them")
+        if self.leakage_reach is not None and self.leakage == 0.0:
+            raise ValueError("leakage_reach is given without a leakage, expected both or the leakage alone")
+        return self
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Displacements for which the law holds, in m; open where the gap is -g0."""
+        reach = math.inf if self.leakage_reach is None else self.leakage_reach
+        if self.pull == "paper":
+            return (self.closed_at - reach, self.closed_at + self.residual_gap)
+        return (self.closed_at - self.residual_gap, self.closed_at + reach)
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return the constants as the module states."""
+        scale = MU0 * self.turns**2
+        return (
+            -1.0 if self.pull == "paper" else 1.0,
+            self.closed_at,
+            scale * self.pole_area,
+            self.residual_gap,
+            scale * self.fringe_perimeter / math.pi,
+            2.0 * self.fringe_height,
+            self.leakage,
+            0.0 if self.leakage_reach is None else self.leakage / self.leakage_reach,
+            self.core_reluctance / self.turns**2,
+            0.0 if self.saturation_flux is None else 1.0 / (self.turns * self.saturation_flux),
+        )
