@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 MEANINGS = {
     "pull": "whether the contact may pull",
     "reloading": "where the pack goes in again within a contact",
+    "back_emf": "whether the flux of the magnet is linked with the coil",
+    "decay": "path of the current after the supply is switched off",
     "file": "CSV file, relative to the hammer file",
     "interpolation": "curve between two samples",
 }
@@ -36,8 +38,6 @@ class KeyTable(SphinxDirective):
         rows: list[list[str]] = []
         if section == "top":
             rows = _cells(Body)
-        elif not first:
-            rows = _cells(model_of(section, ""))
         else:
             head.insert(0, first)
             for kind in kinds_of(section):

@@ -48,6 +48,8 @@ DIMENSIONS: dict[str, str] = {
     "V": "a voltage",
     "ohm": "a resistance",
     "H": "an inductance",
+    "F": "a capacitance",
+    "Wb": "a flux linkage",
     "degC": "a temperature",
     "K": "a difference of temperatures",
     "K/W": "a thermal resistance",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.kernel.compile.variational import variational
-from printhammer.kernel.model.layout import BACKSTOP_PART, DAMPING, FRONT, MAGNET, PACK, SPRING
+from printhammer.kernel.model.layout import BACKSTOP_PART, COIL, DAMPING, FRONT, MAGNET, PACK, SPRING
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
 from printhammer.kernel.variational import layout as V
 from printhammer.results import Declared, part
@@ -122,7 +122,7 @@ def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, .
     away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)
     field = moves[:, SPRING:PACK].any(axis=1) | moves[:, MAGNET:].any(axis=1)
     pack = moves[:, PACK:BACKSTOP_PART].any(axis=1) | (moves[:, FRONT] != 0.0)
-    backstop = moves[:, BACKSTOP_PART:MAGNET].any(axis=1)
+    backstop = moves[:, BACKSTOP_PART:COIL].any(axis=1)
     damping = moves[:, DAMPING:SPRING].any(axis=1)
     laws = V.FIELD_MOVES * field + V.PACK_MOVES * pack
     laws = laws + V.BACKSTOP_MOVES * backstop + V.DAMPING_MOVES * damping

@@ -42,7 +42,7 @@ class Drive:
         if overlap not in OVERLAPS:
             raise InputError(f"overlap = {overlap!r} is expected to be 'add' or 'replace'")
         self._waveform = waveform
-        self._overlap: Overlap = overlap
+        self._overlap: Overlap = "replace" if waveform.replaces else overlap
         self._period = period
         self._times = checked_times(times)
         self._segments = waveform.segments()
@@ -65,7 +65,7 @@ class Drive:
 
     @property
     def overlap(self) -> Overlap:
-        """Rule for overlapping pulses: "add" or "replace"."""
+        """Rule for overlapping pulses: "add" or "replace", which a driver of a voltage always does."""
         return self._overlap
 
     @property
@@ -75,7 +75,7 @@ class Drive:
 
     @property
     def quantity(self) -> QuantityName:
-        """What is driven: "current" (A) or "force" (N)."""
+        """What is driven: "current" (A), "force" (N) or "voltage" (V)."""
         return self._waveform.quantity
 
     @property
@@ -87,6 +87,8 @@ class Drive:
     def fingerprint(self) -> str:
         """Hexadecimal digest of what the drive does; equal for equal drives."""
         digest = hashlib.sha256(f"{self.quantity} {self.overlap} {self._segments.shape}".encode())
+        if self.quantity == "voltage":
+            digest.update(repr(self._waveform.supply()).encode())
         # Adding 0.0 makes -0.0 and 0.0, which are equal, digest alike.
         for array in (self._segments, self._times):
             digest.update((array + 0.0).tobytes())
@@ -172,7 +174,7 @@ class Drive:
 
     def _ends(self) -> FloatArray:
         """Return the times at which the pulses end, s."""
-        ends: FloatArray = self._times + self._segments[-1, 0]
+        ends: FloatArray = self._times + self._waveform.support
         return ends
 
     def _reach(self) -> int:
@@ -188,6 +190,7 @@ class Drive:
             return NotImplemented
         return (
             (self.quantity, self.overlap) == (other.quantity, other.overlap)
+            and self._waveform.supply() == other._waveform.supply()
             and np.array_equal(self._times, other._times)
             and np.array_equal(self._begins(), other._begins())
             and np.array_equal(self._pieces, other._pieces)

@@ -9,6 +9,9 @@ kind  value                               used by
 0     p0 + s (p1 + s (p2 + s p3))         plateaus, ramps, sampled records
 1     p0 + p1 exp(-p2 s)                  rise and decay of a coil current
 2     p0 + p1 sin(p2 s + p3)              half sine, sinusoidal force
+4     p0, a voltage; thresholds p2, p3    supply on, with a chopper
+5     0; decays against p0                supply off
+6     p0, at first                        reservoir
 ====  ==================================  =================
 
 The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end
@@ -35,6 +38,10 @@ EXPONENTIAL: Final = 1
 SINE: Final = 2
 END: Final = 3
 """Kind that the last row has where the kernel gets several tables in one array."""
+SWITCHED: Final = 4
+DECAY: Final = 5
+RESERVOIR: Final = 6
+"""Kinds of the pieces of a driver, whose value is the voltage p0 of the supply, and 0 while it is off."""
 COLUMNS: Final = 6
 
 _CHUNK: Final = 1024
@@ -99,6 +106,7 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
     exponential = p0 + p1 * np.exp(np.where(kind == EXPONENTIAL, -p2 * s, 0.0))
     sine = p0 + p1 * np.sin(p2 * s + p3)
     value = np.where(kind == EXPONENTIAL, exponential, np.where(kind == SINE, sine, polynomial))
+    value = np.where(kind >= SWITCHED, np.where(kind == DECAY, 0.0, p0), value)
     value = np.where(active, value, 0.0)
     return np.where(np.isnan(tau), np.nan, value)
 
@@ -131,6 +139,9 @@ def largest(segments: FloatArray) -> float:
     for row, after in itertools.pairwise(segments):
         start, kind, p0, p1, p2, p3 = (float(entry) for entry in row)
         length = float(after[0]) - start
+        if kind >= SWITCHED:
+            best = max(best, abs(p0) if kind != DECAY else 0.0)
+            continue
         places = [0.0, *(s for s in _inner_extremes(row, length) if 0.0 < s < length)]
         if math.isfinite(length):
             places.append(length)

@@ -105,6 +105,8 @@ class PulseSequence(Drive):
     @property
     def peak(self) -> float:
         """Largest absolute value of the total current, A, or force, N; exact unless pulses meet."""
+        if self._waveform.replaces:
+            return self.largest_pulse
         whole = np.append(self._ends()[:-1] <= self._times[1:], True)
         if self._overlap == "replace":
             highest = max(largest(self._tables[k]) for k in np.unique(self._which[whole]))
@@ -161,6 +163,9 @@ class PulseSequence(Drive):
         self._waveform = self._waveforms[0]
         self._segments = tables[0]
         self._tables = tables
+        self._supports = [0.0] * len(tables)
+        for waveform in waveforms:
+            self._supports[known[id(waveform)]] = waveform.support
         # Looked for when first asked for.
         self._largest = math.nan
         self._which = np.array([known[id(waveform)] for waveform in waveforms], dtype=np.int64)
@@ -172,7 +177,7 @@ class PulseSequence(Drive):
         return self._rows
 
     def _ends(self) -> FloatArray:
-        ends: FloatArray = self._times + np.array([table[-1, 0] for table in self._tables])[self._which]
+        ends: FloatArray = self._times + np.array(self._supports)[self._which]
         return ends
 
     def _reach(self) -> int:

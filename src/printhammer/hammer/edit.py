@@ -9,12 +9,23 @@ from collections.abc import Callable, Iterable, Mapping, MutableMapping
 from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError, located, nearest
-from printhammer.hammer.file import SELECTORS, TEXTS, Body, file_options, kinds_of, model_of, si_unit_of
+from printhammer.hammer.file import (
+    SELECTORS,
+    TEXTS,
+    UNSAID,
+    Body,
+    file_options,
+    kinds_of,
+    model_of,
+    si_unit_of,
+)
 from printhammer.hammer.uncertainty import UNCERTAINTY
 from printhammer.support.constants import Constant, quantities, shown
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
+
+    from printhammer.drive.waveforms.base import QuantityName
 
 Edit = tuple[str, Any]
 """A dotted key and the TOML value to put there; None takes the key away."""
@@ -41,8 +52,8 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         model: type[BaseModel] | None = Body
     elif section in SELECTORS:
         selector = SELECTORS[section]
-        kind = document.get(section, {}).get(selector, "") if selector else ""
-        if selector and kind not in kinds_of(section):
+        kind = document.get(section, {}).get(selector, UNSAID.get(section, ""))
+        if kind not in kinds_of(section):
             raise InputError(f"the key {shown(key)} is not known, the hammer has no [{section}]")
         if name == selector:
             raise InputError(f"{key} = {shown(value)}: expected a whole table for {section!r} instead")
@@ -89,11 +100,11 @@ def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]
     """Return the TOML table of a part, a waveform or a mapping of what `edit_of` takes."""
     selector = SELECTORS[section]
     content = dict(value) if isinstance(value, Mapping) else _fields(section, value)
-    if selector and content.get(selector) not in kinds_of(section):
+    if content.get(selector, UNSAID.get(section)) not in kinds_of(section):
         known = ", ".join(kinds_of(section))
         raise InputError(f"{section}.{selector} = {shown(content.get(selector))}: expected one of {known}")
     result: dict[str, Any] = {}
-    if selector:
+    if selector in content:
         result[selector] = content.pop(selector)
     for name, entry in content.items():
         key, item = edit_of({section: result}, f"{section}.{name}", entry, status, source)
@@ -105,16 +116,18 @@ def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]
 def _fields(section: str, value: Any) -> dict[str, Any]:
     """Return selector, constants and options of a part or waveform object."""
     selector = SELECTORS[section]
-    kind = getattr(type(value), selector, None) if selector else None
+    kind = getattr(type(value), selector, None)
     if kind not in kinds_of(section) or type(value) is not model_of(section, kind):
         raise InputError(f"{section} = {shown(value)}: expected a part, a table, or None")
     if getattr(value, "content", dict)():
         raise InputError(f"{section}: expected a table that names its file, not one read already")
-    driven = getattr(value, "quantity", "current")
+    from printhammer.drive.waveforms.base import UNITS
+
+    driven: QuantityName = getattr(value, "quantity", "current")
     fields: dict[str, Any] = {selector: kind}
     for name, note in quantities(type(value)).items():
         number = getattr(value, name)
-        unit = note.also[0] if note.also and driven == "force" else note.si
+        unit = UNITS[driven] if note.also else note.si
         fields[name] = None if number is None else {"value": number, "unit": unit}
     for name in file_options(type(value)):
         if getattr(value, name) != type(value).model_fields[name].default:

@@ -1,9 +1,9 @@
 """Hammer files: TOML to parts, constants and waveform, every fault told in one sentence.
 
 A file has ``format = 1``, ``name``, optionally ``title`` and ``note``, the constants ``mass`` and ``platen``,
-and a table for each part: ``[magnet]``, ``[spring]``, ``[pack]``, ``[backstop]`` and ``[damping]`` with
-their ``law``, ``[waveform]`` with its ``shape``, ``[coil]``, and ``[uncertainty]`` with standard errors of
-constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is
+and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``, ``[backstop]`` and
+``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, and ``[uncertainty]`` with standard
+errors of constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is
 ``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
 """
 
@@ -52,8 +52,11 @@ TEXTS: Final = {
 }
 """The texts of a file and what they say."""
 
-SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape", "coil": ""}
+SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape"}
 """The tables of a file, and the key that selects what kind of part each one is."""
+
+UNSAID: Final = {"coil": "winding"}
+"""Of a table that may leave its kind out: the kind that it is then."""
 
 _M = TypeVar("_M", bound=BaseModel)
 
@@ -67,14 +70,6 @@ class Body(BaseModel):
     platen: float | None = quantity("m", "x_platen", "position of the platen", default=None)
 
 
-class Coil(BaseModel):
-    """The constants of the coil."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    resistance: float | None = quantity("ohm", "R", "resistance of the coil", ge=0, default=None)
-
-
 @dataclass(frozen=True)
 class Contents:
     """What a hammer file says, SI; `parts` by role."""
@@ -83,7 +78,6 @@ class Contents:
     title: str
     note: str
     body: Body
-    coil: Coil
     parts: dict[str, Part]
     waveform: Waveform | None
     constants: dict[str, Constant]
@@ -121,9 +115,7 @@ def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
-    """Return the model class of a table, such as ("pack", "power"); the kind of "coil" is empty."""
-    if section == "coil":
-        return Coil
+    """Return the model class of a table, such as ("pack", "power")."""
     if section == "waveform":
         from printhammer.drive.waveforms.shapes import SHAPES
 
@@ -171,13 +163,12 @@ def _build(document: Mapping[str, Any], folder: Path) -> Contents:
             table = document[section]
             if not isinstance(table, Mapping):
                 raise InputError(f"{section} = {shown(table)}: expected a table [{section}]")
-            kind = _kind(table, section, selector) if selector else ""
+            kind = _kind(table, section, selector)
             rest = {key: value for key, value in table.items() if key != selector}
             made[section] = _read(model_of(section, kind), rest, f"{section}.", constants, folder)
     contents = Contents(
         **texts,
         body=body,
-        coil=made.pop("coil", Coil()),
         waveform=made.pop("waveform", None),
         parts=made,
         constants=constants,
@@ -189,7 +180,7 @@ def _build(document: Mapping[str, Any], folder: Path) -> Contents:
 
 def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
     known = kinds_of(section)
-    kind = table.get(selector)
+    kind = table.get(selector, UNSAID.get(section))
     if kind is None:
         raise InputError(f"{section}.{selector} is missing, expected one of {', '.join(known)}")
     if not isinstance(kind, str) or kind not in known:

@@ -20,7 +20,7 @@ from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
-from printhammer.parts import BackstopPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
+from printhammer.parts import BackstopPart, CoilPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
 from printhammer.support.constants import Constant, quantities
 
 if TYPE_CHECKING:
@@ -176,13 +176,19 @@ class Hammer:
     @property
     def coil_resistance(self) -> float | None:
         """Resistance of the coil, ohm."""
-        return self._contents.coil.resistance
+        return getattr(self.coil, "resistance", None)
 
     @property
     def magnet(self) -> MagnetPart | None:
         """Permanent magnet and coil."""
         part = self._contents.parts.get("magnet")
         return part if isinstance(part, MagnetPart) else None
+
+    @property
+    def coil(self) -> CoilPart | None:
+        """Circuit of the coil."""
+        part = self._contents.parts.get("coil")
+        return part if isinstance(part, CoilPart) else None
 
     @property
     def spring(self) -> SpringPart | None:
@@ -256,6 +262,9 @@ class Hammer:
         if self.coil_resistance is not None:
             content["coil.resistance"] = self.coil_resistance.hex()
         models: dict[str, tuple[str, Any]] = {role: (part.law, part) for role, part in self.parts.items()}
+        if not _physics(self.coil).keys() - {"resistance"}:
+            # A resistance alone is no circuit.
+            models.pop("coil", None)
         if self.waveform is not None:
             models["waveform"] = (self.waveform.shape, self.waveform)
         for section, (kind, model) in models.items():
@@ -411,7 +420,9 @@ class Hammer:
 
 
 def _physics(model: Any) -> dict[str, Any]:
-    """Return what of a part or waveform enters the fingerprint."""
+    """Return what of a part or waveform enters the fingerprint; nothing of none."""
+    if model is None:
+        return {}
     kind: type[BaseModel] = type(model)
     content: dict[str, Any] = {}
     for name in (*quantities(kind), *(set(file_options(kind)) - {"file"}), "quantity"):

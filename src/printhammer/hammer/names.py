@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from printhammer.errors import InputError, nearest
-from printhammer.hammer.file import SELECTORS, Body, model_of
+from printhammer.hammer.file import SELECTORS, UNSAID, Body, model_of
 from printhammer.support.constants import Quantity, quantities, shown
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
     section, _, field = name.rpartition(".")
     if not section:
         return quantities(Body).get(field)
-    kinds: dict[str, str] = {"coil": "", **{role: part.law for role, part in hammer.parts.items()}}
+    kinds: dict[str, str] = {**UNSAID, **{role: part.law for role, part in hammer.parts.items()}}
     if hammer.waveform is not None:
         kinds["waveform"] = hammer.waveform.shape
     if section not in kinds or section not in SELECTORS:

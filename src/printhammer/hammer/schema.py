@@ -11,6 +11,7 @@ from printhammer.hammer.file import (
     FORMAT,
     SELECTORS,
     TEXTS,
+    UNSAID,
     Body,
     file_options,
     kinds_of,
@@ -33,11 +34,8 @@ def schema() -> dict[str, Any]:
     properties["name"]["minLength"] = 1
     properties |= _constants(Body)
     for section, selector in SELECTORS.items():
-        if selector:
-            tables = [_table(section, kind, selector) for kind in kinds_of(section)]
-            properties[section] = {"oneOf": tables}
-        else:
-            properties[section] = _object(_constants(model_of(section, "")), [])
+        tables = [_table(section, kind, selector) for kind in kinds_of(section)]
+        properties[section] = {"oneOf": tables}
     properties[UNCERTAINTY] = _object(
         {name: {"type": "array", "description": meaning} for name, meaning in ENTRIES.items()}, ["constants"]
     )
@@ -61,7 +59,8 @@ def _table(section: str, kind: str, selector: str) -> dict[str, Any]:
             properties[name]["description"] = description
     required = [name for name in file_options(model) if model.model_fields[name].is_required()]
     doc = (model.__doc__ or "").strip().partition("\n")[0]
-    return {"description": doc, **_object(properties, [selector, *_required(model), *required])}
+    needed = [] if UNSAID.get(section) == kind else [selector]
+    return {"description": doc, **_object(properties, [*needed, *_required(model), *required])}
 
 
 def _object(properties: dict[str, Any], required: list[str]) -> dict[str, Any]:

@@ -8,9 +8,10 @@ they call nothing but `math`:
 ========  ===================================================================================================
 role      functions
 ========  ===================================================================================================
-magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``, and for a coil that a voltage drives
-          ``magnet_linkage``, ``magnet_emf``, ``magnet_inductance`` with the arguments of the force, and
-          ``magnet_current(c, x, linkage, inductance)``
+magnet    ``magnet_force(c, x, current)``, ``magnet_energy(c, x)``; for a coil driven by a voltage also
+          ``magnet_linkage(c, x, current)``, ``magnet_emf(c, x, current)``,
+          ``magnet_inductance(c, x, current)`` and ``magnet_current(c, x, linkage, inductance)``
+coil      none: its circuit is the kernel's, `printhammer.kernel.model.circuit`
 spring    ``spring_force(c, x)``, ``spring_energy(c, x)``
 pack      ``MEMORY``, ``pack_loading(c, x, v)``, ``pack_memory(c, peak)``, ``pack_unloading(c, x, v, q)``,
           ``pack_switch(c, x, v)``
@@ -25,7 +26,6 @@ argument      what it is
 ``c``         packed constants, a float64 array, in the order that the module states
 ``x``, ``v``  displacement, m, and velocity, m/s
 ``current``   current of the coil, A
-``linkage``   flux linkage of the coil, Wb, of which ``inductance``, H, times the current is not the magnet's
 ``peak``      displacement of the latest local maximum inside this contact of the pack, m
 ``q``         what ``pack_memory`` returned of it
 ``w``         sqrt(b - x), root of the compression of the backstop, m^0.5
@@ -33,11 +33,9 @@ argument      what it is
 ============  ===============================================================================================
 
 Forces are in N, positive toward the paper. Minus the slope of an energy, J, is the force, of the magnet at
-zero current. Force and flux linkage of a magnet are slopes of one coenergy: ``magnet_emf`` is the slope of
-the linkage along x and that of the force along the current, ``magnet_inductance`` the slope of the linkage
-along the current, and ``magnet_current`` its inverse. What a module leaves out comes from
-`printhammer.parts.absent`, the part that is not there. A ``..._switch`` function changes sign where a law has
-a kink inside a contact (an option that forbids a surface to pull), so that an integrator can locate it.
+zero current. What a module leaves out comes from `printhammer.parts.absent`, the part that is not there. A
+``..._switch`` function changes sign where a law has a kink inside a contact (an option that forbids a surface
+to pull), so that an integrator can locate it.
 """
 
 from importlib import import_module
@@ -47,6 +45,7 @@ from printhammer.parts.base import (
     PARTS,
     ROLES,
     BackstopPart,
+    CoilPart,
     DampingPart,
     MagnetPart,
     PackPart,
@@ -64,6 +63,7 @@ __all__ = [
     "PARTS",
     "ROLES",
     "BackstopPart",
+    "CoilPart",
     "DampingPart",
     "MagnetPart",
     "PackPart",

@@ -27,18 +27,18 @@ def magnet_linkage(c: Any, x: float, current: float) -> float:
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the back-EMF per speed of no magnet, 0 Wb/m."""
+    """Return the slope of the flux linkage of no magnet with displacement, 0 Wb/m."""
     return 0.0
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the differential inductance of no magnet, 0 H."""
+    """Return the slope of the flux linkage of no magnet with current, 0 H."""
     return 0.0
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current of a linkage with a constant inductance alone, A."""
-    return linkage / inductance if inductance > 0.0 else 0.0
+    """Return the current of a coil without a magnet, linkage / inductance in A."""
+    return linkage / inductance
 
 
 def spring_force(c: Any, x: float) -> float:

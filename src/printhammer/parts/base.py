@@ -8,6 +8,7 @@ the floats of `packed` as one float64 array `c`.
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -19,7 +20,7 @@ from printhammer.support.constants import sentence
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-ROLES: tuple[str, ...] = ("magnet", "spring", "pack", "backstop", "damping")
+ROLES: tuple[str, ...] = ("magnet", "coil", "spring", "pack", "backstop", "damping")
 
 
 class Part(BaseModel):
@@ -77,6 +78,20 @@ class MagnetPart(Part):
     def domain(self) -> tuple[float, float]:
         """Displacements for which the law holds, `(x_min, x_max)` in m."""
         return (-math.inf, math.inf)
+
+    @property
+    def has_linkage(self) -> bool:
+        """Whether the law links a flux, so that a voltage can drive the coil."""
+        return hasattr(sys.modules[self.module], "magnet_linkage")
+
+
+class CoilPart(Part):
+    """The circuit of the coil on the magnet; its law is that of `printhammer.kernel.model.circuit`.
+
+    It holds its constants in the order of the kernel's array, see `printhammer.kernel.model.layout`.
+    """
+
+    role: ClassVar[str] = "coil"
 
 
 class SpringPart(Part):

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _FORCES: Final = {
     "magnet": ("magnet_force",),
+    "coil": (),
     "spring": ("spring_force",),
     "pack": ("pack_loading",),
     "backstop": ("backstop_elastic", "backstop_rebound"),
@@ -45,7 +46,7 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
             has = f"{name}{inspect.signature(law)}" if callable(law) else f"{name} = {law!r}"
             raise InputError(f"{where}: {has}, expected the function {name}({', '.join(wanted)})")
     forces = _FORCES[part.role]
-    if complete and not any(hasattr(module, name) for name in forces):
+    if complete and forces and not any(hasattr(module, name) for name in forces):
         raise InputError(
             f"{where}: the {part.role} law {part.law!r} has no force, expected the function"
             f" {' or '.join(forces)}"

@@ -9,9 +9,9 @@ import numpy as np
 
 from printhammer.drive.ragged import Ragged, starts_of
 from printhammer.kernel.lanes import layout as lane_layout
-from printhammer.kernel.model.layout import MAGNET, PLACES, ROOM
+from printhammer.kernel.model.layout import MAGNET, NODE_WIDTH, PLACES, ROOM
 from printhammer.kernel.single import carry
-from printhammer.run.problem import Problem, scales_of
+from printhammer.run.problem import Problem, live_size, node_width, scales_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,7 +90,7 @@ class Group:
         """Tell whether there is a kernel for lanes for these members."""
         from printhammer.kernel.compile.lanes import suits
 
-        if self.lane_kinds is None or not suits(self.laws):
+        if self.lane_kinds is None or self.laws.circuit or not suits(self.laws):
             return False
         hammers = self.batch.hammers
         used = {role: hammers[:, PLACES[role] : PLACES[role] + room] for role, room in ROOM.items()}
@@ -171,7 +171,7 @@ class Job:
             reached=np.zeros(count),
             steps=np.zeros(count, np.int64),
             dots=np.empty((group.batch.firings.size if want_dots else 0, _DOT_WIDTH)),
-            strobes=np.empty((own.values.size, _STROBE_WIDTH)),
+            strobes=np.empty((own.values.size, _STROBE_WIDTH + node_width(group.laws) - NODE_WIDTH)),
             x=x if count == len(x) else np.empty((count, grid.size), np.float32),
         )
 
@@ -212,7 +212,7 @@ class Job:
             self.kept,
             group.uniform,
             np.zeros(group.most_firings, np.int64),
-            np.zeros(1 + 7 * group.most_firings),
+            np.zeros(live_size(group.most_firings)),
             np.zeros((lane_layout.POOLS + 1, lane_layout.POOL_SIZE)),
             np.zeros(lane_layout.POOLS, np.int64),
             np.zeros((lane_layout.POOLS, lane_layout.LANES), np.int64),
@@ -226,7 +226,7 @@ class Job:
         group = self.group
         nodes, contacts = _NODES, _CONTACTS
         under_way = np.zeros((2, group.most_firings), np.int64)
-        live = np.zeros((2, 1 + 7 * group.most_firings))
+        live = np.zeros((2, live_size(group.most_firings)))
         while which.size or prepare:
             prepare = False
             done = group.kernel.members(
@@ -235,7 +235,7 @@ class Job:
                 self.kept,
                 under_way,
                 live,
-                np.empty((nodes, 5)),
+                np.empty((nodes, node_width(group.laws))),
                 np.empty((contacts, 7)),
                 np.zeros(carry.SIZE),
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
@@ -122,7 +122,32 @@ class Motion(Result, fields=False):
     @derived("A", "coil current", "t")
     def current(self) -> FloatArray:
         """Coil current on the output grid, A, shape (n,); zero under a drive that is a force."""
-        return self._grid[:, 2] if self.drive.quantity == "current" else np.zeros(len(self._times))
+        return self._electric(10) if self._problem.laws.circuit else self._driven("current")
+
+    @property
+    def voltage(self) -> FloatArray:
+        """Voltage across the coil on the output grid, V, shape (n,); zero unless a voltage drives it."""
+        return self._electric(11)
+
+    @property
+    def linkage(self) -> FloatArray:
+        """Flux linkage of the coil on the output grid, Wb, shape (n,); zero unless a voltage drives it."""
+        return self._electric(12)
+
+    @property
+    def driven(self) -> Literal["current", "force"]:
+        """What acts on the armature: a current in the coil (A), or a force (N)."""
+        return "force" if self.drive.quantity == "force" else "current"
+
+    def driven_at(self, t: npt.ArrayLike) -> FloatArray:
+        """Return the current in the coil, A, or the force of the drive, N, at any times of the run, s."""
+        return self._resampled(t)[:, 10] if self._problem.laws.circuit else self.drive.value(t)
+
+    def _electric(self, column: int) -> FloatArray:
+        return self._grid[:, column] if self._problem.laws.circuit else np.zeros(len(self._times))
+
+    def _driven(self, quantity: str) -> FloatArray:
+        return self._grid[:, 2] if self.drive.quantity == quantity else np.zeros(len(self._times))
 
     @property
     def force(self) -> Mapping[str, FloatArray]:
@@ -146,7 +171,7 @@ class Motion(Result, fields=False):
                 f" {self.start:.9g} s to {self.end:.9g} s"
             )
         order = np.argsort(times, kind="stable")
-        table = np.empty((times.size, 10))
+        table = np.empty((times.size, self._problem.columns))
         table[order] = self._problem.resample(self._record, np.ascontiguousarray(times[order]))
         return table
 

@@ -14,9 +14,11 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.kernel.model import layout
 from printhammer.kernel.model.laws import Laws
+from printhammer.kernel.model.layout import CIRCUIT_NODE_WIDTH, NODE_WIDTH
 from printhammer.kernel.model.modes import OK, PAUSED, STATUS_NAMES, STEP_LIMIT
 from printhammer.kernel.single import carry
 from printhammer.results import Declared, part, scalar
+from printhammer.run.supply import take_supply, typical_current
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -45,12 +47,23 @@ _NODES_A_FLIGHT: Final = 40
 _MOST_FLIGHTS: Final = 1e6
 
 
+def live_size(firings: int) -> int:
+    """Return the length of the working space `live` of the kernel for a drive."""
+    return 3 + 7 * firings
+
+
+def node_width(laws: Laws) -> int:
+    """Return the number of columns of a record's nodes."""
+    return CIRCUIT_NODE_WIDTH if laws.circuit else NODE_WIDTH
+
+
 class Record(Declared):
     """What the kernel recorded of one run; see `printhammer.kernel.single.record`."""
 
     status: int = part("code of the status")
     nodes: FloatArray = part(
-        "time, displacement, velocity, mode and memory at the ends of all steps, shape (n, 5)"
+        "time, displacement, velocity, mode and memory at the ends of all steps, shape (n, 5)",
+        more="with a coil circuit its state and the path of the current, shape (n, 9)",
     )
     contacts: FloatArray = part(
         "surface, time and velocity in and out, first node, whether open at the start, shape (m, 7)"
@@ -109,6 +122,7 @@ def laws_of(hammer: Hammer, drive: Drive) -> Laws:
         absent="printhammer.parts.absent",
         damping=_module(hammer.damping),
         force_drive=drive.quantity == "force",
+        circuit=drive.quantity == "voltage",
         pack_pulls=bool(getattr(hammer.pack, "pull", True)),
         backstop_pulls=bool(getattr(hammer.backstop, "pull", True)),
         reload_along_unloading=getattr(hammer.pack, "reloading", "") == "unloading-curve",
@@ -149,6 +163,8 @@ def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple
     origin = hammer.origin
     largest_value = drive.largest_pulse
     current, push = (0.0, largest_value) if drive.quantity == "force" else (largest_value, 0.0)
+    if drive.quantity == "voltage":
+        current = typical_current(hammer, drive)
 
     def force(x: float) -> float:
         sizes = [abs(static.free(x, i)) for i in (0.0, current)]
@@ -190,6 +206,8 @@ class Problem:
         self.tolerance = tolerance
         self.laws = laws_of(hammer, drive)
         self.constants = constants_of(hammer)
+        if self.laws.circuit:
+            take_supply(self.constants, hammer, drive)
         firings, begins, pieces, self.replace, _force = drive.kernel_arrays()
         # The kernel is compiled for arrays that may be written to.
         self.firings = np.array(firings, dtype=np.float64)
@@ -211,8 +229,17 @@ class Problem:
     def drive_arrays(self) -> tuple[Any, ...]:
         """Return what the kernel needs of the drive, with working space: see its `Train`."""
         count = self.firings.size
-        under_way, live = np.zeros(count, np.int64), np.zeros(1 + 7 * count)
+        under_way, live = np.zeros(count, np.int64), np.zeros(live_size(count))
         return (self.firings, self.begins, self.pieces, self.replace, under_way, live)
+
+    @property
+    def columns(self) -> int:
+        """Number of columns that `resample` fills."""
+        return 14 if self.laws.circuit else 10
+
+    def room(self, count: int) -> FloatArray:
+        """Return an array for so many nodes."""
+        return np.empty((count, node_width(self.laws)))
 
     def run(self, end: float) -> Record:
         """Integrate to time `end`, s."""
@@ -221,7 +248,7 @@ class Problem:
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
         contact_capacity = _CONTACTS + int(flights)
         while True:
-            nodes, contacts = np.empty((capacity, 5)), np.empty((contact_capacity, 7))
+            nodes, contacts = self.room(capacity), np.empty((contact_capacity, 7))
             status, used, touched, steps = self._advance(
                 end, self.max_steps or MAX_STEPS, self.drive_arrays(), nodes, contacts, fresh_carry()
             )
@@ -270,7 +297,7 @@ class Problem:
                 capacity *= 4
 
     def _stretches(self, end: float, capacity: int) -> Iterator[Stretch]:
-        drive, nodes, contacts = self.drive_arrays(), np.empty((capacity, 5)), np.empty((capacity, 7))
+        drive, nodes, contacts = self.drive_arrays(), self.room(capacity), np.empty((capacity, 7))
         state = fresh_carry(max(capacity // 2, 2))
         status = PAUSED
         while status == PAUSED:
@@ -285,7 +312,7 @@ class Problem:
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
         """Return states and forces, shape (n, 10), at ascending times, s; see the kernel's `resample`."""
-        out = np.empty((times.size, 10))
+        out = np.empty((times.size, self.columns))
         self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out
 
@@ -297,7 +324,7 @@ class Problem:
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
         """Return work of coil and drive force, losses in pack, backstop, damping [J], shape (n, 5)."""
-        out = np.empty((len(steps), 5))
+        out = np.empty((len(steps), 9 if self.laws.circuit else 5))
         self.kernel.quadratures(
             np.ascontiguousarray(steps, np.int64),
             np.ascontiguousarray(starts, np.float64),

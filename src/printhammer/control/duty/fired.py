@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from printhammer.control.duty.heat import REFERENCE, DotHeat
+from printhammer.control.duty.heat import DotHeat
 from printhammer.errors import InputError
+from printhammer.parts.coil.winding import REFERENCE
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer

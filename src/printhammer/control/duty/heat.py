@@ -14,12 +14,7 @@ import numpy as np
 
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
-
-COPPER: Final = 0.00393
-"""Change of the resistance of copper with temperature, in parts of that at 20 degC, 1/K."""
-
-REFERENCE: Final = 20.0
-"""Temperature at which a resistance is given, degC."""
+from printhammer.parts.coil.winding import COPPER, REFERENCE
 
 COLDEST: Final = REFERENCE - 1.0 / COPPER
 """Temperature at which the straight line of the resistance would reach zero, degC."""

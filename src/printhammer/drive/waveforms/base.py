@@ -1,9 +1,9 @@
-"""What every current or force waveform has in common; the shapes are in `waveforms`."""
+"""What every waveform of a current, a force or a voltage has in common; the shapes are in `waveforms`."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -16,19 +16,38 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-QuantityName = Literal["current", "force"]
-QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force"}
+QuantityName = Literal["current", "force", "voltage"]
+QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force", "V": "voltage"}
 """What a waveform drives, by the SI unit of its amplitude."""
+UNITS: Final = {driven: unit for unit, driven in QUANTITY_UNITS.items()}
+"""The SI unit of what is driven."""
 
 DECAY_TIMES: Final = 27.6310211159
 """Number of decay time constants after which a decaying current is zero by definition: 1e-12 is left then."""
 
 
+class Supply(NamedTuple):
+    """A supply of a voltage, see `printhammer.kernel.model.layout`."""
+
+    diode: float = 0.0
+    """Voltage of the diode in which a chopped current circulates, V."""
+    series: float = 0.0
+    """Resistance in series with an ideal source, ohm."""
+    capacitance: float = 0.0
+    """Of a reservoir, F."""
+    charging: float = 0.0
+    """Resistance from which that is charged, ohm."""
+    charged: float = 0.0
+    """Voltage to which it is charged, V."""
+    coils: float = 1.0
+    """Number of equal coils on it."""
+
+
 class Waveform(BaseModel):
     """What one fired pulse does, as a function of tau, the time since its firing.
 
-    Numbers are SI; a string with a unit ("350 us") is taken as well. An amplitude in N makes it a force
-    waveform.
+    Numbers are SI; a string with a unit ("350 us") is taken as well. An amplitude in N makes it a force, one
+    in V a voltage across a coil with its circuit.
 
     Raises
     ------
@@ -39,6 +58,8 @@ class Waveform(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     shape: ClassVar[str]
+    replaces: ClassVar[bool] = False
+    """Whether the latest firing always replaces those before it."""
     quantity: QuantityName = "current"
 
     if not TYPE_CHECKING:
@@ -100,8 +121,12 @@ class Waveform(BaseModel):
 
     @property
     def unit(self) -> str:
-        """SI unit of the values, "A" or "N"."""
-        return "A" if self.quantity == "current" else "N"
+        """SI unit of the values, "A", "N" or "V"."""
+        return UNITS[self.quantity]
+
+    def supply(self) -> Supply:
+        """Return what the kernel has to know of the supply of a voltage: an ideal source."""
+        return Supply()
 
     def content(self) -> dict[str, FloatArray]:
         """Return the arrays that identify the waveform beside its fields: none for a formula."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, Self
 from printhammer.drive.segments import EXPONENTIAL, POLYNOMIAL, SINE, table
 from printhammer.drive.waveforms.base import DECAY_TIMES, QUANTITY_UNITS, QuantityName, Waveform
 from printhammer.drive.waveforms.chain import Chain
+from printhammer.drive.waveforms.drivers import DRIVERS
 from printhammer.drive.waveforms.sampled import Sampled
 from printhammer.drive.waveforms.switched import Switched
 from printhammer.support.constants import quantity
@@ -44,7 +45,7 @@ def _rate(time_constant: float) -> float:
 class _Pulse(Waveform):
     """A pulse with an amplitude."""
 
-    amplitude: float = quantity("A", "I", "amplitude of the pulse", also=("N",))
+    amplitude: float = quantity("A", "I", "amplitude of the pulse", also=("N", "V"))
 
     def scaled(self, factor: float) -> Self:
         """Return the same pulse with its amplitude multiplied by a factor."""
@@ -125,7 +126,7 @@ class Sine(_Pulse):
         return table([(0.0, SINE, 0.0, self.amplitude, 2.0 * math.pi * self.frequency, self.phase)], math.inf)
 
 
-SHAPES: Final[dict[str, type[Waveform]]] = {
-    shape.shape: shape for shape in (HalfSine, Rectangle, Trapezoid, Sampled)
-}
+_PULSES: Final[tuple[type[Waveform], ...]] = (HalfSine, Rectangle, Trapezoid, Sampled)
+
+SHAPES: Final[dict[str, type[Waveform]]] = {shape.shape: shape for shape in (*_PULSES, *DRIVERS)}
 """Shape of a pulse as a file names it, to its class."""

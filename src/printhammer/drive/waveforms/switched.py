@@ -51,7 +51,7 @@ class Switched(Waveform):
     at: tuple[float, ...]
     levels: tuple[float, ...]
     edge: float = quantity("s", "tau", "time constant of the edges", gt=0.0)
-    initial: float = quantity("A", "I0", "value at the firing", also=("N",), default=0.0)
+    initial: float = quantity("A", "I0", "value at the firing", also=("N", "V"), default=0.0)
 
     @model_validator(mode="before")
     @classmethod

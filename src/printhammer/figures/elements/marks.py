@@ -229,13 +229,13 @@ def drive_strip(
 
     Each at its times, s, in its colour; if they differ in what is driven, the first decides.
     """
-    quantity = motions[0].drive.quantity
+    quantity = motions[0].driven
     time, value = scale("time", until), scale(quantity)
     low, high = 0.0, 0.0
     for number, (motion, grid, colour) in enumerate(zip(motions, times, colours, strict=True)):
-        if motion.drive.quantity != quantity:
+        if motion.driven != quantity:
             continue
-        values = value.shown(motion.drive.value(grid))
+        values = value.shown(motion.driven_at(grid))
         low, high = min(low, float(values.min())), max(high, float(values.max()))
         gid = f"{quantity} {number + 1}" if len(motions) > 1 else str(quantity)
         curve(ax, time.shown(grid), values, gid, colour, lw=THIN)

@@ -27,13 +27,16 @@ if TYPE_CHECKING:
 
 TEMPLATES = (
     "model.pulses",
+    "model.circuit",
     "model.forces",
     "methods.nystrom8",
     "methods.dop853",
+    "methods.crossing",
     "methods.landing",
     "methods.contact",
     "single.record",
     "single.rest",
+    "single.around",
     "single.run",
     "single.resample",
     "methods.quadrature",
@@ -67,7 +70,14 @@ _PLAIN = (
 )
 
 _LAW_FUNCTIONS = {
-    "magnet": ("magnet_force", "magnet_energy"),
+    "magnet": (
+        "magnet_force",
+        "magnet_energy",
+        "magnet_linkage",
+        "magnet_emf",
+        "magnet_inductance",
+        "magnet_current",
+    ),
     "spring": ("spring_force", "spring_energy"),
     "pack": ("pack_loading", "pack_memory", "pack_unloading", "pack_switch"),
     "backstop": (
@@ -173,6 +183,7 @@ def law_bindings(laws: Laws) -> tuple[dict[str, Any], bytes]:
         if role == "backstop":
             bindings["RIGID"] = bool(getattr(module, "RIGID", False))
     bindings["FORCE_DRIVE"] = laws.force_drive
+    bindings["HAS_CIRCUIT"] = laws.circuit
     bindings["PACK_PULLS"] = laws.pack_pulls
     bindings["BACKSTOP_PULLS"] = laws.backstop_pulls
     bindings["RELOAD_ALONG_UNLOADING"] = laws.reload_along_unloading
@@ -207,6 +218,8 @@ def _specialised(laws: Laws) -> Kernel:
     }
     parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
     label = f"laws {', '.join(parts)}" if parts else "a free mass"
+    if laws.circuit:
+        label += " with the coil's circuit"
     kernel = execute_all(TEMPLATES, namespace, sources, label)
     kernel.laws = laws
     return kernel

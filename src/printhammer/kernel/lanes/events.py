@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer, pack_force
     from printhammer.kernel.model.laws import HAS_DAMPING, RELOAD_ALONG_UNLOADING, pack_memory
     from printhammer.kernel.model.pulses import Drive, edges_at
+    from printhammer.kernel.single.around import contact_unit
     from printhammer.kernel.single.resample import state_in_step
-    from printhammer.kernel.single.run import contact_unit
     from printhammer.kernel.single.stretch import firing_before
 
 MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer, acceleration
     from printhammer.kernel.model.laws import CUBIC, SINE
     from printhammer.kernel.model.pulses import edges_at
-    from printhammer.kernel.single.run import first_mode
+    from printhammer.kernel.single.around import first_mode
     from printhammer.kernel.single.stretch import blank_states, clear_dots
 
 

@@ -9,12 +9,14 @@ from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.methods.hermite import position_root, rises_through
 from printhammer.kernel.methods.landing import FAILED, step_factor
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET, Control
+from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET, POSITION, Control
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.methods.crossing import closes, contact_gap_and_change, land_on_gap_in_contact
+    from printhammer.kernel.methods.dop853 import contact_step, whole_contact_step
+    from printhammer.kernel.model.circuit import Electric, electric_rates, fastest_rate, moved
     from printhammer.kernel.model.forces import Hammer, backstop_acceleration
-    from printhammer.kernel.model.laws import BACKSTOP_PULLS, backstop_elastic, backstop_switch
+    from printhammer.kernel.model.laws import BACKSTOP_PULLS, HAS_CIRCUIT, backstop_elastic, backstop_switch
     from printhammer.kernel.model.pulses import Drive
 
 ContactState = Any
@@ -30,9 +32,66 @@ def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> 
     return 2.0 * w * backstop_acceleration(t, w, v, hammer, drive)
 
 
+@compiled
+def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
+    """Return the ds after which a time `left` [s] has passed where a force holds the armature there.
+
+    The root of 2 w ds - v ds^2 - kv ds^3 / 3 = left, whose left side rises throughout.
+    """
+    ds = 0.0
+    for _ in range(60):
+        rest = left - ds * (2.0 * w - ds * (v + ds * kv / 3.0))
+        change = rest / (2.0 * (w - ds * (v + 0.5 * ds * kv)))
+        ds += change
+        if abs(change) <= 1e-12 * ds:
+            break
+    return ds
+
+
+@compiled
+def length_of(left: float, w: float, v: float, kv: float) -> float:
+    """Return about the ds after which a time `left` [s] has passed in the backstop, for a correction of s.
+
+    It solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; the next term
+    is added where it counts and the armature does not leave.
+    """
+    under_root = max(w * w - v * left, 0.0)
+    if w > 0.0 and under_root > 0.0:
+        change = left / (w + math.sqrt(under_root))
+    else:
+        change = (w - math.sqrt(under_root)) / v if v != 0.0 else 0.0
+    stays = w > 0.0 and kv < 0.0 and (v <= 0.0 or v * v + kv * w < 0.0)
+    if stays and -kv * change * change * change > left > 0.0:
+        return length_while_pushed_in(left, w, v, kv)
+    return change
+
+
+@compiled
+def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
+
+    A time after that of leaving gives the s of leaving.
+    """
+    left = t - t0
+    if left <= 0.0:
+        return 0.0
+    s = 0.0
+    t1, w1, v1, kv1 = t0, w0, v0, kv0
+    for _ in range(12):
+        change = length_of(t - t1, w1, v1, kv1)
+        s += change
+        if abs(change) <= 1e-15 * s:
+            break
+        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, M.ANY_SCALES)
+    return s
+
+
 @inlined
-def longest_contact_step(w: float, hammer: Hammer) -> float:
-    """Return the step length in s that the stiffness of the contact at compression ``w**2`` allows."""
+def longest_contact_step(w: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the step length in s that the stiffness of the contact at compression ``w**2`` allows.
+
+    And the circuit of the coil, if there is one.
+    """
     if w <= 0.0:
         return math.inf
     stretch = 1.01 * w
@@ -40,9 +99,13 @@ def longest_contact_step(w: float, hammer: Hammer) -> float:
         backstop_elastic(hammer[BACKSTOP_PART:MAGNET], stretch)
         - backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w)
     )
-    if not softness > 0.0:
-        return math.inf
-    return PHASE_LIMIT * math.sqrt(softness / hammer[INVERSE_MASS]) / (2.0 * w)
+    longest = math.inf
+    if softness > 0.0:
+        longest = PHASE_LIMIT * math.sqrt(softness / hammer[INVERSE_MASS]) / (2.0 * w)
+    if HAS_CIRCUIT:
+        rate = fastest_rate(hammer[POSITION] - w * w, drive[1], hammer, drive[0])
+        longest = min(longest, PHASE_LIMIT / (2.0 * w * rate) if rate > 0.0 else math.inf)
+    return longest
 
 
 @compiled
@@ -154,21 +217,33 @@ def contact_switch(
     return switch, end
 
 
+@compiled
+def electric_in_contact(
+    start: ContactState, t: float, hammer: Hammer, drive: Drive
+) -> tuple[float, Electric]:
+    """Return the s after which a step in the backstop reaches time `t` [s], and the electric state there."""
+    s = s_at(t, start[0], start[1], start[2], start[3], hammer, drive)
+    step = whole_contact_step(start[0], start[1], start[2], start[3], s, hammer, drive, M.ANY_SCALES)
+    rest = t - step[0]
+    rates = electric_rates(step[0], hammer[POSITION] - step[1] * step[1], step[2], step[5], hammer, drive[0])
+    return s, moved(step[5], rest, rates)
+
+
 @inlined
 def advance_contact(
     start: ContactState, h: float, t_next: float, hammer: Hammer, drive: Drive, control: Control
-) -> tuple[int, ContactState, float]:
+) -> tuple[int, ContactState, float, Electric]:
     """Take one accepted step in the backstop, at most to `t_next`, ending on the first switch.
 
     Returns
     -------
     tuple
-        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP or PUSH_ENDED), the state there, the
-        next step length in s.
+        The switch (EDGE at `t_next`, NO_SWITCH, FAILED, LEFT_BACKSTOP, PUSH_ENDED or CIRCUIT), the state
+        there, the next step length in s, and the electric state there.
     """
     t, w, v, kv = start
     shortest = 1e-14 * math.sqrt(control[0]) / control[1]
-    limit = longest_contact_step(w, hammer)
+    limit = longest_contact_step(w, hammer, drive)
     while True:
         h = min(h, limit)
         # A step far beyond the next edge would be wasted.
@@ -178,12 +253,12 @@ def advance_contact(
         elif v < 0.0 and h > 1.01 * reach:
             h = 1.01 * reach
         scales = contact_scales(w, v, h, control)
-        t1, w1, v1, kv1, error = contact_step(t, w, v, kv, h, hammer, drive, scales)
+        t1, w1, v1, kv1, error, electric = whole_contact_step(t, w, v, kv, h, hammer, drive, scales)
         ratio = error / control[3]
         if not ratio <= 1.0:
             h *= step_factor(ratio)
             if h < shortest:
-                return FAILED, start, h
+                return FAILED, start, h, electric
             continue
         code = rises_through(-w, v, kv, -w1, v1, kv1, h, 0.0)
         if code in (M.UNRESOLVED, M.NEAR_TOUCH):
@@ -192,5 +267,19 @@ def advance_contact(
                 continue
             code = M.NO_SWITCH
         end = (t1, w1, v1, kv1)
+        following = h * step_factor(ratio)
         switch, end = contact_switch(start, end, h, code == M.REACHED_FRONT, t_next, hammer, drive, control)
-        return switch, end, h * step_factor(ratio)
+        if HAS_CIRCUIT:
+            span = h
+            if end[0] != t1:
+                span, electric = electric_in_contact(start, end[0], hammer, drive)
+            g0, d0 = contact_gap_and_change(t, w, v, kv, drive[1], span, hammer, drive[0])
+            g1, d1 = contact_gap_and_change(end[0], end[1], end[2], end[3], electric, span, hammer, drive[0])
+            code = closes(g0, d0, g1, d1)
+            if code == M.UNRESOLVED and h > shortest:
+                h *= 0.5
+                continue
+            if code == M.REACHED_FRONT:
+                t1, w1, v1, kv1, electric = land_on_gap_in_contact(start, span, hammer, drive)
+                switch, end = M.CIRCUIT, (t1, w1, v1, kv1)
+        return switch, end, following, electric

@@ -6,7 +6,7 @@ sqrt(delta) and a new independent variable s, dt = 2 w ds, the motion obeys
     dw/ds = -v,    dv/ds = 2 w a,    dt/ds = 2 w,
 
 whose right-hand sides are smooth: the contact force is a polynomial in w, and leaving the backstop is a plain
-crossing of w = 0.
+crossing of w = 0. Where there is a coil circuit, its electric state is integrated with the motion.
 """
 
 from __future__ import annotations
@@ -16,14 +16,26 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.methods import dop853_tableau as T
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import (
+    CHARGED,
+    CURRENT_SCALE,
+    LINKAGE_SCALE,
+    POSITION,
+    RESISTANCE,
+)
 
 if TYPE_CHECKING:
     Numbers = tuple[float, ...]
-    Three = tuple[float, float, float]
 
+    from printhammer.kernel.model.circuit import Electric, driven, electric_rates
     from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
+    from printhammer.kernel.model.laws import HAS_CIRCUIT
     from printhammer.kernel.model.layout import ForceLaw
     from printhammer.kernel.model.pulses import Drive
+
+Point = Any
+"""Time, displacement or w, velocity, and the electric state where there is a circuit."""
 
 
 @compiled
@@ -35,102 +47,177 @@ def combined_error(e5: float, e3: float) -> float:
 
 
 @inlined
-def plus(total: Three, c: float, k: Three) -> Three:
+def plus(total: Point, c: float, k: Point) -> Point:
     """Return a sum of slopes and one more, times its weight."""
+    if HAS_CIRCUIT:
+        return (
+            total[0] + c * k[0],
+            total[1] + c * k[1],
+            total[2] + c * k[2],
+            total[3] + c * k[3],
+            total[4] + c * k[4],
+            total[5] + c * k[5],
+        )
     return total[0] + c * k[0], total[1] + c * k[1], total[2] + c * k[2]
 
 
 @inlined
-def _sum1(c: Numbers, k1: Three) -> Three:
+def _sum1(c: Numbers, k1: Point) -> Point:
     """Return the first slope times its weight; the functions that follow add up more."""
+    if HAS_CIRCUIT:
+        return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2], c[0] * k1[3], c[0] * k1[4], c[0] * k1[5]
     return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2]
 
 
 @inlined
-def _sum2(c: Numbers, k1: Three, k2: Three) -> Three:
+def _sum2(c: Numbers, k1: Point, k2: Point) -> Point:
     return plus(_sum1(c, k1), c[1], k2)
 
 
 @inlined
-def _sum3(c: Numbers, k1: Three, k2: Three, k3: Three) -> Three:
+def _sum3(c: Numbers, k1: Point, k2: Point, k3: Point) -> Point:
     return plus(_sum2(c, k1, k2), c[2], k3)
 
 
 @inlined
-def _sum4(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three) -> Three:
+def _sum4(c: Numbers, k1: Point, k2: Point, k3: Point, k4: Point) -> Point:
     return plus(_sum3(c, k1, k2, k3), c[3], k4)
 
 
 @inlined
-def _sum5(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three) -> Three:
+def _sum5(c: Numbers, k1: Point, k2: Point, k3: Point, k4: Point, k5: Point) -> Point:
     return plus(_sum4(c, k1, k2, k3, k4), c[4], k5)
 
 
 @inlined
-def _sum6(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three, k6: Three) -> Three:
+def _sum6(c: Numbers, k1: Point, k2: Point, k3: Point, k4: Point, k5: Point, k6: Point) -> Point:
     return plus(_sum5(c, k1, k2, k3, k4, k5), c[5], k6)
 
 
 @inlined
-def _sum7(c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three, k6: Three, k7: Three) -> Three:
+def _sum7(c: Numbers, k1: Point, k2: Point, k3: Point, k4: Point, k5: Point, k6: Point, k7: Point) -> Point:
     return plus(_sum6(c, k1, k2, k3, k4, k5, k6), c[6], k7)
 
 
 @inlined
 def _sum8(
-    c: Numbers, k1: Three, k2: Three, k3: Three, k4: Three, k5: Three, k6: Three, k7: Three, k8: Three
-) -> Three:
+    c: Numbers, k1: Point, k2: Point, k3: Point, k4: Point, k5: Point, k6: Point, k7: Point, k8: Point
+) -> Point:
     return plus(_sum7(c, k1, k2, k3, k4, k5, k6, k7), c[7], k8)
 
 
 @inlined
 def _sum9(
     c: Numbers,
-    k1: Three,
-    k2: Three,
-    k3: Three,
-    k4: Three,
-    k5: Three,
-    k6: Three,
-    k7: Three,
-    k8: Three,
-    k9: Three,
-) -> Three:
+    k1: Point,
+    k2: Point,
+    k3: Point,
+    k4: Point,
+    k5: Point,
+    k6: Point,
+    k7: Point,
+    k8: Point,
+    k9: Point,
+) -> Point:
     return plus(_sum8(c, k1, k2, k3, k4, k5, k6, k7, k8), c[8], k9)
 
 
 @inlined
-def along(y: Three, h: float, slope: Three) -> Three:
+def along(y: Point, h: float, slope: Point) -> Point:
     """Return the state a step of `h` along a slope from `y`."""
+    if HAS_CIRCUIT:
+        return (
+            y[0] + h * slope[0],
+            y[1] + h * slope[1],
+            y[2] + h * slope[2],
+            y[3] + h * slope[3],
+            y[4] + h * slope[4],
+            y[5] + h * slope[5],
+        )
     return y[0] + h * slope[0], y[1] + h * slope[1], y[2] + h * slope[2]
 
 
 @inlined
-def time_slope(t: float, y: Three, law: ForceLaw) -> Three:
+def point(t: float, place: float, v: float, drive: Drive) -> Point:
+    """Return a state, of which the electric part comes with the drive."""
+    if HAS_CIRCUIT:
+        electric = drive[1]
+        return t, place, v, electric[0], electric[1], electric[2]
+    return t, place, v
+
+
+@inlined
+def electric_of(y: Point) -> Electric:
+    """Return the electric part of a state."""
+    if HAS_CIRCUIT:
+        return y[3], y[4], y[5]
+    return ()
+
+
+@inlined
+def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
     """Return the rates of time, position and velocity; `t` is exact where the time in `y` is a sum."""
     mode, memory, hammer, drive = law
+    if HAS_CIRCUIT:
+        electric = electric_of(y)
+        rates = electric_rates(t, y[1], y[2], electric, hammer, drive[0])
+        if M.RESTING <= mode <= M.HELD_UNLOADING:
+            return 1.0, 0.0, 0.0, rates[0], rates[1], rates[2]
+        a = acceleration(t, y[1], y[2], mode, memory, hammer, driven(drive[0], electric))
+        return 1.0, y[2], a, rates[0], rates[1], rates[2]
     return 1.0, y[2], acceleration(t, y[1], y[2], mode, memory, hammer, drive)
 
 
 @inlined
-def contact_slope(y: Three, hammer: Hammer, drive: Drive) -> Three:
+def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
     """Return the derivatives of time, w and velocity with s."""
     pace = 2.0 * y[1]
+    if HAS_CIRCUIT:
+        electric, live = electric_of(y), drive[0]
+        rates = electric_rates(y[0], hammer[POSITION] - y[1] * y[1], y[2], electric, hammer, live)
+        rate = pace * backstop_acceleration(y[0], y[1], y[2], hammer, driven(live, electric))
+        return pace, -y[2], rate, pace * rates[0], pace * rates[1], pace * rates[2]
     return pace, -y[2], pace * backstop_acceleration(y[0], y[1], y[2], hammer, drive)
 
 
 @inlined
-def time_step(
-    t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
-) -> tuple[float, float, float, float, float]:
-    """Advance position and velocity by `h` [s]; for accelerations that depend on the velocity.
+def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
+    """Return the slopes at the start of a step, of which the first three are known."""
+    if HAS_CIRCUIT:
+        return time_slope(y[0], y, law)
+    return 1.0, place_rate, rate
 
-    Returns
-    -------
-    tuple of float
-        Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and their error estimates.
-    """
-    y, k1 = (t0, x0, v0), (1.0, v0, a0)
+
+@inlined
+def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Point:
+    """Return the slopes at the start of a step in the backstop, of which the first three are known."""
+    if HAS_CIRCUIT:
+        return contact_slope(y, hammer, drive)
+    return 2.0 * y[1], -y[2], rate
+
+
+@inlined
+def electric_error(e5: Point, e3: Point, h: float, hammer: Hammer) -> float:
+    """Return the error estimate of the electric state in units of its scales."""
+    if HAS_CIRCUIT:
+        linkage = hammer[LINKAGE_SCALE]
+        voltage = max(hammer[CHARGED], hammer[RESISTANCE] * hammer[CURRENT_SCALE])
+        worst = max(
+            abs(combined_error(h * e5[3], h * e3[3])) / linkage,
+            abs(combined_error(h * e5[4], h * e3[4])) / linkage,
+            abs(combined_error(h * e5[5], h * e3[5])) / voltage,
+        )
+        return float(worst)
+    return 0.0
+
+
+@inlined
+def whole_time_step(
+    t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
+) -> tuple[float, float, float, float, float, Electric, float]:
+    """Do as `time_step`; return also the electric state at the end, and its error in units of its scales."""
+    y = point(t0, x0, v0, law.drive)
+    k1 = slope_at(y, v0, a0, law)
     y2 = along(y, h, _sum1(T.A02, k1))
     k2 = time_slope(t0 + T.C02 * h, y2, law)
     y3 = along(y, h, _sum2(T.A03, k1, k2))
@@ -153,26 +240,37 @@ def time_step(
     k11 = time_slope(t0 + T.C11 * h, y11, law)
     y12 = along(y, h, _sum9(T.A12, k1, k4, k5, k6, k7, k8, k9, k10, k11))
     k12 = time_slope(t0 + h, y12, law)
-    _t, x, v = along(y, h, _sum8(T.B, k1, k6, k7, k8, k9, k10, k11, k12))
-    a = time_slope(t0 + h, (t0, x, v), law)[2]
+    end = along(y, h, _sum8(T.B, k1, k6, k7, k8, k9, k10, k11, k12))
+    x, v = end[1], end[2]
+    a = time_slope(t0 + h, end, law)[2]
     e5, e3 = _sum8(T.E5, k1, k6, k7, k8, k9, k10, k11, k12), _sum8(T.E3, k1, k6, k7, k8, k9, k10, k11, k12)
     error_x = combined_error(h * e5[1], h * e3[1])
-    return x, v, a, error_x, combined_error(h * e5[2], h * e3[2])
+    error_e = electric_error(e5, e3, h, law.hammer)
+    return x, v, a, error_x, combined_error(h * e5[2], h * e3[2]), electric_of(end), error_e
 
 
 @inlined
-def contact_step(
-    t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
+def time_step(
+    t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float]:
-    """Advance time, w and velocity in the backstop by `h` in s, from a state whose dv/ds is `kv0`.
+    """Advance position and velocity by `h` [s]; for accelerations that depend on the velocity.
 
     Returns
     -------
     tuple of float
-        Time [s], w [m^0.5], velocity [m/s] and dv/ds at the end, and the error estimate, the sum of those of
-        time, w and velocity in units of `scales`.
+        Position [m], velocity [m/s] and acceleration [m/s^2] at the end, and their error estimates.
     """
-    y, k1 = (t0, w0, v0), (2.0 * w0, -v0, kv0)
+    x, v, a, error_x, error_v, _electric, _error_e = whole_time_step(t0, x0, v0, a0, h, law)
+    return x, v, a, error_x, error_v
+
+
+@inlined
+def whole_contact_step(
+    t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
+) -> tuple[float, float, float, float, float, Electric]:
+    """Do as `contact_step`; return also the electric state, whose error is part of the estimate."""
+    y = point(t0, w0, v0, drive)
+    k1 = contact_slope_at(y, kv0, hammer, drive)
     k2 = contact_slope(along(y, h, _sum1(T.A02, k1)), hammer, drive)
     k3 = contact_slope(along(y, h, _sum2(T.A03, k1, k2)), hammer, drive)
     k4 = contact_slope(along(y, h, _sum2(T.A04, k1, k3)), hammer, drive)
@@ -189,4 +287,21 @@ def contact_step(
     e5, e3 = _sum8(T.E5, k1, k6, k7, k8, k9, k10, k11, k12), _sum8(T.E3, k1, k6, k7, k8, k9, k10, k11, k12)
     error5 = abs(h * e5[0]) / scales[0] + abs(h * e5[1]) / scales[1] + abs(h * e5[2]) / scales[2]
     error3 = abs(h * e3[0]) / scales[0] + abs(h * e3[1]) / scales[1] + abs(h * e3[2]) / scales[2]
-    return end[0], end[1], end[2], kv, combined_error(error5, error3)
+    error = combined_error(error5, error3) + electric_error(e5, e3, h, hammer)
+    return end[0], end[1], end[2], kv, error, electric_of(end)
+
+
+@inlined
+def contact_step(
+    t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
+) -> tuple[float, float, float, float, float]:
+    """Advance time, w and velocity in the backstop by `h` in s, from a state whose dv/ds is `kv0`.
+
+    Returns
+    -------
+    tuple of float
+        Time [s], w [m^0.5], velocity [m/s] and dv/ds at the end, and the error estimate, the sum of those of
+        time, w and velocity in units of `scales`.
+    """
+    t, w, v, kv, error, _electric = whole_contact_step(t0, w0, v0, kv0, h, hammer, drive, scales)
+    return t, w, v, kv, error

@@ -17,12 +17,15 @@ from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, PACK, POSITION, Control, ForceLaw
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.dop853 import time_step
+    from printhammer.kernel.methods.crossing import circuit_switch
+    from printhammer.kernel.methods.dop853 import time_step, whole_time_step
     from printhammer.kernel.methods.nystrom8 import nystrom_step
+    from printhammer.kernel.model.circuit import Electric, fastest_rate
     from printhammer.kernel.model.forces import Hammer, acceleration
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
         HAS_BACKSTOP,
+        HAS_CIRCUIT,
         HAS_DAMPING,
         HAS_PACK,
         MEMORY,
@@ -41,7 +44,7 @@ FAILED = -1
 @inlined
 def takes_velocity(mode: int) -> bool:
     """Tell whether the force off the backstop depends on the velocity."""
-    return HAS_DAMPING or (HAS_PACK and not MEMORY and mode == M.LOADING)
+    return HAS_DAMPING or HAS_CIRCUIT or (HAS_PACK and not MEMORY and mode == M.LOADING)
 
 
 @inlined
@@ -54,18 +57,33 @@ def plain_step(
     return nystrom_step(t, x, v, a, h, law)
 
 
+@inlined
+def whole_step(
+    t: float, x: float, v: float, a: float, h: float, law: ForceLaw
+) -> tuple[float, float, float, float, float, Electric, float]:
+    """Do as `plain_step`; return also the electric state at the end, and its error in its scales."""
+    if HAS_CIRCUIT:
+        return whole_time_step(t, x, v, a, h, law)
+    x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)
+    return x1, v1, a1, error_x, error_v, (), 0.0
+
+
 @compiled
-def error_ratio(error_x: float, error_v: float, mode: int, control: Control) -> float:
+def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, control: Control) -> float:
     """Return the error estimate of a step over what is allowed; NaN stays NaN.
 
-    `control` is (scale of x, scale of v, allowance of the order 6 estimate, allowance of the order 7
-    estimate).
+    That of the electric state is in units of its scales. `control` is (scale of x, scale of v, allowance of
+    the order 6 estimate, allowance of the order 7 estimate).
     """
     ratio_x = abs(error_x) / control[0]
     ratio_v = abs(error_v) / control[1]
     worst = ratio_x if ratio_x > ratio_v else ratio_v
     if math.isnan(ratio_x):
         worst = ratio_x
+    if HAS_CIRCUIT:
+        worst = worst if worst > error_e else error_e
+        if math.isnan(error_e):
+            worst = error_e
     if takes_velocity(mode):
         return worst / control[3]
     if mode in (M.UNLOADING, M.RELOADING):
@@ -163,6 +181,9 @@ def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
         slow = 1e-5 * control[1]
         fall = acceleration(t, x, v - slow, mode, memory, hammer, drive)
         rate = abs(fall - acceleration(t, x, v + slow, mode, memory, hammer, drive)) / (2.0 * slow)
+        longest = min(longest, 2.0 / rate if rate > 0.0 else math.inf)
+    if HAS_CIRCUIT:
+        rate = fastest_rate(x, drive[1], hammer, drive[0])
         longest = min(longest, 2.0 / rate if rate > 0.0 else math.inf)
     return longest
 
@@ -268,14 +289,14 @@ def first_switch(
 @inlined
 def advance(
     start: State, h: float, t_next: float, law: ForceLaw, peak: float, control: Control
-) -> tuple[int, State, float]:
+) -> tuple[int, State, float, Electric]:
     """Take one accepted step from `start`, at most to `t_next`, ending on the first switch.
 
     Returns
     -------
     tuple
         The switch (EDGE at `t_next`, NO_SWITCH, FAILED, or its name), the state there, the next step length
-        [s].
+        [s], and the electric state there.
     """
     mode = law.mode
     t, x, v, a = start
@@ -286,12 +307,12 @@ def advance(
         at_edge = h >= t_next - t
         if at_edge:
             h = t_next - t
-        x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)
-        ratio = error_ratio(error_x, error_v, mode, control)
+        x1, v1, a1, error_x, error_v, electric, error_e = whole_step(t, x, v, a, h, law)
+        ratio = error_ratio(error_x, error_v, error_e, mode, control)
         if not ratio <= 1.0:
             h *= step_factor(ratio)
             if h < shortest:
-                return FAILED, start, h
+                return FAILED, start, h, electric
             continue
         end = (t_next if at_edge else t + h, x1, v1, a1)
         switch, fraction, upper, level, sign = first_switch(start, end, h, law, peak, control)
@@ -311,4 +332,13 @@ def advance(
         if may_let_go and end[0] > t and lets_go_or_takes_hold(end[1], end[2], mode, law.hammer):
             end = land_on_push(start, h, min(1.0, (end[0] - t) / h), law, control)
             switch = M.PUSH_BEGAN if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else M.PUSH_ENDED
-        return switch, end, following
+        if HAS_CIRCUIT:
+            if switch not in (M.NO_SWITCH, M.EDGE):
+                electric = whole_time_step(t, x, v, a, end[0] - t, law)[5]
+            code, end, electric = circuit_switch(start, end, electric, law, control)
+            if code == M.UNRESOLVED and h > shortest:
+                h *= 0.5
+                continue
+            if code in (M.CIRCUIT, M.REST_ENDED):
+                switch = code
+        return switch, end, following, electric

@@ -11,30 +11,47 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
 from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.circuit import BLOCKED, CHOPPED
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
+    CAPACITANCE,
+    CHARGED,
+    CHARGING,
+    COILS,
     DAMPING,
+    DECAY_PIECE,
     FRONT,
     INVERSE_MASS,
     MAGNET,
     POSITION,
+    RESERVOIR_PIECE,
+    RESISTANCE,
     SPRING,
+    TURN_RESISTANCE,
     Train,
 )
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.contact import contact_rate
+    from printhammer.kernel.methods.contact import contact_rate, s_at
     from printhammer.kernel.methods.dop853 import contact_step
-    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.circuit import (
+        coil_current,
+        kind_of,
+        magnetising_current,
+        path_of,
+        source_of,
+    )
+    from printhammer.kernel.model.forces import Hammer, pack_force, value_at
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
+        HAS_CIRCUIT,
         backstop_energy,
         backstop_viscous,
         damping_force,
         magnet_force,
     )
-    from printhammer.kernel.model.pulses import Drive, drive_value, edges_at, pass_edges
-    from printhammer.kernel.single.resample import memory_of, s_at, state_in_step
+    from printhammer.kernel.model.pulses import Drive, edges_at, pass_edges
+    from printhammer.kernel.single.resample import drive_at, drive_in_step, memory_of, state_in_step
 
 POINTS = (
     0.9602898564975363,
@@ -55,7 +72,7 @@ def powers(
     t: float, x: float, v: float, w: float, mode: int, memory: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, float]:
     """Return the powers [W] of coil and drive force, and those that pack, backstop and damping take away."""
-    value = drive_value(t, drive)
+    value = value_at(t, x, hammer, drive)
     coil = 0.0
     force = 0.0
     if FORCE_DRIVE:
@@ -69,6 +86,39 @@ def powers(
         backstop = -backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) * v
     damping = -damping_force(hammer[DAMPING:SPRING], v) * v
     return coil, force, pack, backstop, damping
+
+
+@compiled
+def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[float, float, float, float]:
+    """Return the powers [W] that the supply gives, and that coil, driver and shorted turn turn into heat.
+
+    A supply's own resistance and the diodes are the driver's.
+    """
+    live, electric = drive
+    current = coil_current(x, electric, hammer, live)
+    turn = 0.0
+    if hammer[TURN_RESISTANCE] > 0.0:
+        around = magnetising_current(x, electric, hammer, live) - current
+        turn = hammer[TURN_RESISTANCE] * around * around
+    supply, driver = 0.0, 0.0
+    if hammer[CAPACITANCE] > 0.0:
+        # Of a reservoir for several coils the part of one.
+        charging = (hammer[CHARGED] - electric[2]) / hammer[CHARGING]
+        supply += hammer[CHARGED] * charging / hammer[COILS]
+        driver += hammer[CHARGING] * charging * charging / hammer[COILS]
+    if path_of(live) == BLOCKED:
+        return supply, 0.0, driver, turn
+    voltage, series = source_of(t, electric, hammer, live)
+    kind = kind_of(live)
+    if kind == DECAY_PIECE:
+        supply += live[6] * voltage * current
+        driver -= (1.0 - live[6]) * voltage * current
+    elif path_of(live) == CHOPPED:
+        driver -= voltage * current
+    elif kind != RESERVOIR_PIECE:
+        supply += voltage * current
+    driver += series * current * current
+    return supply, hammer[RESISTANCE] * current * current, driver, turn
 
 
 @compiled
@@ -89,6 +139,8 @@ def quadratures(
 ) -> None:
     """Fill `out`, shape (n, 5): work of coil and drive force, losses in pack, backstop and damping [J].
 
+    With a coil circuit (n, 9): work of the supply, losses in coil, driver and shorted turn.
+
     Parameters
     ----------
     steps : int64 array, shape (n,)
@@ -106,44 +158,49 @@ def quadratures(
             first, last, _edge = edges_at(nodes[i, 0], train)
         t0, x0, v0, mode, kept = nodes[i, 0], nodes[i, 1], nodes[i, 2], int(nodes[i, 3]), nodes[i, 4]
         first, last, _edge = pass_edges(t0, train, first, last)
-        for j in range(5):
+        for j in range(out.shape[1]):
             out[row, j] = 0.0
         if i + 1 < nodes.shape[0] and nodes[i + 1, 0] == t0 and nodes[i + 1, 1] == x0:
             # An impact on a rigid backstop.
             lost = 0.5 * (v0 * v0 - nodes[i + 1, 2] * nodes[i + 1, 2]) / hammer[INVERSE_MASS]
             out[row, 3] = lost if mode != M.BACKSTOP and x0 != hammer[FRONT] else 0.0
             continue
-        if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING) or ends[row] <= starts[row]:
+        resting = mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING)
+        if (resting and not HAS_CIRCUIT) or ends[row] <= starts[row]:
             continue
         memory = memory_of(mode, kept, hammer)
-        kv0 = contact_rate(kept, v0, t0, hammer, train.live) if mode == M.BACKSTOP else 0.0
+        start = drive_at(nodes[i], train.live)
+        kv0 = contact_rate(kept, v0, t0, hammer, start) if mode == M.BACKSTOP else 0.0
         regular = mode == M.BACKSTOP and not (kept == 0.0 and v0 == 0.0)
         low, high = starts[row], ends[row]
         if regular:
-            low = s_at(starts[row], t0, kept, v0, kv0, hammer, train.live)
-            high = s_at(ends[row], t0, kept, v0, kv0, hammer, train.live)
+            low = s_at(starts[row], t0, kept, v0, kv0, hammer, start)
+            high = s_at(ends[row], t0, kept, v0, kv0, hammer, start)
         for j in range(8):
             point = POINTS[j] if j < 4 else -POINTS[j - 4]
             weight = WEIGHTS[j] if j < 4 else WEIGHTS[j - 4]
             place = 0.5 * (low + high) + 0.5 * (high - low) * point
             share = 0.5 * (high - low) * weight
             if regular:
-                t, w, v, _kv, _error = contact_step(
-                    t0, kept, v0, kv0, place, hammer, train.live, M.ANY_SCALES
-                )
+                t, w, v, _kv, _error = contact_step(t0, kept, v0, kv0, place, hammer, start, M.ANY_SCALES)
                 x = hammer[POSITION] - w * w
                 share *= 2.0 * w
             else:
                 t = place
-                x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, train.live)
-            coil, force, pack, backstop, damping = powers(t, x, v, w, mode, memory, hammer, train.live)
+                x, v, w = state_in_step(t, t0, x0, v0, mode, kept, hammer, start)
+            drive = drive_in_step(t, nodes[i], hammer, start)
+            coil, force, pack, backstop, damping = powers(t, x, v, w, mode, memory, hammer, drive)
             out[row, 0] += share * coil
             out[row, 1] += share * force
             out[row, 2] += share * pack
             out[row, 3] += share * backstop
             out[row, 4] += share * damping
+            if HAS_CIRCUIT:
+                terms = electric_powers(t, x, hammer, drive)
+                for k in range(4):
+                    out[row, 5 + k] += share * terms[k]
         if mode == M.BACKSTOP_RELEASED:
             # The backstop has let go: what it still stores is lost as it creeps back.
-            first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, train.live)
-            last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, train.live)
+            first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, start)
+            last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, start)
             out[row, 3] = energy_behind(first_x, hammer) - energy_behind(last_x, hammer)

@@ -20,8 +20,10 @@ from printhammer.kernel.model.layout import (
 from printhammer.kernel.model.modes import LOADING, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
+    from printhammer.kernel.model.circuit import magnetising_current
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
+        HAS_CIRCUIT,
         HAS_DAMPING,
         HAS_PACK,
         backstop_elastic,
@@ -38,9 +40,17 @@ if TYPE_CHECKING:
 
 
 @inlined
+def value_at(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
+    """Return the value of the drive, or the current [A] that a coil circuit makes of it."""
+    if HAS_CIRCUIT:
+        return magnetising_current(x, drive[1], hammer, drive[0])
+    return drive_value(t, drive)
+
+
+@inlined
 def undamped_force(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
     """Return the sum of magnet, spring and drive force [N]."""
-    value = drive_value(t, drive)
+    value = value_at(t, x, hammer, drive)
     if FORCE_DRIVE:
         return magnet_force(hammer[MAGNET:], x, 0.0) + spring_force(hammer[SPRING:PACK], x) + value
     return magnet_force(hammer[MAGNET:], x, value) + spring_force(hammer[SPRING:PACK], x)

@@ -36,6 +36,8 @@ class Laws:
         Dotted name of the module from which every function that a part's module lacks is taken.
     force_drive : bool
         The drive is a force in newtons instead of a coil current in amperes.
+    circuit : bool
+        The drive is a voltage that acts on the circuit of the coil.
     pack_pulls, backstop_pulls : bool
         Whether the contact force may become tensile, as the printed law allows.
     reload_along_unloading : bool
@@ -50,6 +52,7 @@ class Laws:
     absent: str
     damping: str = ""
     force_drive: bool = False
+    circuit: bool = False
     pack_pulls: bool = True
     backstop_pulls: bool = True
     reload_along_unloading: bool = False
@@ -58,6 +61,7 @@ class Laws:
 HAS_PACK: bool
 HAS_BACKSTOP: bool
 HAS_DAMPING: bool
+HAS_CIRCUIT: bool
 MEMORY: bool
 RIGID: bool
 FORCE_DRIVE: bool
@@ -77,6 +81,14 @@ magnet_force: Law2
 """Net force of permanent magnet and coil [N] at a displacement [m] and a current [A]."""
 magnet_energy: Law1
 """Energy [J] at a displacement [m], of which minus the slope is the magnet force at zero current."""
+magnet_linkage: Law2
+"""Flux linkage [Wb] at a displacement [m] and a current [A], of the same coenergy as the force."""
+magnet_emf: Law2
+"""Its slope with displacement [Wb/m], which is that of the force with current [N/A]."""
+magnet_inductance: Law2
+"""Its slope with current [H]."""
+magnet_current: Law3
+"""Current [A] at a displacement [m] at which it and an inductance [H] make a flux linkage [Wb]."""
 spring_force: Law1
 """Force of the spring [N] at a displacement [m]."""
 spring_energy: Law1

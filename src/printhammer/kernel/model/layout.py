@@ -1,8 +1,8 @@
 """Where the constants of a hammer lie in the one array that the kernel works with.
 
 Inverse mass, position of the backstop and front of the pack come first, then the packed constants of damping,
-spring, pack, backstop and magnet, each from a fixed place on: sixteen places each, thirteen for the damping,
-the magnet's last and of any length.
+spring, pack, backstop, coil with its supply, and magnet, each from a fixed place on: sixteen places each,
+thirteen for the damping, the magnet's last and of any length.
 """
 
 from typing import Any, NamedTuple
@@ -14,13 +14,41 @@ DAMPING = 3
 SPRING = 16
 PACK = 32
 BACKSTOP_PART = 48
-MAGNET = 64
-PLACES = {"damping": DAMPING, "spring": SPRING, "pack": PACK, "backstop": BACKSTOP_PART, "magnet": MAGNET}
-ROOM = {"damping": SPRING - DAMPING, "spring": 16, "pack": 16, "backstop": 16}
+COIL = 64
+SUPPLY = 72
+MAGNET = 80
+PLACES = {
+    "damping": DAMPING,
+    "spring": SPRING,
+    "pack": PACK,
+    "backstop": BACKSTOP_PART,
+    "coil": COIL,
+    "magnet": MAGNET,
+}
+ROOM = {"damping": SPRING - DAMPING, "spring": 16, "pack": 16, "backstop": 16, "coil": SUPPLY - COIL}
 """Number of constants that a part may have; a magnet any."""
+
+# The coil, from COIL on.
+RESISTANCE, INDUCTANCE, TURN_RESISTANCE, LEAKAGE, COUPLED = range(COIL, COIL + 5)
+"""Resistance [ohm], constant inductance [H], resistance [ohm] and leakage [H] of a shorted turn, or 0, and
+whether the magnet's flux is linked: 1 or 0."""
+# Its supply, from SUPPLY on.
+DIODE, SERIES, CAPACITANCE, CHARGING, CHARGED, COILS, CURRENT_SCALE, LINKAGE_SCALE = range(SUPPLY, SUPPLY + 8)
+"""Voltage of the diode in which a chopped current circulates [V], resistance of an ideal source [ohm],
+capacitance of a reservoir [F] or 0, the resistance [ohm] and the voltage [V] from which it is charged, number
+of coils on it; typical current [A] and flux linkage [Wb], by which errors are measured."""
 
 CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
 """Kinds of the rows of a table of pieces, see `printhammer.kernel.model.pulses`; the last ends a waveform."""
+SWITCHED_PIECE, DECAY_PIECE, RESERVOIR_PIECE = 4.0, 5.0, 6.0
+"""Kinds of the rows of a driver, see `printhammer.kernel.model.circuit`."""
+
+
+NODE_WIDTH = 5
+"""Columns of a node of a record, see `printhammer.kernel.single.record`."""
+ELECTRIC = NODE_WIDTH
+"""First of the four further columns of a node in a kernel with a coil circuit: electric state and path."""
+CIRCUIT_NODE_WIDTH = NODE_WIDTH + 4
 
 
 class Train(NamedTuple):
@@ -37,7 +65,7 @@ class Train(NamedTuple):
     replace : bool
         Whether a firing cuts off the pulses before it.
     under_way : int64 array, shape (n,)
-    live : float64 array, shape (1 + 7 n,)
+    live : float64 array, shape (3 + 7 n,)
         Working space.
     """
 

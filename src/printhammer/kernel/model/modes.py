@@ -58,6 +58,10 @@ UNRESOLVED = 10
 """Not a switch: the step is too long to tell and has to be repeated with half its length."""
 NEAR_TOUCH = 11
 """Not a switch: an extremum within the margin of a boundary has to be located before one can tell."""
+CIRCUIT = 12
+"""The current of the coil takes another path."""
+REST_ENDED = 13
+"""The current of the coil moves an armature at rest."""
 
 # Statuses of a run.
 OK = 0

@@ -2,8 +2,10 @@
 
 A run that pauses fills it; the next call with the same array and drive continues to the bit as
 if there had been no pause. The caller sets `STATE` to `FRESH` for a run that begins; to `ON_BRANCH` for one
-that begins inside the pack on the branch `MODE` with the latest local maximum at `PEAK` [m]; and
-`PAUSE_AFTER` to the number of nodes after which to pause outside the pack.
+that begins inside the pack on the branch `MODE` with the latest local maximum at `PEAK` [m];
+`PAUSE_AFTER` to the number of nodes after which to pause outside the pack; and `WITH_CURRENT` to 1 for a run
+with a coil circuit that does not begin without current, but with the three numbers from `ELECTRIC` on and the
+path `PATH` (`printhammer.kernel.model.circuit`).
 """
 
 STATE = 0
@@ -30,7 +32,11 @@ FIRST = 20
 LAST = 21
 EDGE = 22
 STEPS = 23
-SIZE = 24
+ELECTRIC = 24
+PATH = 27
+UNTIL = 28
+WITH_CURRENT = 29
+SIZE = 30
 
 FRESH = 0.0
 GOES_ON = 1.0

@@ -2,8 +2,9 @@
 
 A node is ``[time, position, velocity, mode, memory]``: the mode and memory hold from this node to the next;
 memory is the displacement of the latest local maximum in the pack, w = sqrt(b - x) in the backstop, else
-zero. A contact is ``[surface, time in, velocity in, time out, velocity out, last node before it, open at the
-start]``; the time out of a contact that is open at the end is NaN.
+zero. Where there is a coil circuit, its electric state and the path of the current follow, see
+`printhammer.kernel.model.circuit`. A contact is ``[surface, time in, velocity in, time out, velocity out,
+last node before it, open at the start]``; the time out of a contact that is open at the end is NaN.
 
 The arrays are the caller's. Rows beyond their length are counted but not kept, all but the last: a caller
 that wants them all repeats the run with longer arrays, one that wants only the final state gives an array of
@@ -17,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model.layout import ELECTRIC
 from printhammer.kernel.model.modes import FREE
 
-NODE_WIDTH = 5
 CONTACT_WIDTH = 7
 
 Rows = Any
@@ -35,6 +36,15 @@ def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, me
     nodes[i, 3] = mode
     nodes[i, 4] = memory
     return used + 1
+
+
+@compiled
+def note_circuit(nodes: Rows, used: int, electric: Any, path: float) -> None:
+    """Give the latest node its electric state and the path of the current."""
+    i = min(used, nodes.shape[0]) - 1
+    for j in range(3):
+        nodes[i, ELECTRIC + j] = electric[j]
+    nodes[i, ELECTRIC + 3] = path
 
 
 @compiled

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
 from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.circuit import BLOCKED
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
     DAMPING,
+    ELECTRIC,
     MAGNET,
     PACK,
     POSITION,
@@ -23,12 +25,23 @@ from printhammer.kernel.model.layout import (
 )
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.contact import contact_rate
-    from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.methods.contact import contact_rate, electric_in_contact, s_at
+    from printhammer.kernel.methods.dop853 import contact_step, whole_time_step
     from printhammer.kernel.methods.landing import plain_step
-    from printhammer.kernel.model.forces import Hammer, acceleration, pack_force
+    from printhammer.kernel.model.circuit import (
+        Electric,
+        coil_current,
+        electric_rates,
+        moved,
+        open_rate,
+        path_of,
+        source_of,
+        take_path,
+    )
+    from printhammer.kernel.model.forces import Hammer, acceleration, pack_force, value_at
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
+        HAS_CIRCUIT,
         HAS_PACK,
         MEMORY,
         backstop_elastic,
@@ -38,7 +51,7 @@ if TYPE_CHECKING:
         pack_memory,
         spring_force,
     )
-    from printhammer.kernel.model.pulses import Drive, drive_value, edges_at, pass_edges
+    from printhammer.kernel.model.pulses import Drive, edges_at, pass_edges
 
 GOLDEN = 0.3819660112501051
 SAMPLES = 4
@@ -64,60 +77,6 @@ def branch_of(mode: int) -> int:
 
 
 @compiled
-def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Return the ds after which a time `left` [s] has passed where a force holds the armature there.
-
-    The root of 2 w ds - v ds^2 - kv ds^3 / 3 = left, whose left side rises throughout.
-    """
-    ds = 0.0
-    for _ in range(60):
-        rest = left - ds * (2.0 * w - ds * (v + ds * kv / 3.0))
-        change = rest / (2.0 * (w - ds * (v + 0.5 * ds * kv)))
-        ds += change
-        if abs(change) <= 1e-12 * ds:
-            break
-    return ds
-
-
-@compiled
-def length_of(left: float, w: float, v: float, kv: float) -> float:
-    """Return about the ds after which a time `left` [s] has passed in the backstop, for a correction of s.
-
-    It solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; the next term
-    is added where it counts and the armature does not leave.
-    """
-    under_root = max(w * w - v * left, 0.0)
-    if w > 0.0 and under_root > 0.0:
-        change = left / (w + math.sqrt(under_root))
-    else:
-        change = (w - math.sqrt(under_root)) / v if v != 0.0 else 0.0
-    stays = w > 0.0 and kv < 0.0 and (v <= 0.0 or v * v + kv * w < 0.0)
-    if stays and -kv * change * change * change > left > 0.0:
-        return length_while_pushed_in(left, w, v, kv)
-    return change
-
-
-@compiled
-def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
-
-    A time after that of leaving gives the s of leaving.
-    """
-    left = t - t0
-    if left <= 0.0:
-        return 0.0
-    s = 0.0
-    t1, w1, v1, kv1 = t0, w0, v0, kv0
-    for _ in range(12):
-        change = length_of(t - t1, w1, v1, kv1)
-        s += change
-        if abs(change) <= 1e-15 * s:
-            break
-        t1, w1, v1, kv1, _error = contact_step(t0, w0, v0, kv0, s, hammer, drive, M.ANY_SCALES)
-    return s
-
-
-@compiled
 def state_in_step(
     t: float, t0: float, x0: float, v0: float, mode: int, kept: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float]:
@@ -138,6 +97,40 @@ def state_in_step(
     return x1, v1, 0.0
 
 
+@compiled
+def drive_at(node: Any, live: Any) -> Drive:
+    """Return what the forces need of the drive at a node, whose pieces are in `live`."""
+    if HAS_CIRCUIT:
+        take_path(live, node[ELECTRIC + 3], math.inf)
+        return live, (node[ELECTRIC], node[ELECTRIC + 1], node[ELECTRIC + 2])
+    return live
+
+
+@compiled
+def electric_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Electric:
+    """Return the electric state at time `t` [s] in the step that begins at a node."""
+    t0, x0, v0, mode, kept = node[0], node[1], node[2], int(node[3]), node[4]
+    live, electric = drive
+    if t <= t0:
+        return electric
+    if mode == M.HELD or (mode == M.BACKSTOP and kept == 0.0 and v0 == 0.0):
+        return moved(electric, t - t0, electric_rates(t0, x0, 0.0, electric, hammer, live))
+    if mode == M.BACKSTOP:
+        kv0 = contact_rate(kept, v0, t0, hammer, drive)
+        return electric_in_contact((t0, kept, v0, kv0), t, hammer, drive)[1]
+    memory = memory_of(mode, kept, hammer)
+    a0 = acceleration(t0, x0, v0, branch_of(mode), memory, hammer, drive)
+    return whole_time_step(t0, x0, v0, a0, t - t0, ForceLaw(mode, memory, hammer, drive))[5]
+
+
+@compiled
+def drive_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Drive:
+    """Return what the forces need of the drive at time `t` [s] in the step that begins at a node."""
+    if HAS_CIRCUIT:
+        return drive[0], electric_in_step(t, node, hammer, drive)
+    return drive
+
+
 @entry
 def resample(
     times: Any,
@@ -154,9 +147,10 @@ def resample(
         Ascending, inside the run [s].
     nodes, train, hammer
         As recorded and given in :func:`printhammer.kernel.single.run.run`.
-    out : float64 array, shape (n, 10)
+    out : float64 array, shape (n, 10), with a coil circuit (n, 14)
         Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
-        the backstop, damping force, mode. At the time of an impact or a switch: the state after it.
+        the backstop, damping force, mode; then coil current, voltage across the coil, flux linkage, voltage
+        of the reservoir. At the time of an impact or a switch: the state after it.
     """
     train = Train(*train)
     first, last, _edge = edges_at(nodes[0, 0], train)
@@ -171,8 +165,10 @@ def resample(
             first, last, _edge = pass_edges(nodes[i, 0], train, first, last)
         mode = int(nodes[i, 3])
         kept = nodes[i, 4]
-        x, v, w = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, train.live)
-        value = drive_value(t, train.live)
+        start = drive_at(nodes[i], train.live)
+        x, v, w = state_in_step(t, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, start)
+        drive = drive_in_step(t, nodes[i], hammer, start)
+        value = value_at(t, x, hammer, drive)
         out[row, 0] = x
         out[row, 1] = v
         out[row, 2] = value
@@ -184,12 +180,24 @@ def resample(
         out[row, 7] = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v) if compressed else 0.0
         out[row, 8] = damping_force(hammer[DAMPING:SPRING], v)
         out[row, 9] = mode
+        if HAS_CIRCUIT:
+            live, electric = drive
+            current = coil_current(x, electric, hammer, live)
+            out[row, 10] = current
+            if path_of(live) == BLOCKED:
+                out[row, 11] = open_rate(x, v, electric, hammer)
+            else:
+                voltage, series = source_of(t, electric, hammer, live)
+                out[row, 11] = voltage - series * current
+            out[row, 12] = electric[0]
+            out[row, 13] = electric[2]
 
 
 @compiled
-def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Drive) -> tuple[float, float]:
+def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, live: Any) -> tuple[float, float]:
     """Return depth [m] and contact force [N] at time `t` in the step that begins at `node`."""
     mode = int(node[3])
+    drive = drive_at(node, live)
     x, v, w = state_in_step(t, node[0], node[1], node[2], mode, node[4], hammer, drive)
     if surface == M.BACKSTOP_SURFACE:
         force = 0.0
@@ -202,22 +210,22 @@ def depth_and_force(t: float, node: Any, surface: int, hammer: Hammer, drive: Dr
 
 @compiled
 def refined(
-    which: int, low: float, high: float, node: Any, surface: int, hammer: Hammer, drive: Drive
+    which: int, low: float, high: float, node: Any, surface: int, hammer: Hammer, live: Any
 ) -> tuple[float, float]:
     """Return time and value of the largest depth (`which` 0) or force (1) between two times."""
     t1 = low + GOLDEN * (high - low)
     t2 = high - GOLDEN * (high - low)
-    f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
-    f2 = depth_and_force(t2, node, surface, hammer, drive)[which]
+    f1 = depth_and_force(t1, node, surface, hammer, live)[which]
+    f2 = depth_and_force(t2, node, surface, hammer, live)[which]
     for _ in range(36):
         if f1 > f2:
             high, t2, f2 = t2, t1, f1
             t1 = low + GOLDEN * (high - low)
-            f1 = depth_and_force(t1, node, surface, hammer, drive)[which]
+            f1 = depth_and_force(t1, node, surface, hammer, live)[which]
         else:
             low, t1, f1 = t1, t2, f2
             t2 = high - GOLDEN * (high - low)
-            f2 = depth_and_force(t2, node, surface, hammer, drive)[which]
+            f2 = depth_and_force(t2, node, surface, hammer, live)[which]
     return (t1, f1) if f1 > f2 else (t2, f2)
 
 

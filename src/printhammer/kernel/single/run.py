@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled, entry, inlined
+from printhammer.kernel.compile.compiling import entry, inlined
+from printhammer.kernel.methods.crossing import STILL
 from printhammer.kernel.methods.landing import FAILED
 from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.circuit import BLOCKED, UNTIL
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
     FRONT,
@@ -23,32 +25,44 @@ from printhammer.kernel.single import carry as C
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import advance_contact, contact_rate
-    from printhammer.kernel.methods.landing import State, advance, land_on_level, level_switch
-    from printhammer.kernel.model.forces import Hammer, acceleration
-    from printhammer.kernel.model.laws import (
-        BACKSTOP_PULLS,
-        HAS_BACKSTOP,
-        HAS_PACK,
-        MEMORY,
-        RELOAD_ALONG_UNLOADING,
-        RIGID,
-        backstop_rebound,
-        backstop_switch,
-        pack_memory,
+    from printhammer.kernel.methods.landing import advance
+    from printhammer.kernel.model.circuit import (
+        Electric,
+        driven,
+        electric_at_rest,
+        electric_rates,
+        enter_piece,
+        is_quiet,
+        moved,
+        next_path,
+        path_of,
+        take_path,
     )
-    from printhammer.kernel.model.pulses import Drive, pass_edges
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.laws import HAS_CIRCUIT, RIGID, backstop_rebound, pack_memory
+    from printhammer.kernel.model.pulses import pass_edges
+    from printhammer.kernel.single.around import (
+        contact_unit,
+        failure,
+        first_mode,
+        kick_into_backstop,
+        left_range,
+        out_of_bounds,
+        reversed_mode,
+        sensible_step,
+    )
     from printhammer.kernel.single.record import (
         add_node,
         carry_contact,
         close_contact,
+        note_circuit,
         open_contact,
         relabel_node,
     )
     from printhammer.kernel.single.rest import goes_on_in, rest_ends
 
-STILL = 1e-12
-"""Share of the scales below which the motion in one characteristic time counts as none."""
-
+BRANCHES = (M.UNLOADING, M.LOADING, M.RELOADING)
+"""Modes inside the pack in which an armature may rest."""
 
 STUCK = 1000
 """Steps in a row that do not move time after which a run is given up."""
@@ -57,138 +71,32 @@ WAIT = 0.005
 """Shortest wait, in characteristic times, before a resting armature is looked at again."""
 
 
-@compiled
-def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
-    """Return the mode of an initial state; a state in the pack meets fresh paper at its own depth."""
-    if HAS_BACKSTOP:
-        b = hammer[POSITION]
-        if x < b and not RIGID:
-            if (
-                not BACKSTOP_PULLS
-                and backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(b - x), v) <= 0.0
-            ):
-                return M.BACKSTOP_RELEASED
-            return M.BACKSTOP
-        if x <= b and RIGID and v <= 0.0:
-            return M.RESTING if v == 0.0 and a < 0.0 else M.FREE
-        if x == b and (v < 0.0 or (v == 0.0 and a < 0.0)):
-            return M.BACKSTOP
-    if HAS_PACK and x >= hammer[FRONT]:
-        if x > hammer[FRONT] and v < 0.0 and MEMORY:
-            return M.UNLOADING
-        if x > hammer[FRONT] or v > 0.0:
-            return M.LOADING
-    return M.FREE
-
-
-@compiled
-def time_to_level(distance: float, v: float, a: float) -> float:
-    """Return the time [s] in which a constant acceleration covers `distance` >= 0, or infinity."""
-    if v <= 0.0 and a <= 0.0:
-        return math.inf
-    under_root = v * v + 2.0 * a * distance
-    if under_root < 0.0:
-        return math.inf
-    root = math.sqrt(under_root)
-    if v > 0.0:
-        return 2.0 * distance / (v + root)
-    return (root - v) / a
-
-
-@compiled
-def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
-    """Shorten a step that would overshoot the backstop or the pack front by far."""
-    if HAS_BACKSTOP and mode == M.FREE:
-        height = x - hammer[POSITION]
-        if height > 0.0:
-            h = min(h, 1.02 * time_to_level(height, -v, -a))
-        elif height == 0.0 and v > 0.0 and a < 0.0:
-            h = min(h, -2.04 * v / a)
-    if HAS_PACK and mode == M.FREE and x < hammer[FRONT]:
-        h = min(h, 1.02 * time_to_level(hammer[FRONT] - x, v, a))
-    return h
-
-
-@compiled
-def out_of_bounds(x: float, bounds: Any) -> int:
-    """Return the status of a displacement: `bounds` is (lowest, highest, origin, far)."""
-    if not (bounds[0] <= x <= bounds[1]):
-        return M.RANGE_LEFT
-    if abs(x - bounds[2]) > bounds[3]:
-        return M.RUNAWAY
-    return M.OK
-
-
-@compiled
-def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds: Any) -> tuple[bool, State]:
-    """Tell whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
-    h = end[0] - start[0]
-    for side in range(2):
-        bound = bounds[side]
-        sign = 1.0 if side == 1 else -1.0
-        # A backstop that does not lie outside the range keeps the armature off its lower end.
-        if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and law.mode == M.FREE):
-            continue
-        if start[1] == bound and sign * end[1] > sign * bound:
-            return True, start
-        code, fraction, upper = level_switch(start, end, h, bound, sign, law, control)
-        if code == M.REACHED_FRONT:
-            return True, land_on_level(start, h, fraction, upper, bound, sign, law, control)
-    return out_of_bounds(end[1], bounds) == M.RANGE_LEFT, end
-
-
-@compiled
-def failure(x: float, v: float, bounds: Any, control: Control) -> int:
-    """Return the status of a run whose step became too short."""
-    near = 0.05 * control[0]
-    if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
-        return M.RANGE_LEFT
-    return M.STEP_UNDERFLOW
-
-
-@compiled
-def reversed_mode(
-    t: float, x: float, mode: int, peak: float, memory: float, hammer: Hammer, drive: Drive
-) -> tuple[int, float, float]:
-    """Return mode, peak and memory after the velocity became zero inside the pack."""
-    if mode == M.LOADING:
-        if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
-            return M.LOADING, peak, memory
-        return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
-    if mode == M.RELOADING:
-        return M.UNLOADING, peak, memory
-    if RELOAD_ALONG_UNLOADING:
-        again = acceleration(t, x, 0.0, M.UNLOADING, memory, hammer, drive) > 0.0
-        return (M.RELOADING if again else M.UNLOADING), peak, memory
-    # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the
-    # other forces overcome it, else this point is at once a new local maximum.
-    if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
-        return M.LOADING, peak, memory
-    return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
-
-
-@compiled
-def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> tuple[float, float, float]:
-    """Return time, w and velocity shortly after a touch without velocity, the contact force still negligible.
-
-    The regularised equations stand still at w = v = 0.
-    """
-    depth = 1e-15 * control[0]
-    pause = min(math.sqrt(2.0 * depth / -a), t_next - t)
-    return t + pause, math.sqrt(-0.5 * a) * pause, a * pause
-
-
-@compiled
-def contact_unit(v: float, control: Control) -> float:
-    """Return the scale of s for a touch with velocity `v`; a Hertz contact lasts |v|^-0.6 in s."""
-    speed = max(abs(v), 1e-6 * control[1])
-    return float(math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6))
-
-
 @inlined
 def kept_in(mode: int, w: float, peak: float) -> float:
     """Return what a node keeps of the state beside displacement and velocity."""
     return w if mode == M.BACKSTOP else (peak if mode in (M.UNLOADING, M.RELOADING) else 0.0)
+
+
+@inlined
+def electric_at_start(x: float, hammer: Hammer, carry: Any, live: Any) -> Electric:
+    """Return the electric state in which a run begins or goes on, the current on its path."""
+    if HAS_CIRCUIT:
+        if carry[C.STATE] != C.GOES_ON and carry[C.WITH_CURRENT] == 0.0:
+            take_path(live, BLOCKED, math.inf)
+            return electric_at_rest(x, hammer)
+        take_path(live, carry[C.PATH], carry[C.UNTIL])
+        return carry[C.ELECTRIC], carry[C.ELECTRIC + 1], carry[C.ELECTRIC + 2]
+    return ()
+
+
+@inlined
+def keep_electric(electric: Electric, carry: Any, live: Any) -> None:
+    """Keep the electric state for the run to go on."""
+    if HAS_CIRCUIT:
+        for j in range(3):
+            carry[C.ELECTRIC + j] = electric[j]
+        carry[C.PATH] = path_of(live)
+        carry[C.UNTIL] = live[live.size - UNTIL]
 
 
 @entry
@@ -222,12 +130,12 @@ def run(
         Lowest and highest displacement, origin and farthest distance from it [m].
     max_steps : int
         Largest number of steps.
-    nodes : float64 array, shape (any, 5)
+    nodes : float64 array, shape (any, 5), with a coil circuit (any, 9)
     contacts : float64 array, shape (any, 7)
         Filled with the record, see `printhammer.kernel.single.record`. The first node of a run that goes on
         is the last one before the pause; a contact that was open then is the first contact and keeps its row,
         its number of the node before it is negative.
-    carry : float64 array, shape (24,)
+    carry : float64 array, shape (30,)
         See :mod:`printhammer.kernel.single.carry`; `t`, `x` and `v` are not looked at where a run goes on.
 
     Returns
@@ -236,7 +144,9 @@ def run(
         Status, and the numbers of nodes, contacts and steps; the first two may exceed the arrays' lengths.
     """
     train = Train(*train)
-    drive = train.live
+    live = train.live
+    electric = electric_at_start(x, hammer, carry, live)
+    drive = driven(live, electric)
     used = 0
     touched = 0
     steps = 0
@@ -261,6 +171,9 @@ def run(
         touched = carry_contact(contacts, mode)
     else:
         first, last, edge = pass_edges(t, train, 0, 0)
+        if HAS_CIRCUIT:
+            electric = enter_piece(t, x, electric, hammer, live)
+            drive = driven(live, electric)
         a = acceleration(t, x, v, M.FREE, memory, hammer, drive)
         mode = first_mode(x, v, a, hammer)
         if carry[C.STATE] == C.ON_BRANCH:
@@ -284,13 +197,21 @@ def run(
         stuck = 0
         t_before = t - time_scale
     used = add_node(nodes, used, t, x, v, mode, kept_in(mode, w, peak))
+    if HAS_CIRCUIT:
+        note_circuit(nodes, used, electric, path_of(live))
     while t < t_end and status == M.OK:
         if used >= pause_after and mode in (M.FREE, M.BACKSTOP):
             status = M.PAUSED
             break
         t_next = min(edge, t_end)
+        if HAS_CIRCUIT:
+            t_next = min(t_next, live[live.size - UNTIL])
         if t_next <= t:
             first, last, edge = pass_edges(t, train, first, last)
+            if HAS_CIRCUIT:
+                electric = enter_piece(t, x, electric, hammer, live)
+                drive = driven(live, electric)
+                note_circuit(nodes, used, electric, path_of(live))
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             entered = True
             continue
@@ -313,12 +234,19 @@ def run(
                 kv = contact_rate(w, v, t, hammer, drive)
                 entered = False
             idle = first == last
+            if HAS_CIRCUIT:
+                idle = is_quiet(t, x, time_scale, electric, hammer, live)
             if w > 0.0 and idle and abs(v) <= 1e-14 * control[1] and abs(kv) <= 0.1 * still * 2.0 * w:
                 relabel_node(nodes, used, M.HELD)
                 t = t_next
                 switch = M.EDGE
             elif w == 0.0 and v == 0.0:
+                before = t
                 t, w, v = kick_into_backstop(t, a, t_next, control)
+                if HAS_CIRCUIT:
+                    rates = electric_rates(before, x, 0.0, electric, hammer, live)
+                    electric = moved(electric, t - before, rates)
+                    drive = driven(live, electric)
                 kv = contact_rate(w, v, t, hammer, drive)
                 switch = M.EDGE if t == t_next else M.NO_SWITCH
             else:
@@ -328,13 +256,13 @@ def run(
                     started = M.BACKSTOP
                     unit = contact_unit(v, control)
                     h = h_contact * unit
-                switch, end, h = advance_contact((t, w, v, kv), h, t_next, hammer, drive, control)
+                switch, end, h, electric = advance_contact((t, w, v, kv), h, t_next, hammer, drive, control)
                 if touching:
                     h_contact = h / unit
                 t, w, v, kv = end
             x = hammer[POSITION] - w * w
-        elif mode == M.RESTING or (
-            v == 0.0 and abs(a) <= still and mode in (M.UNLOADING, M.LOADING, M.RELOADING)
+        elif (mode == M.RESTING or (v == 0.0 and abs(a) <= still and mode in BRANCHES)) and not (
+            HAS_CIRCUIT and not is_quiet(t, x, time_scale, electric, hammer, live)
         ):
             pause = t_next - t
             if first < last:
@@ -354,6 +282,22 @@ def run(
             if ended and mode != M.RESTING and not goes_on_in(a, mode):
                 mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
                 a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
+        elif HAS_CIRCUIT and (mode == M.RESTING or (v == 0.0 and abs(a) <= still and mode in BRANCHES)):
+            # The current changes under an armature at rest.
+            held = mode
+            if mode != M.RESTING:
+                held = M.HELD_LOADING if mode == M.LOADING else M.HELD_UNLOADING
+                relabel_node(nodes, used, held)
+            if started != held:
+                h = h_free
+            started = held
+            law = ForceLaw(held, memory, hammer, drive)
+            switch, end, h, electric = advance((t, x, 0.0, a), h, t_next, law, peak, control)
+            t = end[0]
+            drive = driven(live, electric)
+            a = acceleration(t, x, 0.0, mode, memory, hammer, drive)
+            if switch == M.REST_ENDED and mode != M.RESTING and not goes_on_in(a, mode):
+                mode, peak, memory = reversed_mode(t, x, mode, peak, memory, hammer, drive)
         else:
             if started != mode:
                 h = h_pack if mode in (M.LOADING, M.UNLOADING) else h_free
@@ -362,7 +306,7 @@ def run(
             h = sensible_step(h, x, v, a, mode, hammer)
             start = (t, x, v, a)
             law = ForceLaw(mode, memory, hammer, drive)
-            switch, end, h = advance(start, h, t_next, law, peak, control)
+            switch, end, h, electric = advance(start, h, t_next, law, peak, control)
             outside, bound_state = left_range(start, end, law, control, bounds)
             if switch != FAILED and outside:
                 end, switch, left = bound_state, M.NO_SWITCH, M.RANGE_LEFT
@@ -376,8 +320,20 @@ def run(
             break
         status = left if left != M.OK else out_of_bounds(x, bounds)
         entered = entered or switch != M.NO_SWITCH
+        if HAS_CIRCUIT:
+            drive = driven(live, electric)
         if switch == M.EDGE:
             first, last, edge = pass_edges(t, train, first, last)
+            if HAS_CIRCUIT:
+                electric = enter_piece(t, x, electric, hammer, live)
+                drive = driven(live, electric)
+            a = acceleration(t, x, v, mode, memory, hammer, drive)
+            if mode == M.BACKSTOP:
+                kv = contact_rate(w, v, t, hammer, drive)
+        elif HAS_CIRCUIT and switch in (M.CIRCUIT, M.REST_ENDED):
+            if switch == M.CIRCUIT:
+                electric = next_path(t, x, electric, hammer, live)
+                drive = driven(live, electric)
             a = acceleration(t, x, v, mode, memory, hammer, drive)
             if mode == M.BACKSTOP:
                 kv = contact_rate(w, v, t, hammer, drive)
@@ -386,6 +342,8 @@ def run(
                 touched = open_contact(contacts, touched, M.BACKSTOP_SURFACE, t, v, used, False)
                 if RIGID:
                     used = add_node(nodes, used, t, x, v, M.FREE, 0.0)
+                    if HAS_CIRCUIT:
+                        note_circuit(nodes, used, electric, path_of(live))
                     v = backstop_rebound(hammer[BACKSTOP_PART:MAGNET], v)
                     a = acceleration(t, x, v, M.FREE, memory, hammer, drive)
                     if a < 0.0 and v * v <= -2.0 * a * 1e-12 * control[0]:
@@ -424,6 +382,9 @@ def run(
                     w = math.sqrt(max(hammer[POSITION] - x, 0.0))
             a = acceleration(t, x, v, mode, memory, hammer, drive)
         used = add_node(nodes, used, t, x, v, mode, kept_in(mode, w, peak))
+        if HAS_CIRCUIT:
+            note_circuit(nodes, used, electric, path_of(live))
+    keep_electric(electric, carry, live)
     carry[C.STATE] = C.GOES_ON
     carry[C.MODE], carry[C.PEAK], carry[C.MEMORY_NOW] = mode, peak, memory
     carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY], carry[C.ACCELERATION] = t, x, v, a

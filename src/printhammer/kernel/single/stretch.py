@@ -11,20 +11,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled
-from printhammer.kernel.model.layout import FRONT, Train
+from printhammer.kernel.model.layout import ELECTRIC, FRONT, Train
 from printhammer.kernel.model.modes import LOADING, PACK_SURFACE, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer, pack_force
-    from printhammer.kernel.model.laws import MEMORY
+    from printhammer.kernel.model.laws import HAS_CIRCUIT, MEMORY
     from printhammer.kernel.model.pulses import edges_at, pass_edges
-    from printhammer.kernel.single.resample import branch_of, peaks_of, state_in_step
+    from printhammer.kernel.single.resample import (
+        branch_of,
+        drive_at,
+        electric_in_step,
+        peaks_of,
+        state_in_step,
+    )
 
 DOT_WIDTH = 6
 """Columns of a dot: pack contacts, time and velocity in, time out, depth, peak force."""
 
 STROBE_WIDTH = 4
-"""Columns of a strobe: displacement, velocity, mode, memory."""
+"""Columns of a strobe: displacement, velocity, mode, memory; with a coil circuit four more, as of a node."""
 
 
 @compiled
@@ -127,8 +133,9 @@ def note_states(
         if moved:
             first, last, _edge = pass_edges(nodes[i, 0], train, first, last)
         mode, kept = int(nodes[i, 3]), nodes[i, 4]
+        drive = drive_at(nodes[i], train.live)
         displacement, velocity, _w = state_in_step(
-            due, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, train.live
+            due, nodes[i, 0], nodes[i, 1], nodes[i, 2], mode, kept, hammer, drive
         )
         if is_sample:
             x[sample] = displacement
@@ -139,6 +146,11 @@ def note_states(
             branch = branch_of(mode)
             strobes[strobe, 2] = branch
             strobes[strobe, 3] = kept if branch in (UNLOADING, RELOADING) else 0.0
+            if HAS_CIRCUIT:
+                electric = electric_in_step(due, nodes[i], hammer, drive)
+                for j in range(3):
+                    strobes[strobe, STROBE_WIDTH + j] = electric[j]
+                strobes[strobe, STROBE_WIDTH + 3] = nodes[i, ELECTRIC + 3]
             strobe += 1
 
 
@@ -146,7 +158,7 @@ def note_states(
 def blank_states(strobes: Any, strobe: int, strobe_end: int, x: Any, sample: int, sample_end: int) -> None:
     """Put NaN where a run ended before."""
     for i in range(strobe, strobe_end):
-        for j in range(STROBE_WIDTH):
+        for j in range(strobes.shape[1]):
             strobes[i, j] = np.nan
     for i in range(sample, sample_end):
         x[i] = np.nan

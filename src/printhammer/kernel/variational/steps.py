@@ -11,12 +11,12 @@ from printhammer.kernel.model.layout import FRONT, INVERSE_MASS, POSITION
 from printhammer.kernel.variational.layout import BACKSTOP_LOSS, MEMORIES, PEAK, START, TIME
 
 if TYPE_CHECKING:
-    from printhammer.kernel.methods.contact import contact_rate
+    from printhammer.kernel.methods.contact import contact_rate, length_of
     from printhammer.kernel.methods.dop853 import contact_step
     from printhammer.kernel.model.forces import Hammer, acceleration
     from printhammer.kernel.model.laws import FORCED, HAS_BACKSTOP, HAS_PACK, MEMORY
     from printhammer.kernel.model.pulses import Drive, drive_value
-    from printhammer.kernel.single.resample import length_of, memory_of
+    from printhammer.kernel.single.resample import memory_of
     from printhammer.kernel.variational.columns import bring_back, column_step, longest_step, take_in
     from printhammer.kernel.variational.forcing import (
         contact_changes,
@@ -53,7 +53,7 @@ def length_in_contact(
 ) -> float:
     """Return the s, from a state in the backstop at time `t0`, of the time `t` [s].
 
-    As `printhammer.kernel.single.resample.s_at`, but content with what the variation needs. Where it
+    As `printhammer.kernel.methods.contact.s_at`, but content with what the variation needs. Where it
     `leaves` at `t`, w = 0 is solved for in the end: the time stands still there.
     """
     kv0 = contact_rate(w0, v0, t0, hammer, drive)

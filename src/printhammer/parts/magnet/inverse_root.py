@@ -3,7 +3,11 @@
     Fm = F0 - (Am - Bm I)^2 / sqrt(x)
 
 Source: F. Hendriks, IBM J. Res. Develop. 27 (1983), equation (3), a fit to forces measured at several
-currents.
+currents. The same coenergy, W' = F0 x - 2 (Am - Bm I)^2 sqrt(x), links the flux
+
+    lambda = dW'/dI = 4 Bm (Am - Bm I) sqrt(x),
+
+whose slope with the current is negative: a coil on it has a constant inductance above 4 Bm^2 sqrt(x).
 Validity: the measured range of x and I, which the paper does not print; give it as `range_min` and
 `range_max`.
 Weakness: singular at x = 0, where the origin is arbitrary (the backstop sits at 0.002 in); the pull grows
@@ -40,6 +44,35 @@ def magnet_energy(c: Any, x: float) -> float:
     if x < 0.0:
         return math.nan
     return float(2.0 * c[1] * c[1] * math.sqrt(x) - c[0] * x)
+
+
+def magnet_linkage(c: Any, x: float, current: float) -> float:
+    """Return the flux linkage, Wb; NaN for x < 0."""
+    if x < 0.0:
+        return math.nan
+    return float(4.0 * c[2] * (c[1] - c[2] * current) * math.sqrt(x))
+
+
+def magnet_emf(c: Any, x: float, current: float) -> float:
+    """Return the slope of the flux linkage with displacement, Wb/m; NaN for x <= 0."""
+    if x <= 0.0:
+        return math.nan
+    return float(2.0 * c[2] * (c[1] - c[2] * current) / math.sqrt(x))
+
+
+def magnet_inductance(c: Any, x: float, current: float) -> float:
+    """Return the slope of the flux linkage with current, H; NaN for x < 0."""
+    if x < 0.0:
+        return math.nan
+    return float(-4.0 * c[2] * c[2] * math.sqrt(x))
+
+
+def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
+    """Return the current at which the flux linkage and a constant inductance make `linkage`, A."""
+    if x < 0.0:
+        return math.nan
+    depth = 4.0 * c[2] * math.sqrt(x)
+    return float((linkage - depth * c[1]) / (inductance - depth * c[2]))
 
 
 @register

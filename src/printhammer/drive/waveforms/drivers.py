@@ -1,0 +1,180 @@
+"""Drivers of a coil with its circuit: a supply that is switched on and off, and the paths of the current.
+
+The latest firing always replaces those before it: a driver is one output stage. Voltages are those of the
+supply; a diode, the resistance of the supply and the thresholds of a chopper act where the coil's circuit
+has them act, see `printhammer.kernel.model.circuit`. After the supply is switched off the current decays
+against a voltage, and once it is zero it stays zero until the coil would drive it again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from printhammer.drive.segments import DECAY, RESERVOIR, SWITCHED, table
+from printhammer.drive.waveforms.base import QuantityName, Supply, Waveform
+from printhammer.support.constants import quantity as measured
+
+if TYPE_CHECKING:
+    from printhammer.support.arrays import FloatArray
+
+DIODE = 0.7
+"""Voltage of a silicon diode, V."""
+
+
+class _Driver(Waveform):
+    """A supply switched on for a time, and what the current does after it."""
+
+    replaces: ClassVar[bool] = True
+    quantity: QuantityName = "voltage"
+    voltage: float = measured("V", "V", "voltage of the supply", gt=0.0)
+    width: float = measured("s", "tw", "time for which the supply is switched on", gt=0.0)
+    decay: Literal["diode", "zener", "rail"] = Field(
+        default="diode", description="path of the current after the supply is switched off"
+    )
+    decay_voltage: float | None = measured(
+        "V", "Vd", "voltage against which the current decays", ge=0.0, default=None
+    )
+    source_resistance: float = measured("ohm", "Rs", "resistance of the supply", ge=0.0, default=0.0)
+    coils: float = measured("1", "n", "equal coils on the supply, fired together", ge=1.0, default=1.0)
+    diode_voltage: float = measured(
+        "V", "Vf", "voltage of the diode in which a chopped current circulates", ge=0.0, default=DIODE
+    )
+
+    @model_validator(mode="after")
+    def _decay_is_known(self) -> Self:
+        if self.decay == "zener" and self.decay_voltage is None:
+            raise ValueError('decay = "zener" is given without decay_voltage, expected the zener voltage')
+        return self
+
+    @property
+    def series(self) -> float:
+        """Resistance that the current of one coil meets in the supply, ohm."""
+        return self.source_resistance * self.coils
+
+    @property
+    def support(self) -> float:
+        """Time from the firing until the supply is off, s; the current may last longer."""
+        return float(self.segments()[-2, 0])
+
+    def supply(self) -> Supply:
+        """Return the supply."""
+        return Supply(diode=self.diode_voltage, coils=self.coils)
+
+    def scaled(self, factor: float) -> Self:
+        """Return the same driver on a supply of another voltage; its currents are not in proportion."""
+        return type(self)(**{**self.model_dump(), "voltage": self.voltage * factor})
+
+    def _off(self, at: float) -> tuple[float, ...]:
+        """Return the row of the piece that begins when the supply is switched off."""
+        against = self.decay_voltage
+        if against is None:
+            against = self.voltage if self.decay == "rail" else DIODE
+        series = self.series if self.decay == "rail" else 0.0
+        return (at, DECAY, against, series, float(self.decay == "rail"), 0.0)
+
+    def _on(self, at: float, upper: float = math.inf, lower: float = 0.0) -> tuple[float, ...]:
+        return (at, SWITCHED, self.voltage, self.series, upper, lower)
+
+
+class Rail(_Driver):
+    """The supply on for the width, then off."""
+
+    shape: ClassVar[str] = "rail"
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: on, off."""
+        return table([self._on(0.0), self._off(self.width)], math.inf)
+
+
+class Chopper(_Driver):
+    """The supply on for the width, chopped between two currents, or off for a fixed time at the upper one.
+
+    While it is chopped off, the current circulates through a diode.
+    """
+
+    shape: ClassVar[str] = "chopper"
+    upper: float = measured("A", "Iu", "current at which the chopper switches off", gt=0.0)
+    lower: float | None = measured("A", "Il", "current at which it switches on again", gt=0.0, default=None)
+    off_time: float | None = measured("s", "to", "time for which it stays off", gt=0.0, default=None)
+
+    @model_validator(mode="after")
+    def _thresholds(self) -> Self:
+        if (self.lower is None) == (self.off_time is None):
+            raise ValueError("expected either lower, a second threshold, or off_time")
+        if self.lower is not None and not self.lower < self.upper:
+            raise ValueError(f"lower = {self.lower:g} A is expected to be below upper = {self.upper:g} A")
+        return self
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: chopped, off."""
+        lower = self.lower if self.lower is not None else -(self.off_time or 0.0)
+        return table([self._on(0.0, self.upper, lower), self._off(self.width)], math.inf)
+
+
+class PeakAndHold(_Driver):
+    """The full supply for a time, then chopped between two lower currents for the rest of the width."""
+
+    shape: ClassVar[str] = "peak-and-hold"
+    peak_time: float = measured("s", "tp", "time of the full supply", gt=0.0)
+    hold_upper: float = measured("A", "Iu", "upper current while it holds", gt=0.0)
+    hold_lower: float = measured("A", "Il", "lower current while it holds", gt=0.0)
+
+    @model_validator(mode="after")
+    def _thresholds(self) -> Self:
+        if not self.hold_lower < self.hold_upper:
+            raise ValueError(
+                f"hold_lower = {self.hold_lower:g} A is expected to be below"
+                f" hold_upper = {self.hold_upper:g} A"
+            )
+        if not self.peak_time < self.width:
+            raise ValueError(
+                f"peak_time = {self.peak_time:g} s is expected to be below width = {self.width:g} s"
+            )
+        return self
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: full, chopped, off."""
+        hold = self._on(self.peak_time, self.hold_upper, self.hold_lower)
+        return table([self._on(0.0), hold, self._off(self.width)], math.inf)
+
+
+class Capacitor(_Driver):
+    """A capacitor that is discharged through the coil for the width, and charged from the supply always."""
+
+    shape: ClassVar[str] = "capacitor"
+    capacitance: float = measured("F", "C", "capacitance", gt=0.0)
+    charging_resistance: float = measured("ohm", "Rc", "resistance from which it is charged", gt=0.0)
+
+    def supply(self) -> Supply:
+        """Return the supply."""
+        return Supply(
+            diode=self.diode_voltage,
+            capacitance=self.capacitance,
+            charging=self.charging_resistance,
+            charged=self.voltage,
+            coils=self.coils,
+        )
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: on, off."""
+        on = (0.0, RESERVOIR, self.voltage, self.series, 0.0, 0.0)
+        return table([on, self._off(self.width)], math.inf)
+
+
+class Bridge(_Driver):
+    """An H-bridge: the supply for the width, then for a time the reversed supply, then off."""
+
+    shape: ClassVar[str] = "bridge"
+    reverse: float = measured("s", "tr", "time of the reversed supply", gt=0.0)
+
+    def segments(self) -> FloatArray:
+        """Return the segment table: on, reversed, off."""
+        back = (self.width, SWITCHED, -self.voltage, self.series, math.inf, 0.0)
+        return table([self._on(0.0), back, self._off(self.width + self.reverse)], math.inf)
+
+
+DRIVERS: tuple[type[Waveform], ...] = (Rail, Chopper, PeakAndHold, Capacitor, Bridge)
+"""The drivers."""

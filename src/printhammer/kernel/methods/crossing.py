@@ -1,0 +1,222 @@
+"""Where in a step the path of the coil's current changes, or an armature held at rest comes free.
+
+What is looked for is the first root of a gap, a smooth function of the state that is positive while things
+stay as they are: see `printhammer.kernel.model.circuit.path_gap`. The cubic through the gaps and their slopes
+at both ends of a step tells by its Bernstein coefficients whether one lies inside; how far these are from a
+straight line measures how well the cubic can be believed. The root is located with the integrator.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import called, compiled, inlined
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import POSITION, Control, ForceLaw
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.dop853 import whole_contact_step, whole_time_step
+    from printhammer.kernel.model.circuit import Electric, driven, electric_rates, moved, path_gap
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.pulses import Drive
+
+STILL = 1e-12
+"""Share of the scales below which the motion in one characteristic time counts as none."""
+
+BEGUN = 1e-9
+"""Gap at the start of a step that counts as none: a path that has just been entered."""
+
+SHARE = 1e-5
+"""Share of a step over which the slope of a gap is taken."""
+
+PATH_GAP, REST_GAP = 0, 1
+"""Which gap: of the path of the current, of the rest of the armature."""
+
+
+@compiled
+def closes(g0: float, d0: float, g1: float, d1: float) -> int:
+    """Tell whether a gap closes in a step, from its values and slopes, times the step, at both ends.
+
+    Returns
+    -------
+    int
+        REACHED_FRONT if it closes once, NO_SWITCH if it does not, UNRESOLVED if the step must be halved.
+    """
+    b1, b2 = g0 + d0 / 3.0, g1 - d1 / 3.0
+    if g1 <= 0.0:
+        if g0 <= BEGUN and d0 > 0.0:
+            return M.UNRESOLVED
+        return M.UNRESOLVED if b1 < 0.0 < b2 else M.REACHED_FRONT
+    if g0 <= BEGUN:
+        return M.NO_SWITCH if b2 > 0.0 else M.UNRESOLVED
+    bent = max(abs(b1 - (2.0 * g0 + g1) / 3.0), abs(b2 - (g0 + 2.0 * g1) / 3.0))
+    return M.NO_SWITCH if min(b1, b2) > 0.5 * bent else M.UNRESOLVED
+
+
+@inlined
+def rest_gap(a: float, mode: int, control: Control) -> float:
+    """Return a number that is positive while the acceleration leaves an armature at rest."""
+    unit = control[1] * control[1] / control[0]
+    if mode == M.RESTING:
+        return -a / unit
+    return STILL - abs(a) / unit
+
+
+@compiled
+def gap_at(
+    which: int, t: float, x: float, v: float, electric: Electric, law: ForceLaw, live: Any, control: Control
+) -> float:
+    """Return a gap off the backstop."""
+    mode, memory, hammer, _drive = law
+    if which == PATH_GAP:
+        return path_gap(x, v, electric, hammer, live)
+    branch = M.LOADING if mode == M.HELD_LOADING else (M.UNLOADING if mode == M.HELD_UNLOADING else mode)
+    return rest_gap(acceleration(t, x, v, branch, memory, hammer, driven(live, electric)), mode, control)
+
+
+@compiled
+def gap_and_change(
+    which: int,
+    t: float,
+    x: float,
+    v: float,
+    a: float,
+    electric: Electric,
+    h: float,
+    law: ForceLaw,
+    live: Any,
+    control: Control,
+) -> tuple[float, float]:
+    """Return a gap off the backstop, and its slope in time times `h`."""
+    gap = gap_at(which, t, x, v, electric, law, live, control)
+    pause = SHARE * h
+    rates = electric_rates(t, x, v, electric, law.hammer, live)
+    if M.RESTING <= law.mode <= M.HELD_UNLOADING:
+        v, a = 0.0, 0.0
+    later = gap_at(
+        which, t + pause, x + pause * v, v + pause * a, moved(electric, pause, rates), law, live, control
+    )
+    return gap, (later - gap) / SHARE
+
+
+@called
+def land_on_gap(
+    which: int, start: Any, h: float, upper: float, law: ForceLaw, control: Control
+) -> tuple[float, float, float, float, Electric]:
+    """Return the state at which a gap closes inside `upper` of a step of `h`: t, x, v, a, electric state."""
+    t, x, v, a = start
+    live = law.drive[0]
+    low, high = 0.0, upper
+    low_gap = gap_at(which, t, x, v, law.drive[1], law, live, control)
+    x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, high * h, law)
+    high_gap = gap_at(which, t + high * h, x1, v1, e1, law, live, control)
+    side = 0
+    for _ in range(100):
+        if (high - low) * h <= 1e-15 * control[0] / control[1] or high_gap >= 0.0 >= low_gap:
+            break
+        middle = (low * high_gap - high * low_gap) / (high_gap - low_gap)
+        if not (low < middle < high):
+            middle = 0.5 * (low + high)
+            if not (low < middle < high):
+                break
+        x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, middle * h, law)
+        gap = gap_at(which, t + middle * h, x1, v1, e1, law, live, control)
+        if gap > 0.0:
+            low, low_gap = middle, gap
+            # The weight of an end that stays is halved: the Illinois rule.
+            high_gap *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            high, high_gap = middle, gap
+            low_gap *= 0.5 if side == -1 else 1.0
+            side = -1
+        if abs(gap) <= 1e-15:
+            high = middle
+            break
+    x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, high * h, law)
+    return t + high * h, x1, v1, a1, e1
+
+
+@compiled
+def circuit_switch(
+    start: Any, end: Any, electric: Electric, law: ForceLaw, control: Control
+) -> tuple[int, Any, Electric]:
+    """Look for a switch of the circuit, or the end of a rest, in a step off the backstop that ends so.
+
+    Returns
+    -------
+    tuple
+        CIRCUIT, REST_ENDED, NO_SWITCH or UNRESOLVED, and the state and electric state there.
+    """
+    h = end[0] - start[0]
+    live = law.drive[0]
+    result = M.NO_SWITCH
+    resting = M.RESTING <= law.mode <= M.HELD_UNLOADING
+    for which in range(2 if resting else 1):
+        span = end[0] - start[0]
+        g0, d0 = gap_and_change(
+            which, start[0], start[1], start[2], start[3], law.drive[1], span, law, live, control
+        )
+        g1, d1 = gap_and_change(which, end[0], end[1], end[2], end[3], electric, span, law, live, control)
+        code = closes(g0, d0, g1, d1)
+        if code == M.UNRESOLVED:
+            return code, end, electric
+        if code == M.REACHED_FRONT:
+            t, x, v, a, electric = land_on_gap(which, start, h, min(1.0, span / h), law, control)
+            end = (t, x, v, a)
+            result = M.CIRCUIT if which == PATH_GAP else M.REST_ENDED
+    return result, end, electric
+
+
+@compiled
+def contact_gap(w: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
+    """Return the gap of the path of the current in the backstop."""
+    return path_gap(hammer[POSITION] - w * w, v, electric, hammer, live)
+
+
+@compiled
+def contact_gap_and_change(
+    t: float, w: float, v: float, kv: float, electric: Electric, h: float, hammer: Hammer, live: Any
+) -> tuple[float, float]:
+    """Return the gap in the backstop, and its slope in s times `h`."""
+    gap = contact_gap(w, v, electric, hammer, live)
+    pause = SHARE * h
+    pace = 2.0 * w * pause
+    rates = electric_rates(t, hammer[POSITION] - w * w, v, electric, hammer, live)
+    later = contact_gap(w - v * pause, v + kv * pause, moved(electric, pace, rates), hammer, live)
+    return gap, (later - gap) / SHARE
+
+
+@called
+def land_on_gap_in_contact(
+    start: Any, h: float, hammer: Hammer, drive: Drive
+) -> tuple[float, float, float, float, Electric]:
+    """Return the state at which the gap closes inside a step of `h` in s: t, w, v, dv/ds, electric state."""
+    t, w, v, kv = start
+    live = drive[0]
+    low, high = 0.0, 1.0
+    low_gap = contact_gap(w, v, drive[1], hammer, live)
+    t1, w1, v1, kv1, _error, e1 = whole_contact_step(t, w, v, kv, h, hammer, drive, M.ANY_SCALES)
+    high_gap = contact_gap(w1, v1, e1, hammer, live)
+    side = 0
+    for _ in range(100):
+        middle = (low * high_gap - high * low_gap) / (high_gap - low_gap)
+        if not (low < middle < high):
+            middle = 0.5 * (low + high)
+            if not (low < middle < high):
+                break
+        t1, w1, v1, kv1, _error, e1 = whole_contact_step(t, w, v, kv, middle * h, hammer, drive, M.ANY_SCALES)
+        gap = contact_gap(w1, v1, e1, hammer, live)
+        if gap > 0.0:
+            low, low_gap = middle, gap
+            high_gap *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            high, high_gap = middle, gap
+            low_gap *= 0.5 if side == -1 else 1.0
+            side = -1
+        if abs(gap) <= 1e-15 or high - low <= 1e-15:
+            high = middle if abs(gap) <= 1e-15 else high
+            break
+    t1, w1, v1, kv1, _error, e1 = whole_contact_step(t, w, v, kv, high * h, hammer, drive, M.ANY_SCALES)
+    return t1, w1, v1, kv1, e1

@@ -1,0 +1,310 @@
+"""The coil circuit: flux linkage as part of the state, under a voltage source or the paths of a driver.
+
+With the flux linkage lambda(x, i) of the magnet and the constant inductance L of the coil the circuit obeys
+
+    d lambda / dt = u - R i,    lambda = lambda_m(x, i) + L i,
+
+and force and back-EMF are the two sides of one coenergy: F = dW'/dx, lambda_m = dW'/di. With a shorted turn
+of resistance Re (referred to the coil) and leakage Ls, the turn carries the current ie:
+
+    lambda = lambda_1 + Ls i,    d lambda_1 / dt = -Re ie,    lambda_1 = lambda_m(x, i + ie) + L (i + ie).
+
+H. H. Woodson and J. R. Melcher, *Electromechanical Dynamics* (1968), ch. 3. A reservoir of capacitance C,
+charged from V through Rc and shared by n coils, has the voltage q: dq/dt = (V - q) / (Rc C) - n i / C.
+
+The electric state is the tuple ``(lambda, lambda_1, q)``, the empty tuple in a kernel without a circuit. It
+travels with the array ``live`` of the drive: where other kernels hand on ``live``, this one hands on ``(live,
+electric)``. The last two places of ``live`` hold what a driver does at present: its path, and until when a
+chopper of fixed off-time stays off [s].
+
+A driver's pieces, of which at most one is under way, are ``[start, SWITCHED_PIECE, voltage, series
+resistance, upper, lower]``, with the thresholds of a chopper [A], an infinite upper one for none, and minus
+the off-time [s] as the lower one of a chopper of fixed off-time; ``[start, DECAY_PIECE, voltage against which
+the current decays, series resistance, share given back to the supply, 0]``; and ``[start, RESERVOIR_PIECE, 0,
+series resistance, 0, 0]``. All other pieces are the voltage of an ideal source, in both directions.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.model.layout import (
+    CAPACITANCE,
+    CHARGED,
+    CHARGING,
+    COILS,
+    COUPLED,
+    CURRENT_SCALE,
+    DECAY_PIECE,
+    DIODE,
+    INDUCTANCE,
+    LEAKAGE,
+    LINKAGE_SCALE,
+    MAGNET,
+    RESERVOIR_PIECE,
+    RESISTANCE,
+    SERIES,
+    SWITCHED_PIECE,
+    TURN_RESISTANCE,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.forces import Hammer
+    from printhammer.kernel.model.laws import (
+        HAS_CIRCUIT,
+        magnet_current,
+        magnet_emf,
+        magnet_inductance,
+        magnet_linkage,
+    )
+    from printhammer.kernel.model.pulses import Drive, drive_value
+
+Electric = Any
+"""Flux linkage of the coil, that of the shorted turn [Wb], voltage of the reservoir [V]; or nothing."""
+
+SOURCE, CHOPPED, BLOCKED, BACKWARD = 0.0, 1.0, 2.0, 3.0
+"""Paths of the current: as the piece says; around through the diode; none; decay of a negative current."""
+
+PATH = 1
+UNTIL = 2
+"""Places in `live`, counted from its end."""
+
+STILL_SHARE = 1e-12
+"""Share of the scales that may change in one characteristic time in a circuit that counts as at rest."""
+
+
+@inlined
+def driven(live: Any, electric: Electric) -> Drive:
+    """Return what the forces need of the drive."""
+    if HAS_CIRCUIT:
+        return live, electric
+    return live
+
+
+@inlined
+def path_of(live: Any) -> float:
+    """Return the path of the current."""
+    return float(live[live.size - PATH])
+
+
+@inlined
+def take_path(live: Any, path: float, until: float) -> None:
+    """Put the current on a path."""
+    live[live.size - PATH] = path
+    live[live.size - UNTIL] = until
+
+
+@inlined
+def kind_of(live: Any) -> float:
+    """Return the kind of the piece under way; -1 if there is none."""
+    return float(live[3]) if live[0] > 0.0 else -1.0
+
+
+@inlined
+def current_at(x: float, linkage: float, hammer: Hammer) -> float:
+    """Return the current [A] that links `linkage` [Wb] with the constant inductance and the magnet."""
+    if hammer[COUPLED] != 0.0:
+        return float(magnet_current(hammer[MAGNET:], x, linkage, hammer[INDUCTANCE]))
+    return float(linkage / hammer[INDUCTANCE])
+
+
+@inlined
+def linkage_at(x: float, current: float, hammer: Hammer) -> float:
+    """Return the flux linkage [Wb] of the main path at a displacement [m] and a current [A]."""
+    own = hammer[INDUCTANCE] * current
+    if hammer[COUPLED] != 0.0:
+        return float(magnet_linkage(hammer[MAGNET:], x, current) + own)
+    return float(own)
+
+
+@inlined
+def coil_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
+    """Return the current in the coil [A]; none flows in a path that is blocked."""
+    if path_of(live) == BLOCKED:
+        return 0.0
+    if hammer[TURN_RESISTANCE] > 0.0:
+        return float((electric[0] - electric[1]) / hammer[LEAKAGE])
+    return current_at(x, electric[0], hammer)
+
+
+@inlined
+def magnetising_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
+    """Return the current [A] that the magnet sees: in the coil, and in the shorted turn if there is one."""
+    if hammer[TURN_RESISTANCE] > 0.0:
+        return current_at(x, electric[1], hammer)
+    return coil_current(x, electric, hammer, live)
+
+
+@inlined
+def source_of(t: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float]:
+    """Return the voltage [V] that acts on the coil and the resistance [ohm] in series with it."""
+    kind = kind_of(live)
+    if kind == SWITCHED_PIECE:
+        if path_of(live) == CHOPPED:
+            return -hammer[DIODE], 0.0
+        return live[4], live[5]
+    if kind == DECAY_PIECE:
+        return (live[4] if path_of(live) == BACKWARD else -live[4]), live[5]
+    if kind == RESERVOIR_PIECE:
+        return electric[2], live[5]
+    return drive_value(t, live), hammer[SERIES]
+
+
+@inlined
+def open_rate(x: float, v: float, electric: Electric, hammer: Hammer) -> float:
+    """Return the rate of the flux linkage [V] while no current flows in the coil."""
+    if hammer[TURN_RESISTANCE] > 0.0:
+        return float(-hammer[TURN_RESISTANCE] * current_at(x, electric[1], hammer))
+    if hammer[COUPLED] != 0.0:
+        return magnet_emf(hammer[MAGNET:], x, 0.0) * v
+    return 0.0
+
+
+@inlined
+def reservoir_rate(current: float, electric: Electric, hammer: Hammer, live: Any) -> float:
+    """Return the rate of the voltage of the reservoir [V/s]."""
+    if hammer[CAPACITANCE] == 0.0:
+        return 0.0
+    rate = (hammer[CHARGED] - electric[2]) / hammer[CHARGING]
+    if kind_of(live) == RESERVOIR_PIECE:
+        rate -= hammer[COILS] * current
+    return float(rate / hammer[CAPACITANCE])
+
+
+@inlined
+def electric_rates(
+    t: float, x: float, v: float, electric: Electric, hammer: Hammer, live: Any
+) -> tuple[float, float, float]:
+    """Return the rates of the electric state [V, V, V/s]."""
+    if path_of(live) == BLOCKED:
+        rate = open_rate(x, v, electric, hammer)
+        return (
+            rate,
+            (rate if hammer[TURN_RESISTANCE] > 0.0 else 0.0),
+            reservoir_rate(0.0, electric, hammer, live),
+        )
+    voltage, series = source_of(t, electric, hammer, live)
+    current = coil_current(x, electric, hammer, live)
+    turn = 0.0
+    if hammer[TURN_RESISTANCE] > 0.0:
+        turn = -hammer[TURN_RESISTANCE] * (current_at(x, electric[1], hammer) - current)
+    rate = voltage - (hammer[RESISTANCE] + series) * current
+    return rate, turn, reservoir_rate(current, electric, hammer, live)
+
+
+@inlined
+def moved(electric: Electric, pause: float, rates: Electric) -> Electric:
+    """Return the electric state after a pause [s] in which its rates stay."""
+    return (
+        electric[0] + pause * rates[0],
+        electric[1] + pause * rates[1],
+        electric[2] + pause * rates[2],
+    )
+
+
+@compiled
+def electric_at_rest(x: float, hammer: Hammer) -> tuple[float, float, float]:
+    """Return the electric state without current, the reservoir full."""
+    linkage = linkage_at(x, 0.0, hammer)
+    return linkage, linkage, hammer[CHARGED]
+
+
+@compiled
+def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float, float, float]:
+    """Return the electric state next to `electric` in which no current flows in the coil."""
+    if hammer[TURN_RESISTANCE] > 0.0:
+        return electric[1], electric[1], electric[2]
+    return linkage_at(x, 0.0, hammer), electric[1], electric[2]
+
+
+@compiled
+def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
+    """Return a number, of the order of one, that is positive while the path of the current stays."""
+    kind, path = kind_of(live), path_of(live)
+    scale = hammer[CURRENT_SCALE]
+    if kind == SWITCHED_PIECE:
+        if path == SOURCE:
+            if math.isinf(live[6]):
+                return 1.0
+            return float((live[6] - coil_current(x, electric, hammer, live)) / scale)
+        if path == CHOPPED:
+            return float((coil_current(x, electric, hammer, live) - max(live[7], 0.0)) / scale)
+        against = hammer[DIODE]
+    elif kind == DECAY_PIECE:
+        if path == SOURCE:
+            return float(coil_current(x, electric, hammer, live) / scale)
+        if path == BACKWARD:
+            return float(-coil_current(x, electric, hammer, live) / scale)
+        against = live[4]
+    else:
+        return 1.0
+    return float((open_rate(x, v, electric, hammer) + against) / (scale * hammer[RESISTANCE]))
+
+
+@compiled
+def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
+    """Put the current on the path that follows where the gap has closed; return the electric state there."""
+    path = path_of(live)
+    if kind_of(live) == DECAY_PIECE:
+        if path == BLOCKED:
+            take_path(live, SOURCE, math.inf)
+            return electric
+        take_path(live, BLOCKED, math.inf)
+        return without_current(x, electric, hammer)
+    if path == SOURCE:
+        take_path(live, CHOPPED, t - live[7] if live[7] < 0.0 else math.inf)
+    elif path == BLOCKED:
+        take_path(live, CHOPPED, live[live.size - UNTIL])
+    elif live[7] >= 0.0:
+        take_path(live, SOURCE, math.inf)
+    else:
+        take_path(live, BLOCKED, live[live.size - UNTIL])
+        return without_current(x, electric, hammer)
+    return electric
+
+
+@compiled
+def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
+    """Put the current on its path where a piece begins, or an off-time ends; return the electric state."""
+    current = coil_current(x, electric, hammer, live)
+    kind = kind_of(live)
+    if kind == SWITCHED_PIECE and current >= live[6]:
+        take_path(live, CHOPPED, t - live[7] if live[7] < 0.0 else math.inf)
+    elif kind == DECAY_PIECE and abs(current) <= STILL_SHARE * hammer[CURRENT_SCALE]:
+        take_path(live, BLOCKED, math.inf)
+        return without_current(x, electric, hammer)
+    elif kind == DECAY_PIECE and current < 0.0:
+        take_path(live, BACKWARD, math.inf)
+    elif kind != -1.0 or path_of(live) != BLOCKED:
+        take_path(live, SOURCE, math.inf)
+    return electric
+
+
+@compiled
+def is_quiet(t: float, x: float, time_scale: float, electric: Electric, hammer: Hammer, live: Any) -> bool:
+    """Tell whether the circuit of an armature at rest stays as it is until the next edge."""
+    kind = kind_of(live)
+    if kind != -1.0 and kind < SWITCHED_PIECE:
+        return False
+    rates = electric_rates(t, x, 0.0, electric, hammer, live)
+    limit = STILL_SHARE * hammer[LINKAGE_SCALE] / time_scale
+    voltage = STILL_SHARE * max(hammer[CHARGED], hammer[RESISTANCE] * hammer[CURRENT_SCALE]) / time_scale
+    return bool(abs(rates[0]) <= limit and abs(rates[1]) <= limit and abs(rates[2]) <= voltage)
+
+
+@compiled
+def fastest_rate(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
+    """Return the largest decay rate of the circuit [1/s] about the present state."""
+    if path_of(live) == BLOCKED and hammer[TURN_RESISTANCE] == 0.0:
+        return 0.0
+    current = magnetising_current(x, electric, hammer, live)
+    inductance = hammer[INDUCTANCE]
+    if hammer[COUPLED] != 0.0:
+        inductance += magnet_inductance(hammer[MAGNET:], x, current)
+    resistance = hammer[RESISTANCE] + source_of(0.0, electric, hammer, live)[1]
+    if hammer[TURN_RESISTANCE] > 0.0:
+        turn = hammer[TURN_RESISTANCE]
+        return float(turn / inductance + (turn + resistance) / hammer[LEAKAGE])
+    return float(resistance / inductance)

@@ -1,0 +1,161 @@
+"""What the loop of a run asks before and after a step: modes, lengths of steps, ends of the range."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    FRONT,
+    MAGNET,
+    PACK,
+    POSITION,
+    Control,
+    ForceLaw,
+)
+
+if TYPE_CHECKING:
+    from printhammer.kernel.methods.landing import State, land_on_level, level_switch
+    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.laws import (
+        BACKSTOP_PULLS,
+        HAS_BACKSTOP,
+        HAS_PACK,
+        MEMORY,
+        RELOAD_ALONG_UNLOADING,
+        RIGID,
+        backstop_switch,
+        pack_memory,
+    )
+    from printhammer.kernel.model.pulses import Drive
+
+
+@compiled
+def first_mode(x: float, v: float, a: float, hammer: Hammer) -> int:
+    """Return the mode of an initial state; a state in the pack meets fresh paper at its own depth."""
+    if HAS_BACKSTOP:
+        b = hammer[POSITION]
+        if x < b and not RIGID:
+            if (
+                not BACKSTOP_PULLS
+                and backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(b - x), v) <= 0.0
+            ):
+                return M.BACKSTOP_RELEASED
+            return M.BACKSTOP
+        if x <= b and RIGID and v <= 0.0:
+            return M.RESTING if v == 0.0 and a < 0.0 else M.FREE
+        if x == b and (v < 0.0 or (v == 0.0 and a < 0.0)):
+            return M.BACKSTOP
+    if HAS_PACK and x >= hammer[FRONT]:
+        if x > hammer[FRONT] and v < 0.0 and MEMORY:
+            return M.UNLOADING
+        if x > hammer[FRONT] or v > 0.0:
+            return M.LOADING
+    return M.FREE
+
+
+@compiled
+def time_to_level(distance: float, v: float, a: float) -> float:
+    """Return the time [s] in which a constant acceleration covers `distance` >= 0, or infinity."""
+    if v <= 0.0 and a <= 0.0:
+        return math.inf
+    under_root = v * v + 2.0 * a * distance
+    if under_root < 0.0:
+        return math.inf
+    root = math.sqrt(under_root)
+    if v > 0.0:
+        return 2.0 * distance / (v + root)
+    return (root - v) / a
+
+
+@compiled
+def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
+    """Shorten a step that would overshoot the backstop or the pack front by far."""
+    if HAS_BACKSTOP and mode == M.FREE:
+        height = x - hammer[POSITION]
+        if height > 0.0:
+            h = min(h, 1.02 * time_to_level(height, -v, -a))
+        elif height == 0.0 and v > 0.0 and a < 0.0:
+            h = min(h, -2.04 * v / a)
+    if HAS_PACK and mode == M.FREE and x < hammer[FRONT]:
+        h = min(h, 1.02 * time_to_level(hammer[FRONT] - x, v, a))
+    return h
+
+
+@compiled
+def out_of_bounds(x: float, bounds: Any) -> int:
+    """Return the status of a displacement: `bounds` is (lowest, highest, origin, far)."""
+    if not (bounds[0] <= x <= bounds[1]):
+        return M.RANGE_LEFT
+    if abs(x - bounds[2]) > bounds[3]:
+        return M.RUNAWAY
+    return M.OK
+
+
+@compiled
+def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds: Any) -> tuple[bool, State]:
+    """Tell whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
+    h = end[0] - start[0]
+    for side in range(2):
+        bound = bounds[side]
+        sign = 1.0 if side == 1 else -1.0
+        # A backstop that does not lie outside the range keeps the armature off its lower end.
+        if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and law.mode == M.FREE):
+            continue
+        if start[1] == bound and sign * end[1] > sign * bound:
+            return True, start
+        code, fraction, upper = level_switch(start, end, h, bound, sign, law, control)
+        if code == M.REACHED_FRONT:
+            return True, land_on_level(start, h, fraction, upper, bound, sign, law, control)
+    return out_of_bounds(end[1], bounds) == M.RANGE_LEFT, end
+
+
+@compiled
+def failure(x: float, v: float, bounds: Any, control: Control) -> int:
+    """Return the status of a run whose step became too short."""
+    near = 0.05 * control[0]
+    if (x - bounds[0] < near and v <= 0.0) or (bounds[1] - x < near and v >= 0.0):
+        return M.RANGE_LEFT
+    return M.STEP_UNDERFLOW
+
+
+@compiled
+def reversed_mode(
+    t: float, x: float, mode: int, peak: float, memory: float, hammer: Hammer, drive: Drive
+) -> tuple[int, float, float]:
+    """Return mode, peak and memory after the velocity became zero inside the pack."""
+    if mode == M.LOADING:
+        if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
+            return M.LOADING, peak, memory
+        return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+    if mode == M.RELOADING:
+        return M.UNLOADING, peak, memory
+    if RELOAD_ALONG_UNLOADING:
+        again = acceleration(t, x, 0.0, M.UNLOADING, memory, hammer, drive) > 0.0
+        return (M.RELOADING if again else M.UNLOADING), peak, memory
+    # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the
+    # other forces overcome it, else this point is at once a new local maximum.
+    if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
+        return M.LOADING, peak, memory
+    return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
+
+
+@compiled
+def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> tuple[float, float, float]:
+    """Return time, w and velocity shortly after a touch without velocity, the contact force still negligible.
+
+    The regularised equations stand still at w = v = 0.
+    """
+    depth = 1e-15 * control[0]
+    pause = min(math.sqrt(2.0 * depth / -a), t_next - t)
+    return t + pause, math.sqrt(-0.5 * a) * pause, a * pause
+
+
+@compiled
+def contact_unit(v: float, control: Control) -> float:
+    """Return the scale of s for a touch with velocity `v`; a Hertz contact lasts |v|^-0.6 in s."""
+    speed = max(abs(v), 1e-6 * control[1])
+    return float(math.sqrt(control[0]) / (control[1] ** 0.4 * speed**0.6))

@@ -1,0 +1,71 @@
+"""Winding of the coil: resistance, constant inductance, and a shorted turn for eddy currents.
+
+    d lambda / dt = u - R i,    lambda = lambda_m(x, i) + L i,    R = R20 (1 + 0.00393 (T - 20 degC))
+
+The flux linkage lambda_m is that of the magnet, of the same coenergy as its force; the voltage u is positive
+where it drives a positive current, and a moving armature induces -v d lambda / dx. With a shorted turn, of
+resistance Re and leakage Ls referred to the coil,
+
+    lambda = lambda_1 + Ls i,    d lambda_1 / dt = -Re ie,    lambda_1 = lambda_m(x, i + ie) + L (i + ie).
+
+Source: H. H. Woodson and J. R. Melcher, *Electromechanical Dynamics* (1968), ch. 3; the temperature
+coefficient of copper, IEC 60028. Validity: currents that do not crowd in the wire. Weakness: one shorted turn
+stands for eddy currents that spread in the iron; the iron has no hysteresis. It has a circuit only where the
+drive is a voltage; a current is taken as it is.
+
+Packed constants: c = [resistance, inductance, turn_resistance, leakage, back_emf].
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Final, Self
+
+from pydantic import Field, model_validator
+
+from printhammer.parts.base import CoilPart, register
+from printhammer.support.constants import quantity
+
+COPPER: Final = 3.93e-3
+"""Temperature coefficient of the resistance of copper at 20 degC, 1/K."""
+
+REFERENCE: Final = 20.0
+"""Temperature at which the resistance is stated, degC."""
+
+
+@register
+class Winding(CoilPart):
+    """Constants of the winding."""
+
+    law: ClassVar[str] = "winding"
+
+    resistance: float | None = quantity("ohm", "R", "resistance of the coil at 20 degC", ge=0, default=None)
+    inductance: float = quantity("H", "L", "constant part of the inductance", ge=0, default=0.0)
+    temperature: float = quantity(
+        "degC", "T", "temperature of the winding", gt=-200, lt=400, default=REFERENCE
+    )
+    turn_resistance: float | None = quantity(
+        "ohm", "Re", "resistance of a shorted turn, referred to the coil", gt=0, default=None
+    )
+    leakage: float | None = quantity(
+        "H", "Ls", "leakage inductance between coil and shorted turn", gt=0, default=None
+    )
+    back_emf: bool = Field(default=True, description="whether the magnet's flux is linked with the coil")
+
+    @model_validator(mode="after")
+    def _turn_is_whole(self) -> Self:
+        if (self.turn_resistance is None) != (self.leakage is None):
+            there, missing = "turn_resistance", "leakage"
+            if self.turn_resistance is None:
+                there, missing = missing, there
+            raise ValueError(f"{there} is given without {missing}, expected both or none")
+        return self
+
+    @property
+    def warm_resistance(self) -> float:
+        """Resistance at the temperature of the winding, ohm; 0 where none is stated."""
+        return (self.resistance or 0.0) * (1.0 + COPPER * (self.temperature - REFERENCE))
+
+    def packed(self, origin: float) -> tuple[float, ...]:
+        """Return the constants as the module states, the resistance at the temperature of the winding."""
+        turn, leakage = self.turn_resistance or 0.0, self.leakage or 0.0
+        return (self.warm_resistance, self.inductance, turn, leakage, float(self.back_emf))

@@ -1,0 +1,158 @@
+"""What the kernel has to know of a supply and of the coil on it, and whether the two make a circuit."""
+
+from __future__ import annotations
+
+import math
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.kernel.model import layout
+from printhammer.parts import absent
+from printhammer.parts.coil.winding import Winding
+
+if TYPE_CHECKING:
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.base import Supply, Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+_PLACES: Final = 33
+"""Places on the way of the armature at which the inductance is looked at."""
+
+_SHORT: Final = 1e-3
+"""Time, s, in which a coil without resistance is taken to reach its typical current."""
+
+
+def waveforms_of(drive: Drive) -> tuple[Waveform, ...]:
+    """Return the waveforms that a drive fires, each once."""
+    fired = getattr(drive, "waveforms", None) or (drive.waveform,)
+    return tuple(dict.fromkeys(fired))
+
+
+def supply_of(drive: Drive) -> Supply:
+    """Return the supply of a drive by voltage.
+
+    Raises
+    ------
+    InputError
+        Its waveforms are on different supplies.
+    """
+    supplies = {waveform.supply() for waveform in waveforms_of(drive)}
+    if len(supplies) > 1:
+        raise InputError("the waveforms of the drive are on different supplies, expected one supply")
+    return supplies.pop()
+
+
+def winding_of(hammer: Hammer) -> Winding:
+    """Return the winding of a hammer that a voltage drives.
+
+    Raises
+    ------
+    InputError
+        The hammer has no coil, its resistance is not stated, or the magnet's law links no flux.
+    """
+    coil = hammer.coil
+    if not isinstance(coil, Winding) or coil.resistance is None:
+        raise InputError(
+            f"{hammer.path}: coil.resistance is missing, expected the resistance of the coil that the voltage"
+            " drives"
+        )
+    if coil.back_emf and hammer.magnet is not None and not hammer.magnet.has_linkage:
+        raise InputError(
+            f"{hammer.path}: the magnet law {hammer.magnet.law!r} links no flux, expected one that does or"
+            " coil.back_emf = false"
+        )
+    return coil
+
+
+def linkage(hammer: Hammer, x: float, current: float) -> float:
+    """Return the flux linkage of the main path of a coil, Wb, at a displacement, m, and a current, A."""
+    coil = winding_of(hammer)
+    own = coil.inductance * current
+    if hammer.magnet is None or not coil.back_emf:
+        return own
+    law = _law(hammer, "magnet_linkage")
+    return own + float(law(np.array(hammer.magnet.packed(hammer.origin)), x, current))
+
+
+def inductance(hammer: Hammer, x: float, current: float) -> float:
+    """Return the slope of the flux linkage of the main path with the current, H."""
+    coil = winding_of(hammer)
+    if hammer.magnet is None or not coil.back_emf:
+        return coil.inductance
+    law = _law(hammer, "magnet_inductance")
+    own = float(law(np.array(hammer.magnet.packed(hammer.origin)), x, current))
+    return coil.inductance + own
+
+
+def _law(hammer: Hammer, name: str) -> Any:
+    module = import_module(hammer.magnet.module) if hammer.magnet is not None else absent
+    return getattr(module, name, None) or getattr(absent, name)
+
+
+def typical_current(hammer: Hammer, drive: Drive) -> float:
+    """Return the largest current that a drive by voltage lets flow for long, A."""
+    coil = winding_of(hammer)
+    largest = 0.0
+    for waveform in waveforms_of(drive):
+        resistance = coil.warm_resistance + getattr(waveform, "series", 0.0)
+        voltage = waveform.peak
+        if resistance > 0.0:
+            current = voltage / resistance
+        else:
+            slope = inductance(hammer, hammer.origin, 0.0) + (coil.leakage or 0.0)
+            current = voltage * min(_SHORT, waveform.support) / slope if slope > 0.0 else voltage
+        hold = getattr(waveform, "hold_upper", None)
+        if hold is not None and hold > current:
+            raise InputError(
+                f"hold_upper = {hold:g} A: expected less than {current:.4g} A, the most that {voltage:g} V"
+                f" drives through {resistance:.4g} ohm"
+            )
+        upper = getattr(waveform, "upper", None)
+        largest = max(largest, current if upper is None else min(upper, current))
+    return largest or 1.0
+
+
+def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
+    """Put the supply, and the scales of current and flux linkage, into the array of constants.
+
+    Raises
+    ------
+    InputError
+        The hammer has no circuit for a voltage, or its flux linkage does not rise with the current.
+    """
+    coil, supply = winding_of(hammer), supply_of(drive)
+    current = typical_current(hammer, drive)
+    check_linkage(hammer, current)
+    constants[layout.DIODE : layout.DIODE + 6] = supply
+    constants[layout.CURRENT_SCALE] = current
+    span = abs(linkage(hammer, hammer.origin, current) - linkage(hammer, hammer.origin, 0.0))
+    if not (math.isfinite(span) and span > 0.0):
+        span = coil.inductance * current
+    constants[layout.LINKAGE_SCALE] = span + (coil.leakage or 0.0) * current
+
+
+def check_linkage(hammer: Hammer, current: float) -> None:
+    """Refuse a coil whose flux linkage does not rise with the current on the way of the armature.
+
+    Raises
+    ------
+    InputError
+        As said.
+    """
+    coil = winding_of(hammer)
+    low = hammer.origin
+    ends = [place for place in (hammer.front, hammer.platen) if place is not None]
+    high = max([*ends, low])
+    for x in np.linspace(low, high, _PLACES if high > low else 1).tolist():
+        for share in (0.0, 0.5, 1.0):
+            slope = inductance(hammer, x, share * current)
+            if slope <= 0.0:
+                least = coil.inductance - slope
+                raise InputError(
+                    f"{hammer.path}: coil.inductance = {coil.inductance:g} H: expected more than"
+                    f" {least:.4g} H, so that the flux linkage rises with the current at x = {x:.4g} m"
+                )
