@@ -26,6 +26,7 @@ argument      what it is
 ``c``         packed constants, a float64 array, in the order that the module states
 ``x``, ``v``  displacement, m, and velocity, m/s
 ``current``   current of the coil, A
+``linkage``   flux linkage of the coil, Wb, of which ``inductance``, H, times the current is not the magnet's
 ``peak``      displacement of the latest local maximum inside this contact of the pack, m
 ``q``         what ``pack_memory`` returned of it
 ``w``         sqrt(b - x), root of the compression of the backstop, m^0.5
@@ -33,9 +34,11 @@ argument      what it is
 ============  ===============================================================================================
 
 Forces are in N, positive toward the paper. Minus the slope of an energy, J, is the force, of the magnet at
-zero current. What a module leaves out comes from `printhammer.parts.absent`, the part that is not there. A
-``..._switch`` function changes sign where a law has a kink inside a contact (an option that forbids a surface
-to pull), so that an integrator can locate it.
+zero current. Force and flux linkage of a magnet are slopes of one coenergy: ``magnet_emf`` is the slope of
+the linkage along x and that of the force along the current, ``magnet_inductance`` the slope of the linkage
+along the current, and ``magnet_current`` its inverse. What a module leaves out comes from
+`printhammer.parts.absent`, the part that is not there. A ``..._switch`` function changes sign where a law has
+a kink inside a contact (an option that forbids a surface to pull), so that an integrator can locate it.
 """
 
 from importlib import import_module

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 import printhammer as ph
 from printhammer.control.duty.duty import ThermalCoil, steady, time_to
 from printhammer.control.duty.heat import FEEDS, DotHeat, dot_heat
+from printhammer.parts.coil.winding import COPPER
 
 AMBIENT = [25.0, 50.0] * 3
 RAIL = [21.6, 21.6, 24.0, 24.0, 26.4, 26.4]
