@@ -143,7 +143,7 @@ def test_a_sampled_waveform_lies_beside_the_drive_file(tmp_path: Path) -> None:
         (TRAIN + '[waveform]\nshape = ["half-sine"]', "waveform.shape"),
         (TRAIN + HALF + 'rise = "1 us"', "waveform.rise"),
         (TRAIN + HALF.replace("350", "0"), "waveform.width = 0.0"),
-        (TRAIN + HALF.replace("1 A", "1 V"), "waveform.amplitude.*'V'"),
+        (TRAIN + HALF.replace("1 A", "1 W"), "waveform.amplitude.*'W'"),
         (TRAIN + HALF.replace('width = "350 us"', ""), "waveform.width is missing"),
         (TRAIN + '[waveform]\nshape = "sampled"', "file, or time"),
         (TRAIN + '[waveform]\nshape = "sampled"\nfile = 3', "waveform.file = 3"),

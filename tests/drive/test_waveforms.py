@@ -92,7 +92,9 @@ def test_sine_never_ends() -> None:
 
 
 def test_shapes_are_the_words_of_a_file() -> None:
-    assert set(SHAPES) == {"half-sine", "rectangle", "trapezoid", "sampled"}
+    pulses = {"half-sine", "rectangle", "trapezoid", "sampled"}
+    drivers = {"rail", "chopper", "peak-and-hold", "capacitor", "bridge"}
+    assert set(SHAPES) == pulses | drivers
     assert all(shape.shape == word for word, shape in SHAPES.items())
 
 
@@ -216,7 +218,7 @@ def test_a_csv_file_of_a_force_makes_a_force_waveform(tmp_path: Path) -> None:
         ("time [us],current []\n0,1\n1,2\n", "unit"),
         ("time [us],current [lbf]\n0,1\n1,2\n", "lbf"),
         ("time [mm],current [A]\n0,1\n1,2\n", "mm"),
-        ("time [us],voltage [V]\n0,1\n1,2\n", "voltage"),
+        ("time [us],power [W]\n0,1\n1,2\n", "power"),
         ("current [A],time [us]\n0,1\n1,2\n", "'current' and 'time'"),
         ("time [us]\n0\n1\n", "1 columns"),
         ("time [us],current [A]\n0,1\n1\n", "line 3 has 1 cells"),

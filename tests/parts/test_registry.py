@@ -13,6 +13,7 @@ from printhammer.parts import (
     PARTS,
     ROLES,
     BackstopPart,
+    CoilPart,
     DampingPart,
     MagnetPart,
     PackPart,
@@ -24,6 +25,7 @@ from printhammer.parts import (
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.coil.winding import Winding
 from printhammer.parts.damping.viscous import ViscousDamping
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.magnet.moving_coil import MovingCoilMagnet
@@ -79,9 +81,11 @@ EXAMPLES: list[Part] = [
     ElastomerBackstop(position=5e-5, stiffness=8e7, relaxation_time=2e-5),
     RigidBackstop(position=5e-5, restitution=0.4),
     ViscousDamping(coefficient=0.5),
+    Winding(resistance=3.0, inductance=2e-3),
 ]
 BASES = {
     "magnet": MagnetPart,
+    "coil": CoilPart,
     "spring": SpringPart,
     "pack": PackPart,
     "backstop": BackstopPart,
@@ -115,7 +119,8 @@ def test_absent_has_every_law_with_its_arguments() -> None:
 def test_absent_parts_do_nothing() -> None:
     absent = import_module("printhammer.parts.absent")
     for name, count in ARGUMENTS.items():
-        expected = {"pack_switch": 1.0, "backstop_switch": 1.0, "backstop_rebound": 0.5}.get(name, 0.0)
+        ones = dict.fromkeys(("pack_switch", "backstop_switch", "magnet_current"), 1.0)
+        expected = {**ones, "backstop_rebound": 0.5}.get(name, 0.0)
         assert getattr(absent, name)(None, *[-0.5] * (count - 1)) == expected
 
 
@@ -253,7 +258,7 @@ def test_a_part_from_elsewhere_can_register(monkeypatch: pytest.MonkeyPatch) -> 
         role = "wheel"
         law = "round"
 
-    with pytest.raises(ValueError, match="expected one of magnet, spring, pack, backstop"):
+    with pytest.raises(ValueError, match="expected one of magnet, coil, spring, pack, backstop"):
         register(Wheel)
 
 

@@ -15,7 +15,7 @@ from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import LinearSpring
 from printhammer.printing.dots.nominal import nominal
-from printhammer.run.coil_work import coil_power
+from printhammer.run.energy.coil_work import coil_power
 
 
 @pytest.mark.parametrize("softer", [1.0, 2.0])

@@ -12,9 +12,9 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, Rows, derived, provenance
 from printhammer.results.files import write_csv, write_parquet
-from printhammer.run.coil_work import CoilWork, coil_work_of
+from printhammer.run.energy.coil_work import CoilWork, coil_work_of
 from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading_works
-from printhammer.run.ledger import Ledger, increments_of, ledger_of
+from printhammer.run.energy.ledger import Ledger, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
 
 if TYPE_CHECKING:
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "drive", "total")
 """Names of the forces: equations (3), (4), (5), (6), (7), damping of the armature wherever it is, where the
 hammer has any, a drive that is a force, and their sum."""
+
+PATHS: Final = ("supply", "chopped", "blocked", "backward")
+"""Paths of the current of a coil: as the supply has it, around through the diode of a chopper, none, and the
+decay of a negative current."""
 
 _BISECTIONS: Final = 52
 
@@ -142,6 +146,15 @@ class Motion(Result, fields=False):
     def driven_at(self, t: npt.ArrayLike) -> FloatArray:
         """Return the current in the coil, A, or the force of the drive, N, at any times of the run, s."""
         return self._resampled(t)[:, 10] if self._problem.laws.circuit else self.drive.value(t)
+
+    @cached_property
+    def switchings(self) -> tuple[FloatArray, tuple[str, ...]]:
+        """Times at which the current of the coil took another path, s, and the paths: see `PATHS`."""
+        if not self._problem.laws.circuit:
+            return np.zeros(0), ()
+        times, paths = self._record.nodes[:, 0], self._record.nodes[:, -1]
+        rows = np.flatnonzero(np.diff(paths) != 0.0) + 1
+        return times[rows], tuple(PATHS[int(code)] for code in paths[rows].tolist())
 
     def _electric(self, column: int) -> FloatArray:
         return self._grid[:, column] if self._problem.laws.circuit else np.zeros(len(self._times))

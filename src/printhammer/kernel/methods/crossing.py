@@ -43,12 +43,15 @@ def closes(g0: float, d0: float, g1: float, d1: float) -> int:
         REACHED_FRONT if it closes once, NO_SWITCH if it does not, UNRESOLVED if the step must be halved.
     """
     b1, b2 = g0 + d0 / 3.0, g1 - d1 / 3.0
-    if g1 <= 0.0:
-        if g0 <= BEGUN and d0 > 0.0:
-            return M.UNRESOLVED
-        return M.UNRESOLVED if b1 < 0.0 < b2 else M.REACHED_FRONT
     if g0 <= BEGUN:
-        return M.NO_SWITCH if b2 > 0.0 else M.UNRESOLVED
+        # The slope at the start is no better known than the gap.
+        if g1 > BEGUN:
+            return M.NO_SWITCH if b2 > 0.0 else M.UNRESOLVED
+        if g1 >= -BEGUN:
+            return M.NO_SWITCH
+        return M.REACHED_FRONT if g0 < -0.1 * BEGUN else M.UNRESOLVED
+    if g1 <= 0.0:
+        return M.UNRESOLVED if b1 < 0.0 < b2 else M.REACHED_FRONT
     bent = max(abs(b1 - (2.0 * g0 + g1) / 3.0), abs(b2 - (g0 + 2.0 * g1) / 3.0))
     return M.NO_SWITCH if min(b1, b2) > 0.5 * bent else M.UNRESOLVED
 
@@ -59,7 +62,7 @@ def rest_gap(a: float, mode: int, control: Control) -> float:
     unit = control[1] * control[1] / control[0]
     if mode == M.RESTING:
         return -a / unit
-    return STILL - abs(a) / unit
+    return 1.0 - abs(a) / (STILL * unit)
 
 
 @compiled

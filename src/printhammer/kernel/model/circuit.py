@@ -51,7 +51,6 @@ from printhammer.kernel.model.layout import (
 )
 
 if TYPE_CHECKING:
-    from printhammer.kernel.model.forces import Hammer
     from printhammer.kernel.model.laws import (
         HAS_CIRCUIT,
         magnet_current,
@@ -60,6 +59,8 @@ if TYPE_CHECKING:
         magnet_linkage,
     )
     from printhammer.kernel.model.pulses import Drive, drive_value
+
+Hammer = Any
 
 Electric = Any
 """Flux linkage of the coil, that of the shorted turn [Wb], voltage of the reservoir [V]; or nothing."""

@@ -223,7 +223,10 @@ def run(
         if steps > max_steps:
             status = M.STEP_LIMIT
             break
-        stuck = stuck + 1 if t == t_before else 0
+        stands = t == t_before
+        if HAS_CIRCUIT:
+            stands = t - t_before <= 1e-14 * time_scale
+        stuck = stuck + 1 if stands else 0
         t_before = t
         if stuck > STUCK:
             status = M.STEP_UNDERFLOW

@@ -68,11 +68,17 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 
 
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
-    """Return the current at which the flux linkage and a constant inductance make `linkage`, A."""
+    """Return the current at which the flux linkage and a constant inductance make `linkage`, A.
+
+    NaN where the sum does not rise with the current.
+    """
     if x < 0.0:
         return math.nan
     depth = 4.0 * c[2] * math.sqrt(x)
-    return float((linkage - depth * c[1]) / (inductance - depth * c[2]))
+    slope = inductance - depth * c[2]
+    if slope <= 0.0:
+        return math.nan
+    return float((linkage - depth * c[1]) / slope)
 
 
 @register

@@ -17,7 +17,7 @@ from printhammer.printing.dots.settling import Wear, wear_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
 from printhammer.printing.dots.strategy import Strategy, checked_drives, name_of, open_loop
 from printhammer.results import Declared, Result, column, derived, part, scalar
-from printhammer.run.coil_work import squared_current
+from printhammer.run.energy.coil_work import squared_current
 from printhammer.run.ensemble import DotTable
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Dot
-    from printhammer.run.ledger import Ledger
+    from printhammer.run.energy.ledger import Ledger
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 PITCH: Final = 25.4e-3 / 60.0  # Distance of neighbouring slots on the paper by default, m: sixty to the inch

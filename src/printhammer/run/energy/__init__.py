@@ -1,0 +1,1 @@
+"""Where the energy of a run comes from and goes."""
