@@ -104,7 +104,11 @@ def integrate(
             else:
                 u, series = now.voltage, now.series
             total = device.inductance + device.slope(x, i)
-            return [v, force / device.mass, (u - (device.resistance + series) * i - device.emf(x, i) * v) / total]
+            return [
+                v,
+                force / device.mass,
+                (u - (device.resistance + series) * i - device.emf(x, i) * v) / total,
+            ]
 
         return slope
 

@@ -136,6 +136,12 @@ def least_work_rates(hammer: Hammer) -> Result:
     )
 
 
+def dead_time(hammer: Hammer) -> Result:
+    # With a blow that one of the rails does not reach.
+    wire = ph.load("impact-wire")
+    return ph.dead_time(wire, voltage=[20.0, 38.0], temperature=[20.0], blow=3.2)
+
+
 def thermal_duty(hammer: Hammer) -> Result:
     # Bursts of which one may last, and one melts the copper.
     bursts = ["100 Hz", "1 kHz", "1 MHz"]
@@ -148,6 +154,7 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     **CHAOS,
     "CompensationTable": compensation_table,
     "DampingStudy": damping_study,
+    "DeadTime": dead_time,
     "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
     "EnsembleResult": ensemble,
     "Feedback": feedback,

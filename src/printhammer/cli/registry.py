@@ -13,6 +13,7 @@ from printhammer.cli.verbs.chaos.strobe import strobe
 from printhammer.cli.verbs.laboratory import fit, hammer, reconstruct
 from printhammer.cli.verbs.laboratory.datasheet import from_datasheet
 from printhammer.cli.verbs.laboratory.measure import measure
+from printhammer.cli.verbs.printing.dead_time import dead_time
 from printhammer.cli.verbs.printing.duty import duty
 from printhammer.cli.verbs.printing.energy import energy
 from printhammer.cli.verbs.printing.feedback import feedback
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, lyapunov),
-    *(print_, energy, feedback, quality, tune, duty, bench, studio, sweep, measure, warm),
+    *(print_, energy, feedback, quality, tune, dead_time, duty, bench, studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped, from_datasheet),
     *(fit.magnet, fit.spring, fit.pack, fit.backstop, fit.motion),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),

@@ -14,6 +14,7 @@ PLOTS: Final = {
     "Branch": "chaos.continuation.plot",
     "Branches": "chaos.continuation.plot",
     "CompensationTable": "control.compensation.plot",
+    "DeadTime": "control.dead_time.plot",
     "DampingStudy": "printing.damping.plot",
     "Feedback": "control.feedback.plot",
     "Feedback.run": "control.feedback.plot_run",

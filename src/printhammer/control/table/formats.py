@@ -25,6 +25,8 @@ from printhammer.control.table.histories import (
     shared_numbers,
 )
 from printhammer.errors import InputError
+from printhammer.support.c_code import comment, identifier, numbers
+from printhammer.support.c_code import table as c_table
 from printhammer.support.constants import shown
 from printhammer.support.sheets import sheet_of
 
@@ -244,15 +246,14 @@ def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, 
     Every number of a history is there, so that the firmware needs no search.
     """
     gaps, reach = head["gaps"], head["reach"]
-    prefix = re.sub(r"\W+", "_", f"printhammer_{head['hammer']}", flags=re.ASCII).lower()
+    prefix = identifier(head["hammer"])
     guard, upper = f"{prefix}_table_h".upper(), prefix.upper()
     entries, fingerprint = entries_of(gaps, reach), re.sub(r"[^0-9a-zA-Z]", "", head["fingerprint"])
-    name = head["hammer"].encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
-    name = "".join(letter if letter.isprintable() else " " for letter in name)
-    arrays = ""
-    for column, values in times.items():
-        rows = "\n".join(f"  {{\n{_numbers(row)}\n  }}," for row in np.rint(values / NANOSECOND))
-        arrays += f"\nstatic const int32_t {prefix}_{column}[{rates.size}][{entries}] = {{\n{rows}\n}};\n"
+    name = comment(head["hammer"])
+    arrays = "".join(
+        f"\n{c_table('int32_t', f'{prefix}_{column}', np.rint(values / NANOSECOND))}"
+        for column, values in times.items()
+    )
     return f"""\
 #ifndef {guard}
 #define {guard}
@@ -274,7 +275,7 @@ def header_text(head: Mapping[str, Any], rates: FloatArray, times: Mapping[str, 
 
 /* Slots per second, in millihertz. */
 static const uint32_t {prefix}_rate[{rates.size}] = {{
-{_numbers(np.rint(1e3 * rates))}
+{numbers(np.rint(1e3 * rates))}
 }};
 {arrays}
 /* Number of a history; what lies before a rest does not count. */
@@ -291,9 +292,3 @@ static inline unsigned {prefix}_history(const unsigned *gaps)
 
 #endif
 """
-
-
-def _numbers(values: FloatArray) -> str:
-    """Write whole numbers, ten a line."""
-    texts = [str(int(value)) for value in values]
-    return ",\n".join("    " + ", ".join(texts[at : at + 10]) for at in range(0, len(texts), 10))

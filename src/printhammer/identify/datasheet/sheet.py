@@ -182,7 +182,7 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
     if not isinstance(driver, Mapping):
         raise InputError(f"driver = {shown(driver)}: expected a table with a shape")
     sheet = DataSheet(
-        where, texts, entries, points, inductance, dict(driver), _assumed(document, entries), _why(document)
+        where, texts, entries, points, inductance, dict(driver), _assumed(document), _why(document)
     )
     _check(sheet)
     return sheet
@@ -221,17 +221,22 @@ def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[
     return first, second
 
 
-def _assumed(document: Mapping[str, Any], entries: Mapping[str, Entry]) -> frozenset[str]:
+def _keys(document: Mapping[str, Any]) -> list[str]:
+    """List the keys of a sheet whose origin may be told: tables, and what is in them."""
+    whole = [key for key in document if key not in (*TEXTS, "assumed", "why")]
+    inner = [f"{name}.{key}" for name in (*TABLES, "driver") for key in document.get(name, {})]
+    return [*whole, *inner]
+
+
+def _assumed(document: Mapping[str, Any]) -> frozenset[str]:
     assumed = document.get("assumed", [])
     if not isinstance(assumed, list):
         raise InputError(f'assumed = {shown(assumed)}: expected keys of this sheet, such as ["mass"]')
-    whole = (key for key in document if key not in (*TEXTS, "assumed", "why"))
-    known = dict.fromkeys([*whole, *entries, *(f"driver.{key}" for key in document.get("driver", {}))])
+    known = _keys(document)
     for key in assumed:
         if key not in known:
-            raise InputError(
-                f"assumed: {shown(key)} is no key of this sheet, expected {nearest(str(key), known)}"
-            )
+            expected = nearest(str(key), known)
+            raise InputError(f"assumed: {shown(key)} is no key of this sheet, expected {expected}")
     return frozenset(assumed)
 
 
@@ -242,9 +247,7 @@ def _why(document: Mapping[str, Any]) -> dict[str, str]:
     ):
         raise InputError(f"why = {shown(why)}: expected a table of keys and texts")
     for key in why:
-        if key not in document and key not in [
-            f"{name}.{each}" for name in TABLES for each in document.get(name, {})
-        ]:
+        if key not in _keys(document):
             raise InputError(f"why.{key} is given, expected a key of this sheet")
     return dict(why)
 
