@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import PulseTrain
     from printhammer.hammer.hammer import Hammer
 
-TEMPERATURES: Final = (20.0, 60.0, 100.0, 140.0)
+TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 """Temperatures of the winding at which a hammer with a driver is fired, degC."""
 
 _LEFT: Final = 1e-3  # Current that may be left at the end, in parts of the largest
