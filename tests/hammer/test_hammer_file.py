@@ -89,15 +89,18 @@ BAD = {
     "number for a source": (changed('source = "H[^"]*"', "source = 3"), ["platen.source = 3"]),
     "no law": (
         changed("^law.*", ""),
-        ["magnet.law is missing", "expected one of inverse-root, moving-coil, reluctance, table"],
+        [
+            "magnet.law is missing",
+            "expected one of inverse-root, linkage-table, moving-coil, reluctance, table",
+        ],
     ),
     "unknown law": (
         changed('"inverse-root"', '"cubic"'),
-        ["magnet.law = 'cubic'", "inverse-root, moving-coil, reluctance, table"],
+        ["magnet.law = 'cubic'", "inverse-root, linkage-table, moving-coil, reluctance, table"],
     ),
     "list for a law": (
         changed('"inverse-root"', "[]"),
-        ["magnet.law = []", "inverse-root, moving-coil, reluctance, table"],
+        ["magnet.law = []", "inverse-root, linkage-table, moving-coil, reluctance, table"],
     ),
     "unknown shape": (
         changed('"rectangle"', '"round"'),

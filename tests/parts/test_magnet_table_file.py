@@ -1,4 +1,4 @@
-"""Force tables from CSV files: what is read, and what is refused."""
+"""Tables of forces and of flux linkages from CSV files: what is read, and what is refused."""
 
 from pathlib import Path
 
@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from printhammer.errors import InputError
+from printhammer.parts.magnet.linkage_table import LinkageTableMagnet
 from printhammer.parts.magnet.table import TableMagnet
 
 GRID = """# measured on 1982-11-03
@@ -27,7 +28,7 @@ def test_units_and_order_do_not_matter(tmp_path: Path) -> None:
     plain = read(tmp_path / "plain.csv", GRID)
     assert plain.table.x == (1e-4, 2e-4)
     assert plain.table.current == (0.0, 1.0)
-    assert plain.table.force == ((1.0, 2.0), (3.0, 4.5))
+    assert plain.table.values == ((1.0, 2.0), (3.0, 4.5))
     assert plain.domain == (1e-4, 2e-4)
     assert plain.current_range == (0.0, 1.0)
     other = "\ufeffforce [mN], current [mA] ,displacement [um]\r\n4500,1000,200\r\n\r\n2000,1000,100\r\n"
@@ -114,3 +115,48 @@ def test_any_text_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, t
     except InputError as error:
         told = str(error)
     assert "\n" not in told
+
+
+LINKAGES = """displacement [mm],current [A],linkage [mWb]
+0.1,0,0
+0.1,1,20
+0.1,2,30
+0.2,0,0
+0.2,1,30
+0.2,2,50
+"""
+
+
+def test_linkages_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "linkages.csv"
+    path.write_text(LINKAGES)
+    assert LinkageTableMagnet(file=str(path)).table.values == ((0.0, 0.02, 0.03), (0.0, 0.03, 0.05))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            LINKAGES.replace("0.1,2,30", "0.1,2,20"),
+            "at 0.0001 m the linkage goes from 0.02 to 0.02 Wb between 1 and 2 A, expected one that rises",
+        ),
+        (
+            LINKAGES.replace("0.2,2,50", "0.2,2,31"),
+            "the spline through the linkages falls about 2 A, expected one that rises with the current",
+        ),
+        (
+            LINKAGES.replace("linkage [mWb]", "force [N]"),
+            "expected 'displacement [mm],current [A],linkage [Wb]'",
+        ),
+        (LINKAGES.replace("mWb", "N"), "the unit 'N' is a force, expected"),
+        ("", "and a grid of linkages"),
+    ],
+)
+def test_a_table_of_linkages_without_coenergy_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "linkages.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        LinkageTableMagnet(file=str(path))
+    assert str(caught.value).startswith(f"{path}: ")
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -232,7 +232,7 @@ def test_table_goes_through_its_points_and_ends_there() -> None:
     part = cubic_table()
     module, c = law(part)
     table = part.table
-    for x, row in zip(table.x, table.force, strict=True):
+    for x, row in zip(table.x, table.values, strict=True):
         for current, force in zip(table.current, row, strict=True):
             assert module.magnet_force(c, x, current) == pytest.approx(force, rel=1e-12)
     for x, current in [(0.99e-4, 0.0), (6.01e-4, 0.0), (2e-4, -0.51), (2e-4, 2.01), (math.nan, 0.0)]:

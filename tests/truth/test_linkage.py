@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -12,8 +13,11 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from printhammer.parts import MagnetPart
+from printhammer.parts.magnet._grid import GridMagnet
+from printhammer.parts.magnet.linkage_table import LinkageTableMagnet
 from printhammer.parts.magnet.moving_coil import MovingCoilMagnet
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet
+from printhammer.parts.magnet.table import TableMagnet
 
 STENCIL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 """Central differences of the eighth order."""
@@ -178,3 +182,84 @@ def test_a_moving_coil_gives_back_what_it_takes() -> None:
     assert module.magnet_emf(c, 0.25, 2.0) == -4.0
     assert module.magnet_current(c, 0.25, -1.0 + 0.5 * 2.0, 0.5) == 2.0
     assert math.isnan(module.magnet_current(c, 0.25, -1.0, 0.0))
+
+
+KNOTS = (1e-4, 1.5e-4, 2.5e-4, 3e-4, 4.5e-4, 6e-4)
+CURRENTS = (-0.5, 0.0, 0.4, 1.0, 1.5, 2.0)
+TABLES: list[type[GridMagnet]] = [TableMagnet, LinkageTableMagnet]
+
+
+@cache
+def table_of(kind: type[GridMagnet], seed: int) -> MagnetPart:
+    """A table of a circuit, with noise."""
+    noise = np.random.default_rng(seed).normal(0.0, 1e-2, (len(KNOTS), len(CURRENTS)))
+    x, current = np.array(KNOTS)[:, None], np.array(CURRENTS)
+    if kind is TableMagnet:
+        return kind.from_arrays(KNOTS, CURRENTS, 1e4 * x * current**2 + 0.1 * noise)
+    return kind.from_arrays(KNOTS, CURRENTS, 1e-2 * (1.0 + 2e3 * x) * np.arctan(current) + 1e-2 * noise)
+
+
+@pytest.mark.parametrize("kind", TABLES)
+@given(seed=st.integers(0, 4), x=st.floats(1.01e-4, 5.99e-4), current=st.floats(-0.499, 1.999))
+def test_tables_have_one_coenergy(kind: type[GridMagnet], seed: int, x: float, current: float) -> None:
+    # Inside a cell both are polynomials, whose differences are exact.
+    assume(min(abs(x - knot) for knot in KNOTS) > 5e-6)
+    assume(min(abs(current - knot) for knot in CURRENTS) > 0.02)
+    module, c = law(table_of(kind, seed))
+    emf, inductance = module.magnet_emf(c, x, current), module.magnet_inductance(c, x, current)
+    largest = max(abs(module.magnet_emf(c, x, i)) for i in np.linspace(-0.5, 2.0, 11))
+    most = max(abs(module.magnet_inductance(c, s, i)) for i in CURRENTS for s in KNOTS)
+    along_current = slope(lambda i: module.magnet_force(c, x, i), current, 0.004)
+    along_x = slope(lambda s: module.magnet_linkage(c, s, current), x, 1e-6)
+    assert along_current == pytest.approx(emf, abs=1e-9 * largest)
+    assert along_x == pytest.approx(emf, abs=1e-9 * largest)
+    rise = slope(lambda i: module.magnet_linkage(c, x, i), current, 0.004)
+    assert rise == pytest.approx(inductance, abs=1e-9 * most)
+
+
+@pytest.mark.parametrize("kind", TABLES)
+@given(seed=st.integers(0, 4), x=st.floats(1e-4, 6e-4), current=st.floats(-0.5, 2.0))
+def test_tables_are_continuous_and_inverted(
+    kind: type[GridMagnet], seed: int, x: float, current: float
+) -> None:
+    module, c = law(table_of(kind, seed))
+    for name in ("magnet_force", "magnet_linkage", "magnet_emf", "magnet_inductance"):
+        of = getattr(module, name)
+        for knot in KNOTS[1:-1]:
+            size = max(abs(of(c, knot, i)) for i in CURRENTS)
+            before = of(c, knot * (1.0 - 1e-14), current)
+            assert before == pytest.approx(of(c, knot, current), abs=1e-9 * size)
+        for knot in CURRENTS[1:-1]:
+            size = max(abs(of(c, s, 1.9)) for s in KNOTS)
+            assert of(c, x, knot - 1e-14) == pytest.approx(of(c, x, knot), abs=1e-9 * size)
+    # A table of forces lacks the inductance at its beginning, of which its noise asks for some.
+    for inductance in (0.1, 1.0) if kind is TableMagnet else (0.0, 1e-3, 1.0):
+        linkage = module.magnet_linkage(c, x, current) + inductance * current
+        back = module.magnet_current(c, x, linkage, inductance)
+        assert back == pytest.approx(current, rel=1e-13, abs=1e-13)
+    assert math.isnan(module.magnet_current(c, x, 1e3, 0.1))
+    assert math.isnan(module.magnet_current(c, 0.9 * KNOTS[0], 0.0, 0.1))
+
+
+def test_tables_of_a_circuit_give_force_and_linkage_back() -> None:
+    magnet = ReluctanceMagnet(
+        turns=500.0,
+        pole_area=5e-5,
+        residual_gap=2e-4,
+        closed_at=3e-3,
+        core_reluctance=4e5,
+        saturation_flux=9e-5,
+    )
+    module, c = law(magnet)
+    x, current = np.linspace(0.0, 2.5e-3, 41), np.linspace(0.0, 3.0, 41)
+    linkages = [[module.magnet_linkage(c, a, i) for i in current] for a in x]
+    forces = [[module.magnet_force(c, a, i) for i in current] for a in x]
+    by_linkage, d = law(LinkageTableMagnet.from_arrays(x, current, linkages))
+    by_force, e = law(TableMagnet.from_arrays(x, current, forces))
+    for a in (0.03e-3, 0.7e-3, 1.9e-3, 2.45e-3):
+        assert by_linkage.magnet_force(d, a, 0.0) == pytest.approx(0.0, abs=1e-15)
+        for i in (0.2, 0.9, 1.7, 2.9):
+            linkage, begin = module.magnet_linkage(c, a, i), module.magnet_linkage(c, 0.0, i)
+            assert by_linkage.magnet_linkage(d, a, i) == pytest.approx(linkage, rel=1e-4)
+            assert by_linkage.magnet_force(d, a, i) == pytest.approx(module.magnet_force(c, a, i), rel=3e-3)
+            assert by_force.magnet_linkage(e, a, i) + begin == pytest.approx(linkage, rel=1e-3)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _COLOURS: Final = (style.BLUE, style.GREEN, style.YELLOW, style.INK, "#56b4e9", "#cc79a7", style.MUTED)
 _KINDS: Final = {
     "displacement": "displacement",
+    "gap": "displacement",
     "indentation": "displacement",
     "force": "force",
     "time": "time",
@@ -31,7 +32,7 @@ _KINDS: Final = {
     "impact speed": "velocity",
     "rebound speed": "velocity",
 }
-"""How each quantity of a table is shown."""
+"""How each quantity of a table is shown; others are pure numbers."""
 
 _MANY: Final = 400
 """From so many data on, points are drawn small."""
@@ -73,6 +74,8 @@ def plot(fit: Fit) -> Figure:
 
 
 def _scale(name: str, values: FloatArray) -> Scale:
+    if name not in _KINDS:
+        return Scale(name, "1", "1")
     return scale(cast(Name, _KINDS[name]), float(np.abs(values).max()))
 
 

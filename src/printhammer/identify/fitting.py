@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.result import Fit
 
-KINDS: Final = ("magnet", "spring", "pack", "backstop", "motion")
+KINDS: Final = ("magnet", "solenoid", "spring", "pack", "backstop", "motion")
 
 
 def fit(
@@ -26,7 +26,8 @@ def fit(
     Parameters
     ----------
     kind : str
-        "magnet": F0, Am, Bm (and Bs, As) from forces against displacement and current; "spring": Bs, As from
+        "magnet": F0, Am, Bm (and Bs, As) from forces against displacement and current; "solenoid": the
+        circuit of the law `reluctance` from forces and inductances against the gap; "spring": Bs, As from
         forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
         rebounds; "motion": mass, damping and others from records of single shots.
     path : path, or sequence of path
@@ -39,7 +40,8 @@ def fit(
     **options
         Of the kind; lengths in m or with a unit. All: `robust` (true), whether rows that lie too far off are
         left out. "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the
-        reading of the displacement sensor at x = 0, or None to fit it. "spring": `position`. "pack":
+        reading of the displacement sensor at x = 0, or None to fit it. "solenoid": as
+        `printhammer.identify.static.solenoid.fit_solenoid`. "spring": `position`. "pack":
         `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
         `printhammer.identify.static.backstop.Stiffness`. "motion": as
         `printhammer.identify.shots.motion.fit_motion`.
@@ -69,6 +71,10 @@ def fit(
         many, options["spring"] = _magnet_and_spring(many)
     if len(many) != 1:
         raise InputError(f"{len(many)} tables, expected one of the kind {kind!r}")
+    if kind == "solenoid":
+        from printhammer.identify.static.solenoid import fit_solenoid
+
+        return fit_solenoid(many[0], **options)
     for name in ("position", "thickness", "zero"):
         if isinstance(options.get(name), str):
             options[name] = read_number(options[name], "m", name)

@@ -23,7 +23,7 @@ CONFIDENCE: Final = 0.95
 """Probability with which an interval is meant to contain the constant."""
 
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
-"""Laws whose constants are fitted, by role."""
+"""Laws whose constants are fitted, by role; of a magnet another one where the kind is "solenoid"."""
 
 _BODIES: Final = (
     "radius1",
@@ -95,7 +95,9 @@ class Profile(Declared, eq=False):
 class Fit(Result):
     """The result of a fit."""
 
-    kind: str = scalar("", "what was fitted", more='"magnet", "spring", "pack", "backstop" or "motion"')
+    kind: str = scalar(
+        "", "what was fitted", more='"magnet", "solenoid", "spring", "pack", "backstop" or "motion"'
+    )
     source: tuple[str, ...] = scalar("", "names of the files", more="without their folders")
     constants: Mapping[str, FittedConstant] = part("constants by key")
     keys: tuple[str, ...] = coordinate(
@@ -214,6 +216,10 @@ class Fit(Result):
             if constant.in_file
         }
 
+    @property
+    def _laws(self) -> dict[str, str]:
+        return {**LAWS, "magnet": "reluctance"} if self.kind == "solenoid" else LAWS
+
     def _source(self, constant: FittedConstant) -> str:
         """Return the source of a constant, such as "fitted to magnet.csv, standard error 0.02 N"."""
         how = constant.how or f"fitted to {' and '.join(self.source)}"
@@ -232,7 +238,7 @@ class Fit(Result):
             remarks.append(f"the data reject the law: {self.rejected}")
         constants = self.for_file
         sections = {key.rpartition(".")[0]: None for key in constants}
-        laws = [(f"{section}.law", LAWS[section]) for section in sections if section in LAWS]
+        laws = [(f"{section}.law", self._laws[section]) for section in sections if section in LAWS]
         comments = "".join(f"# {' '.join(remark.split())}\n" for remark in remarks)
         # Tables come last, or the constants at the top would become theirs.
         return changed_text(comments, sorted([*laws, *constants.items()], key=lambda edit: "." in edit[0]))
@@ -257,9 +263,11 @@ class Fit(Result):
         sections = {key.rpartition(".")[0] for key in constants} & set(LAWS)
         for section in sorted(sections):
             part = hammer.parts.get(section)
-            if part is None or part.law != LAWS[section]:
+            if part is None or part.law != self._laws[section]:
                 law = "is missing" if part is None else f"has the law {part.law!r}"
-                raise InputError(f"{hammer.path}: the {section} {law}, expected the law {LAWS[section]!r}")
+                raise InputError(
+                    f"{hammer.path}: the {section} {law}, expected the law {self._laws[section]!r}"
+                )
         for key, text in self.given.items():
             _agrees(hammer, key, text)
         gone = [other for key in constants for other in REPLACED.get(key, ())]

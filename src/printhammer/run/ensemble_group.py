@@ -121,7 +121,11 @@ def _problems(
     problems: list[Problem] = []
     problem_of = np.zeros(len(members), np.int64)
     peaks, peak_of = np.unique(fired.peak_of[members], return_inverse=True)
-    alike = Ragged.sorted_by(hammer_of[members] * len(peaks) + peak_of)
+    # A capacitor or a diode is the drive's, and lies with the hammer's constants.
+    supplies = fired.supply_of.max(initial=0) + 1
+    alike = Ragged.sorted_by(
+        (hammer_of[members] * len(peaks) + peak_of) * supplies + fired.supply_of[members]
+    )
     for places in map(alike.__getitem__, range(len(alike))):
         own = members[places]
         hammer, drive = hammers[hammer_of[own[0]]], fired.drives[own[0]]

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.base import Supply
     from printhammer.kernel.compile.lanes import LaneKinds
     from printhammer.support.arrays import FloatArray
 
@@ -28,13 +29,16 @@ class Form(NamedTuple):
     replace, force : bool
         Whether a firing cuts off the pulses before it; whether it is a force.
     peak : float
-        Largest absolute value of any one pulse, A or N.
+        Largest absolute value of any one pulse, A, N or V.
+    supply : Supply
+        Supply of a voltage.
     """
 
     table: int
     replace: bool
     force: bool
     peak: float
+    supply: Supply
 
 
 class Fired:
@@ -50,8 +54,8 @@ class Fired:
         Firing times of the members, s.
     begins : int array, shape (all firings,)
         Row of the member's tables at which that of each firing begins.
-    table_of, peak_of : array, shape (members,)
-        Table and peak of the form of each member.
+    table_of, peak_of, supply_of : array, shape (members,)
+        Table, peak and number of the supply of the form of each member.
     tables, rates, kinds : list
         The segment tables, and what `closed_form` says of each.
     """
@@ -79,6 +83,10 @@ class Fired:
             self.begins = np.concatenate([np.zeros(0, np.int64), *begins])
         self.table_of = np.array([form.table for form in self.forms], dtype=np.int64)[self.form_of]
         self.peak_of = np.array([form.peak for form in self.forms])[self.form_of]
+        supplies = {
+            supply: number for number, supply in enumerate({form.supply: None for form in self.forms})
+        }
+        self.supply_of = np.array([supplies[form.supply] for form in self.forms])[self.form_of]
 
     def _add(self, drive: Drive) -> int:
         """Return the number of the form of a drive, a new one if need be."""
@@ -97,7 +105,7 @@ class Fired:
             if table not in self._peaks:
                 self._peaks[table] = drive.largest_pulse
             peak = self._peaks[table]
-        form = Form(table, bool(replace), bool(force), peak)
+        form = Form(table, bool(replace), bool(force), peak, drive.waveform.supply())
         if form not in self._forms:
             self._forms[form] = len(self.forms)
             self.forms.append(form)

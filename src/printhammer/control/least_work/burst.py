@@ -34,10 +34,10 @@ from printhammer.results import Declared, Result, Rows, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
-from printhammer.run.energy.coil_work import CoilWork, coil_power
 from printhammer.run.contacts import Contact
-from printhammer.run.ensemble import Ensemble
+from printhammer.run.energy.coil_work import CoilWork, coil_power
 from printhammer.run.energy.ledger import Ledger, stored_energy
+from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate
 from printhammer.units import from_si

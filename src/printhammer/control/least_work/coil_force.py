@@ -22,8 +22,8 @@ class CoilForce:
     """Fm(x, I) - Fm(x, 0) as a smooth surface through values of the law, for searches.
 
     Its error is about 1e-8 of the largest force. What a search has found is computed anew with the law
-    itself, see `printhammer.run.energy.coil_work`. The hammer has magnet, pack and backstop; the surface reaches to
-    currents of `largest`, A, of either sign.
+    itself, see `printhammer.run.energy.coil_work`. The hammer has magnet, pack and backstop; the surface
+    reaches to currents of `largest`, A, of either sign.
     """
 
     def __init__(self, hammer: Hammer, largest: float) -> None:

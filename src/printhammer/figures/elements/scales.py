@@ -73,7 +73,7 @@ def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> Se
     The data of the axes are in `shown.unit`; another name than that of the scale may be given.
     """
     name = name or shown.label
-    text = f"{name}  [{shown.sign}]".replace("\n  ", "\n")
+    text = f"{name}  [{shown.sign}]".replace("\n  ", "\n") if shown.unit != "1" else name
     if side == "x":
         ax.set_xlabel(text)
     else:

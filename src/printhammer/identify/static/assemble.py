@@ -30,7 +30,7 @@ class Data(Declared, eq=False):
     """The data of a fit and where they were measured."""
 
     files: tuple[Path, ...] = part("where they come from")
-    kind: str = part('one of "magnet", "spring", "pack" and "backstop"')
+    kind: str = part('one of "magnet", "solenoid", "spring", "pack" and "backstop"')
     abscissa: FloatArray = part("SI, shape (m,)")
     values: FloatArray = part("SI, shape (m,)")
     axes: tuple[tuple[str, str], tuple[str, str]] = part("names and SI units")

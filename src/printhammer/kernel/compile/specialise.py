@@ -177,6 +177,9 @@ def law_bindings(laws: Laws) -> tuple[dict[str, Any], bytes]:
         text += _source(module)
         for function in functions:
             bindings[function] = getattr(module, function, None) or getattr(absent, function)
+        used = {name for function in functions for name in _modules_of(bindings[function])}
+        others = sorted(used - {module.__name__, absent.__name__})
+        text += b"".join(_source(sys.modules[other]) for other in others)
         bindings[f"HAS_{role.upper()}"] = bool(name)
         if role == "pack":
             bindings["MEMORY"] = bool(getattr(module, "MEMORY", False))
@@ -213,7 +216,7 @@ def _specialised(laws: Laws) -> Kernel:
     sources = hashlib.sha256(text + repr((laws, numba.__version__)).encode())
     compiled = importlib.import_module("printhammer.kernel.compile.compiling").compiled
     namespace = {
-        name: _compile_law(value, compiled) if isinstance(value, FunctionType) else value
+        name: compile_law(value, compiled) if isinstance(value, FunctionType) else value
         for name, value in bindings.items()
     }
     parts = [getattr(laws, role).rpartition(".")[2] for role in _LAW_FUNCTIONS if getattr(laws, role)]
@@ -252,18 +255,27 @@ def functions_of(module: ModuleType) -> dict[str, Any]:
     }
 
 
-def _compile_law(function: FunctionType, compiled: Callable[..., Any]) -> Any:
-    """Compile a law, together with the helpers of its own module that it calls."""
-    helpers = {
+def compile_law(function: Callable[..., Any], compiled: Callable[..., Any]) -> Any:
+    """Compile a law, together with the helpers that it calls."""
+    if isinstance(function, FunctionType) and (helpers := _helpers_of(function)):
+        scope = dict(function.__globals__)
+        scope.update({name: compile_law(helper, compiled) for name, helper in helpers.items()})
+        function = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
+    return compiled(function)
+
+
+def _helpers_of(function: FunctionType) -> dict[str, FunctionType]:
+    """Return the functions that a law calls, by the name that it uses."""
+    return {
         name: value
         for name in function.__code__.co_names
         if isinstance(value := function.__globals__.get(name), FunctionType)
     }
-    if helpers:
-        scope = dict(function.__globals__)
-        scope.update({name: _compile_law(helper, compiled) for name, helper in helpers.items()})
-        function = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
-    return compiled(function)
+
+
+def _modules_of(function: FunctionType) -> set[str]:
+    """Return the names of the modules of a law and all that it calls."""
+    return {function.__module__}.union(*(_modules_of(helper) for helper in _helpers_of(function).values()))
 
 
 def execute(template: str, tag: str, namespace: dict[str, Any]) -> ModuleType:

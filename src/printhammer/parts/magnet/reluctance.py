@@ -53,7 +53,7 @@ def _gap_inductance(c: Any, x: float) -> float:
     s = g + c[3]
     if not (s > 0.0 and c[6] - c[7] * g >= 0.0):
         return math.nan
-    return float(c[2] / s + c[4] * math.log1p(c[5] / s))
+    return float(c[2] / s + c[4] * math.log(1.0 + c[5] / s))
 
 
 def _gap_slope(c: Any, x: float) -> float:

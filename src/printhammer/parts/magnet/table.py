@@ -1,32 +1,38 @@
 """Magnet given by a measured table of forces F(x, I).
 
-    Fm = S(x, I),  S the bicubic spline through the table
+    Fm = S(x, I),    lambda = integral of dS/dI from the smallest displacement to x
 
-Source: the measurement named in the file; equation (3) of the paper is one fit to such a table. The file is
-a CSV with one line a point and units in its heading (`displacement [mm],current [A],force [N]`), a complete
-grid in any order, 0 A within its currents. Validity: the displacements and currents of the table. Outside
-it the functions return NaN rather than extrapolate, which a run reports as the range left. Weakness: a
-spline through measured points also follows their noise, and its third derivative jumps between cells.
+S is the bicubic spline through the table. The linkage is what the force asks for (one coenergy); what it
+lacks is its part at the smallest displacement, taken as the inductance of the coil there, a constant.
 
-Packed constants: c = [nx, ni, x[nx], current[ni], coefficients[nx - 1][ni - 1][4][4], energy[nx - 1][5]];
-within a cell F = sum over p, q of coefficients[p][q] (x - x[i])^p (I - current[j])^q.
+    [magnet]
+    law = "table"
+    file = "forces.csv"
+
+Source: the measurement named in the file; equation (3) of the paper is one fit to such a table. The file is a
+CSV with one line a point and units in its heading (`displacement [mm],current [A],force [N]`), a complete
+grid in any order, 0 A within its currents. Validity: the displacements and currents of the table. Outside it
+the functions return NaN rather than extrapolate, which a run reports as the range left. Weakness: a spline
+through measured points also follows their noise, and its third derivative jumps between cells; the linkage
+follows the noise of its slope along the current.
+
+Packed constants: c = [nx, ni, x[nx], current[ni], coefficients[nx - 1][ni - 1][4][4], energy[nx - 1][5],
+linkage[nx - 1][ni - 1][3]]; within a cell F = sum over p, q of coefficients[p][q] (x - x[i])^p (I -
+current[j])^q, and at x[i] the linkage is the sum over q of linkage[q] (I - current[j])^q.
 """
 
 from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
-
-from printhammer.errors import InputError
-from printhammer.parts.base import MagnetPart, register
-from printhammer.parts.magnet._force_table import ForceTable, gather, packed_spline, read_csv
-from printhammer.support.constants import folder_of
+from printhammer.parts.base import register
+from printhammer.parts.magnet._cells import cell_of
+from printhammer.parts.magnet._grid import Grid, GridMagnet, bicubic, cell_at_zero
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from printhammer.support.arrays import FloatArray
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
@@ -35,22 +41,8 @@ def magnet_force(c: Any, x: float, current: float) -> float:
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
         return math.nan
-    i = 0
-    high = nx - 1
-    while high - i > 1:
-        middle = (i + high) // 2
-        if c[2 + middle] <= x:
-            i = middle
-        else:
-            high = middle
-    j = 0
-    high = ni - 1
-    while high - j > 1:
-        middle = (j + high) // 2
-        if c[2 + nx + middle] <= current:
-            j = middle
-        else:
-            high = middle
+    i = cell_of(c, 2, nx, x)
+    j = cell_of(c, 2 + nx, ni, current)
     dx = x - c[2 + i]
     di = current - c[2 + nx + j]
     cell = 2 + nx + ni + 16 * (i * (ni - 1) + j)
@@ -70,21 +62,106 @@ def magnet_energy(c: Any, x: float) -> float:
     ni = int(c[1])
     if not c[2] <= x <= c[1 + nx]:
         return math.nan
-    i = 0
-    high = nx - 1
-    while high - i > 1:
-        middle = (i + high) // 2
-        if c[2 + middle] <= x:
-            i = middle
-        else:
-            high = middle
+    i = cell_of(c, 2, nx, x)
     dx = x - c[2 + i]
     k = 2 + nx + ni + 16 * (nx - 1) * (ni - 1) + 5 * i
     return float(c[k] + dx * (c[k + 1] + dx * (c[k + 2] + dx * (c[k + 3] + dx * c[k + 4]))))
 
 
+def _linkage(c: Any, x: float, j: int) -> tuple[float, float, float]:
+    """Return the linkage at x in a cell of the currents: powers 0 to 2 of the current from its lower end."""
+    nx = int(c[0])
+    ni = int(c[1])
+    i = cell_of(c, 2, nx, x)
+    dx = x - c[2 + i]
+    cell = 2 + nx + ni + 16 * (i * (ni - 1) + j)
+    k = 2 + nx + ni + (nx - 1) * (16 * (ni - 1) + 5) + 3 * (i * (ni - 1) + j)
+    level = 0.0
+    rise = 0.0
+    bend = 0.0
+    for p in range(3, -1, -1):
+        share = 1.0 / (p + 1)
+        level = level * dx + share * c[cell + 4 * p + 1]
+        rise = rise * dx + share * c[cell + 4 * p + 2]
+        bend = bend * dx + share * c[cell + 4 * p + 3]
+    return c[k] + dx * level, c[k + 1] + 2.0 * dx * rise, c[k + 2] + 3.0 * dx * bend
+
+
+def magnet_linkage(c: Any, x: float, current: float) -> float:
+    """Return the flux linkage, Wb, without its part at the smallest displacement; NaN outside the table."""
+    nx = int(c[0])
+    ni = int(c[1])
+    if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
+        return math.nan
+    j = cell_of(c, 2 + nx, ni, current)
+    di = current - c[2 + nx + j]
+    level, rise, bend = _linkage(c, x, j)
+    return float(level + di * (rise + di * bend))
+
+
+def magnet_emf(c: Any, x: float, current: float) -> float:
+    """Return the slope of the force along the current, N/A, which is that of the linkage along x."""
+    nx = int(c[0])
+    ni = int(c[1])
+    if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
+        return math.nan
+    i = cell_of(c, 2, nx, x)
+    j = cell_of(c, 2 + nx, ni, current)
+    dx = x - c[2 + i]
+    di = current - c[2 + nx + j]
+    cell = 2 + nx + ni + 16 * (i * (ni - 1) + j)
+    emf = 0.0
+    for p in range(3, -1, -1):
+        k = cell + 4 * p
+        emf = emf * dx + (c[k + 1] + di * (2.0 * c[k + 2] + di * 3.0 * c[k + 3]))
+    return float(emf)
+
+
+def magnet_inductance(c: Any, x: float, current: float) -> float:
+    """Return the differential inductance, H, without that at the table's beginning; NaN outside."""
+    nx = int(c[0])
+    ni = int(c[1])
+    if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
+        return math.nan
+    j = cell_of(c, 2 + nx, ni, current)
+    _, rise, bend = _linkage(c, x, j)
+    return float(rise + 2.0 * bend * (current - c[2 + nx + j]))
+
+
+def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
+    """Return the current of a linkage with a constant inductance in series, A; NaN outside the table.
+
+    A current that rounding puts beyond the table is that of its end.
+    """
+    nx = int(c[0])
+    ni = int(c[1])
+    if not c[2] <= x <= c[1 + nx]:
+        return math.nan
+    low = 0
+    high = ni - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _linkage(c, x, middle)[0] + inductance * c[2 + nx + middle] <= linkage:
+            low = middle
+        else:
+            high = middle
+    level, rise, bend = _linkage(c, x, low)
+    rest = linkage - level - inductance * c[2 + nx + low]
+    rise += inductance
+    square = rise * rise + 4.0 * bend * rest
+    if not (rise >= 0.0 and square > 0.0):
+        return math.nan
+    current = c[2 + nx + low] + 2.0 * rest / (rise + math.sqrt(square))
+    least = c[2 + nx]
+    largest = c[1 + nx + ni]
+    slack = 1e-9 * (largest - least)
+    if not least - slack <= current <= largest + slack:
+        return math.nan
+    return float(min(max(current, least), largest))
+
+
 @register
-class TableMagnet(MagnetPart):
+class TableMagnet(GridMagnet):
     """Force table read from a CSV file.
 
     Raises
@@ -94,77 +171,39 @@ class TableMagnet(MagnetPart):
     """
 
     law: ClassVar[str] = "table"
-
-    file: str = Field(description="CSV file of the table, relative to the file that names it")
-    _table: ForceTable = PrivateAttr()
-
-    @model_validator(mode="wrap")
-    @classmethod
-    def _load(cls, data: Any, handler: Callable[[Any], Self], info: ValidationInfo) -> Self:
-        if not isinstance(data, dict):
-            return handler(data)
-        table = info.context.get("table") if isinstance(info.context, dict) else None
-        if table is None and isinstance(data.get("file"), str):
-            table = read_csv(folder_of(info) / data["file"])
-        made = handler(data)
-        if table is not None:
-            made._table = table
-        return made
-
-    @classmethod
-    def from_arrays(
-        cls, x: Sequence[float], current: Sequence[float], force: Sequence[Sequence[float]], file: str = ""
-    ) -> Self:
-        """Make the part from arrays.
-
-        Parameters
-        ----------
-        x, current : sequence of float
-            Displacements, m, and currents, A.
-        force : sequence of sequence of float
-            Forces, N, shape (len(x), len(current)).
-        file : str, optional
-            File name, only remembered.
-
-        Raises
-        ------
-        InputError
-            If the arrays do not make a grid.
-        """
-        if len(force) != len(x) or any(len(line) != len(current) for line in force):
-            raise InputError(
-                f"force table: expected {len(x)} rows of {len(current)} forces, one for each x and current"
-            )
-        rows = [
-            (float(a), float(b), float(f))
-            for a, line in zip(x, force, strict=True)
-            for b, f in zip(current, line, strict=True)
-        ]
-        return cls.model_validate({"file": file}, context={"table": gather(rows, "force table")})
-
-    @property
-    def table(self) -> ForceTable:
-        """The measured points."""
-        return self._table
-
-    @property
-    def domain(self) -> tuple[float, float]:
-        """Displacements of the table, `(x_min, x_max)` in m."""
-        return (self._table.x[0], self._table.x[-1])
-
-    @property
-    def current_range(self) -> tuple[float, float]:
-        """Currents of the table, A."""
-        return (self._table.current[0], self._table.current[-1])
-
-    def content(self) -> Mapping[str, Any]:
-        """Return the points, which belong to the identity of the magnet: x, m; current, A; force, N."""
-        return {"x": self._table.x, "current": self._table.current, "force": self._table.force}
+    quantity: ClassVar[str] = "force"
 
     @cached_property
     def _packed(self) -> tuple[float, ...]:
-        return packed_spline(self._table)
+        return _packed_spline(self._table)
 
     def packed(self, origin: float) -> tuple[float, ...]:
         """Return the spline as the module states."""
         return self._packed
+
+
+def _packed_spline(table: Grid) -> tuple[float, ...]:
+    """Return the spline of the forces with its integrals along x: of itself, and of its slope along I."""
+    import numpy as np
+
+    x, current = np.array(table.x), np.array(table.current)
+    coefficients = bicubic(table)
+    j, place = cell_at_zero(table)
+    at_zero = coefficients[:, j] @ np.power(place, np.arange(4))
+    energy = _integral(x, -at_zero)
+    slope = coefficients[..., 1:] * np.arange(1.0, 4.0)  # x cell, I cell, power of x, power of I
+    linkage = _integral(x, np.swapaxes(slope, 2, 3))[..., 0]  # x cell, I cell, power of I
+    parts = (x, current, coefficients.ravel(), energy.ravel(), linkage.ravel())
+    return (float(len(x)), float(len(current)), *np.concatenate(parts).tolist())
+
+
+def _integral(x: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return a cubic spline's integral from its first knot: cells first, powers of x last, five for four."""
+    import numpy as np
+
+    whole = np.zeros((*slope.shape[:-1], 5))
+    whole[..., 1:] = slope / np.arange(1, 5)
+    width = np.diff(x).reshape(-1, *[1] * (slope.ndim - 1))
+    rise = np.sum(whole * np.power(width, np.arange(5)), axis=-1)
+    whole[1:, ..., 0] = np.cumsum(rise, axis=0)[:-1]
+    return whole

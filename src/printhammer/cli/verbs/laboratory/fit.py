@@ -88,6 +88,36 @@ def magnet(
 
 
 @verb(
+    "fit solenoid",
+    "printhammer fit solenoid solenoid.csv --turns 957 --current '1.2 A' --out solenoid.toml",
+    _PASSED,
+    **_FILES,
+)
+def solenoid(
+    job: Job,
+    file: Path = _measured(
+        "Columns gap, force, inductance or linkage, and perhaps current: a coil at a held armature.",
+        default=...,
+    ),
+    turns: float = opt.number("Turns of the coil.", metavar="N", default=...),
+    current: float | None = opt.quantity("A", "CURRENT", "Of all rows, where the table has no column of it."),
+    hammer: str | None = _HAMMER,
+    strict: bool = _STRICT,
+    **passed: Any,
+) -> Answer:
+    """Find the magnetic circuit of a solenoid or pot magnet: gap, fringe, core, leakage.
+
+    Force and inductance at one current tell how far the core saturates. The constants are those of the magnet
+    law reluctance; where its gap closes is not among them.
+    """
+    from printhammer.identify.fitting import fit
+
+    return _fitted(
+        job, hammer, strict, lambda _known: fit("solenoid", file, turns=turns, current=current, **passed)
+    )
+
+
+@verb(
     "fit spring",
     f"{_MEASURED} printhammer fit spring lab/spring.csv --backstop '0.002 in'",
     {**_PASSED, "position": _BACKSTOP},

@@ -1,0 +1,18 @@
+"""Where a place lies among the knots of a packed table: for laws that are splines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def cell_of(c: Any, first: int, knots: int, at: float) -> int:
+    """Return the cell, counted from 0, that holds `at`, of knots that stand in c[first:first + knots]."""
+    low = 0
+    high = knots - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if c[first + middle] <= at:
+            low = middle
+        else:
+            high = middle
+    return low

@@ -1,0 +1,247 @@
+"""A table measured over displacement and current: checks, reading from CSV, bicubic spline, and its part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
+
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+
+from printhammer.errors import InputError, located
+from printhammer.parts.base import MagnetPart
+from printhammer.support.constants import folder_of
+from printhammer.support.sheets import finite, read_sheet, split_heading
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from printhammer.support.arrays import FloatArray
+
+UNITS: Final = {"force": "N", "linkage": "Wb"}
+"""SI units of what may be measured."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Values of one quantity on a complete grid, SI."""
+
+    x: tuple[float, ...]
+    """Displacements, ascending, m."""
+    current: tuple[float, ...]
+    """Currents, ascending, 0 within their range, A."""
+    values: tuple[tuple[float, ...], ...]
+    """`values[i][j]` at `x[i]` and `current[j]`."""
+
+
+def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str) -> Grid:
+    """Make a table of points in any order: displacement, m, current, A, and the quantity measured.
+
+    Messages begin with `what`.
+
+    Raises
+    ------
+    InputError
+        A point is not finite, given twice or missing, there are fewer than two displacements or currents, or
+        0 A lies outside the currents.
+    """
+    points: dict[tuple[float, float], float] = {}
+    for x, current, value in rows:
+        if not (math.isfinite(x) and math.isfinite(current) and math.isfinite(value)):
+            raise InputError(
+                f"{what}: the point {x!r} m, {current!r} A, {value!r} {UNITS[quantity]} is expected to be"
+                " finite"
+            )
+        if (x, current) in points:
+            raise InputError(f"{what}: the point {x:.9g} m, {current:.9g} A is given twice, expected once")
+        points[x, current] = value
+    xs = sorted({x for x, _ in points})
+    currents = sorted({current for _, current in points})
+    for name, values in (("displacements", xs), ("currents", currents)):
+        if len(values) < 2:
+            raise InputError(f"{what}: {len(values)} different {name}, expected at least 2")
+    for x in xs:
+        for current in currents:
+            if (x, current) not in points:
+                raise InputError(
+                    f"{what}: the point {x:.9g} m, {current:.9g} A is missing, expected a complete grid of "
+                    f"{len(xs)} displacements and {len(currents)} currents"
+                )
+    if not currents[0] <= 0.0 <= currents[-1]:
+        span = f"{currents[0]:.9g} to {currents[-1]:.9g} A"
+        raise InputError(f"{what}: the currents go from {span}, expected a range with 0 A in it")
+    measured = tuple(tuple(points[x, current] for current in currents) for x in xs)
+    return Grid(tuple(xs), tuple(currents), measured)
+
+
+def read_csv(path: Path, quantity: str) -> Grid:
+    """Read a table of one quantity of `UNITS` from a CSV file with one line a point.
+
+    The heading names the columns with their units, ``displacement [mm],current [A],force [N]``, in any
+    order; the points may come in any order. Blank lines and lines that begin with # are passed over.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is empty, lacks a unit, holds something else than finite numbers, or no
+        complete grid.
+    """
+    from printhammer.units import to_si
+
+    what = str(path)
+    columns = {"displacement": "m", "current": "A", quantity: UNITS[quantity]}
+    heading = f"displacement [mm],current [A],{quantity} [{UNITS[quantity]}]"
+    lines = read_sheet(path, f"the {quantity} table").rows
+    if not lines:
+        raise InputError(
+            f"{what}: the file is empty, expected the heading {heading!r} and a grid of {quantity}s"
+        )
+    order, units = _heading(lines[0][1], what, columns, heading)
+    rows = []
+    for number, cells in lines[1:]:
+        if len(cells) != len(order):
+            raise InputError(f"{what}: line {number} has {len(cells)} cells, expected {len(order)}")
+        row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
+        with located(f"{what}: line {number}"):
+            x, current, value = (to_si(row[name], units[name], si) for name, si in columns.items())
+        rows.append((x, current, value))
+    return gather(rows, what, quantity)
+
+
+def _heading(
+    cells: Sequence[str], what: str, columns: Mapping[str, str], heading: str
+) -> tuple[list[str], dict[str, str]]:
+    """Return the columns in order and the unit of each."""
+    from printhammer.units import to_si
+
+    units = {}
+    for cell in cells:
+        name, unit = split_heading(cell)
+        name = name.lower()
+        if name not in columns or name in units:
+            break
+        if not unit:
+            raise InputError(f"{what}: column {cell.strip()!r} has no unit, expected the heading {heading!r}")
+        with located(f"{what}: column {cell.strip()!r}"):
+            to_si(1.0, unit, columns[name])
+        units[name] = unit
+    if len(units) != len(columns) or len(cells) != len(columns):
+        listed = ",".join(cell.strip() for cell in cells)
+        raise InputError(f"{what}: the heading is {listed!r}, expected {heading!r}")
+    return list(units), units
+
+
+def bicubic(table: Grid) -> FloatArray:
+    """Return the bicubic spline of a table, coefficients by x cell, I cell, power of x, power of I.
+
+    Cubic splines with not-a-knot ends along x, then along the current (with two or three points in a
+    direction: the line or the parabola through them), so that values, slopes and curvatures are continuous;
+    C. de Boor, J. Math. Phys. 41 (1962) 212. Powers are of the distances from the lower corner of a cell.
+    """
+    import numpy as np
+    from scipy.interpolate import CubicSpline
+
+    x, current = np.array(table.x), np.array(table.current)
+    along_x = CubicSpline(x, np.array(table.values), axis=0).c[::-1]  # power of x, x cell, current
+    cells = CubicSpline(current, along_x, axis=2).c[::-1]  # power of I, I cell, power of x, x cell
+    coefficients: FloatArray = np.transpose(cells, (3, 1, 2, 0))
+    return coefficients
+
+
+def cell_at_zero(table: Grid) -> tuple[int, float]:
+    """Return the cell of the currents that holds 0 A, and how far 0 A lies in it, A."""
+    import numpy as np
+
+    current = table.current
+    j = min(max(int(np.searchsorted(current, 0.0, side="right")) - 1, 0), len(current) - 2)
+    return j, 0.0 - current[j]
+
+
+class GridMagnet(MagnetPart):
+    """A magnet whose law is the spline through a table read from a CSV file.
+
+    Raises
+    ------
+    InputError
+        The file or its grid cannot be used.
+    """
+
+    quantity: ClassVar[str]
+    """What the table holds, a key of `UNITS`."""
+
+    file: str = Field(description="CSV file of the table, relative to the file that names it")
+    _table: Grid = PrivateAttr()
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _load(cls, data: Any, handler: Callable[[Any], Self], info: ValidationInfo) -> Self:
+        if not isinstance(data, dict):
+            return handler(data)
+        table = info.context.get("table") if isinstance(info.context, dict) else None
+        if table is None and isinstance(data.get("file"), str):
+            path = folder_of(info) / data["file"]
+            table = read_csv(path, cls.quantity)
+            cls.check(table, str(path))
+        made = handler(data)
+        if table is not None:
+            made._table = table
+        return made
+
+    @classmethod
+    def check(cls, table: Grid, where: str) -> None:
+        """Refuse a table that the law cannot use; messages begin with `where`."""
+
+    @classmethod
+    def from_arrays(
+        cls, x: Sequence[float], current: Sequence[float], values: Sequence[Sequence[float]], file: str = ""
+    ) -> Self:
+        """Make the part from arrays.
+
+        Parameters
+        ----------
+        x, current : sequence of float
+            Displacements, m, and currents, A.
+        values : sequence of sequence of float
+            Forces, N, or flux linkages, Wb, shape (len(x), len(current)).
+        file : str, optional
+            File name, only remembered.
+
+        Raises
+        ------
+        InputError
+            If the arrays do not make a grid.
+        """
+        what = f"{cls.quantity} table"
+        if len(values) != len(x) or any(len(line) != len(current) for line in values):
+            raise InputError(
+                f"{what}: expected {len(x)} rows of {len(current)} {cls.quantity}s, one for each x and"
+                " current"
+            )
+        rows = [
+            (float(a), float(b), float(value))
+            for a, line in zip(x, values, strict=True)
+            for b, value in zip(current, line, strict=True)
+        ]
+        table = gather(rows, what, cls.quantity)
+        cls.check(table, what)
+        return cls.model_validate({"file": file}, context={"table": table})
+
+    @property
+    def table(self) -> Grid:
+        """The measured points."""
+        return self._table
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Displacements of the table, `(x_min, x_max)` in m."""
+        return (self._table.x[0], self._table.x[-1])
+
+    @property
+    def current_range(self) -> tuple[float, float]:
+        """Currents of the table, A."""
+        return (self._table.current[0], self._table.current[-1])
+
+    def content(self) -> Mapping[str, Any]:
+        """Return the points, which belong to the identity of the magnet: x, m; current, A; values, SI."""
+        return {"x": self._table.x, "current": self._table.current, self.quantity: self._table.values}
