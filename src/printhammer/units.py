@@ -47,7 +47,6 @@ DIMENSIONS: dict[str, str] = {
     "W": "a power",
     "V": "a voltage",
     "ohm": "a resistance",
-    "Wb": "a flux linkage",
     "H": "an inductance",
     "F": "a capacitance",
     "Wb": "a flux linkage",

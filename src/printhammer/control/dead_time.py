@@ -1,9 +1,9 @@
 """Dead time: from switching on to impact, against rail voltage and temperature of the coil.
 
-A warm coil draws less current and a low rail lets it rise later, so that a dot comes later and is struck less
-hard. Firmware that knows both fires earlier and longer: for each rail and temperature of a grid the hammer's own
-pulse is fired from rest, and then the pulse is sought, by its width, that gives the same blow: a speed of impact,
-by default that of the hammer's own pulse at its own rail and temperature.
+A warm coil draws less current and a low rail lets it rise later, so that a dot comes later and is struck
+less hard. Firmware that knows both fires earlier and longer: for each rail and temperature of a grid the
+hammer's own pulse is fired from rest, and then the pulse is sought, by its width, that gives the same blow:
+a speed of impact, by default that of the hammer's own pulse at its own rail and temperature.
 """
 
 from __future__ import annotations

@@ -1,9 +1,13 @@
 """The devices that ship do what their sheets claim."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 import printhammer as ph
 from printhammer.drive.waveforms.drivers import Rail
+from printhammer.parts.magnet import reluctance as law
 from printhammer.run.motion import Motion
 
 RATED = 5.0
@@ -69,6 +73,28 @@ def test_a_pinball_plunger_arrives_while_its_coil_is_fired() -> None:
     assert motion.status == "ok"
     assert motion.dots[0].flight_time < coil.waveform.width
     assert motion.current.max() < 50.0 / 4.2
+
+
+def test_a_pot_magnet_meets_the_forces_and_inductances_of_its_study() -> None:
+    study = np.loadtxt(
+        Path(__file__).parents[2] / "data" / "solenoid-quasistatic.csv", delimiter=",", skiprows=4
+    )
+    magnet = ph.load("pot-magnet").magnet
+    assert magnet is not None
+    c = magnet.packed(0.0)
+    for gap, force, _flux, inductance in study:
+        assert law.magnet_force(c, 5e-3 - gap, 1.2) == pytest.approx(force, rel=0.03)
+        assert law.magnet_linkage(c, 5e-3 - gap, 1.2) / 1.2 == pytest.approx(inductance, rel=0.03)
+
+
+def test_a_pot_magnet_pulls_in_on_its_rail() -> None:
+    pot = ph.load("pot-magnet")
+    motion = ph.simulate(pot, ph.PulseTrain(pot.waveform, at=[0.0]), duration=0.04)
+    assert motion.status == "ok"
+    assert motion.x[-1] > pot.front
+    # Back-EMF turns the current down before the armature arrives.
+    touch = motion.dots[0].flight_time
+    assert motion.current[motion.t < touch].max() > 1.5 * np.interp(touch, motion.t, motion.current)
 
 
 def test_a_wire_prints_with_the_current_chopped() -> None:
