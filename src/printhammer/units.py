@@ -49,7 +49,6 @@ DIMENSIONS: dict[str, str] = {
     "ohm": "a resistance",
     "H": "an inductance",
     "F": "a capacitance",
-    "Wb": "a flux linkage",
     "degC": "a temperature",
     "K": "a difference of temperatures",
     "K/W": "a thermal resistance",

@@ -68,7 +68,8 @@ def rest_state(hammer: HammerLike) -> float:
     """Return the displacement at which the armature rests at zero current, m.
 
     With a backstop against which the net force presses: the equilibrium there, compressing it (on a rigid
-    one, its position). Without a magnet, and without a backstop: the nearest stable equilibrium otherwise.
+    one, and where there is no force at all, its position). Without a magnet, and without a backstop: the
+    nearest stable equilibrium otherwise.
 
     Raises
     ------
@@ -87,6 +88,9 @@ def rest_state(hammer: HammerLike) -> float:
                     f"{_named(hammer)} has no rest state: {because}, expected it to hold the armature"
                 )
             return rest
+        if pressing == 0.0 and hammer.magnet is not None:
+            # Nothing moves it: a plunger without a spring.
+            return position
         if hammer.magnet is not None:
             because = f"at the backstop the net force at zero current is {pressing:.6g} N"
             raise InputError(f"{_named(hammer)} has no rest state: {because}, expected a negative force")
