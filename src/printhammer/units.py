@@ -47,6 +47,7 @@ DIMENSIONS: dict[str, str] = {
     "W": "a power",
     "V": "a voltage",
     "ohm": "a resistance",
+    "Wb": "a flux linkage",
     "H": "an inductance",
     "F": "a capacitance",
     "degC": "a temperature",

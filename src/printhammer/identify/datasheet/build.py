@@ -32,9 +32,6 @@ RESTITUTION: Final = 0.3
 INDENTATION: Final = 0.25
 """Part of the gap left by which the work of the magnet presses in what is struck."""
 
-HOLD: Final = 1e-3
-"""Part of the force at full gap that holds an armature without a spring at rest."""
-
 _GRID: Final = 200
 
 
@@ -68,11 +65,10 @@ def _hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
             closed_at=closed_at,
         )
     )
-    spring = _spring(sheet, magnet, current)
     parts: dict[str, Any] = {
         "magnet": _magnet(sheet, magnet),
         "coil": {"resistance": sheet.constant("resistance")},
-        "spring": spring,
+        "spring": _spring(sheet, magnet, current),
         "pack": _pack(sheet, magnet, current),
         "backstop": {
             "law": "rigid",
@@ -150,28 +146,25 @@ def _derived_from(sheet: DataSheet, key: str, how: str) -> tuple[str, str]:
     return ("derived" if status == "datasheet" else status), f"{how}; {source}"
 
 
-def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Return the table of the return spring; InputError if the magnet does not overcome it."""
+def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any] | None:
+    """Return the table of the return spring, None without one; InputError if the magnet is weaker."""
+    stated = [name for name in ("preload", "stiffness") if f"spring.{name}" in sheet.entries]
+    if not stated:
+        return None
     pull = law.magnet_force(magnet.part.packed(0.0), 0.0, current)
-    if "spring.preload" not in sheet.entries and "spring.stiffness" not in sheet.entries:
-        why = (
-            "no return spring in the sheet: a thousandth of the force at full gap keeps the armature at rest"
-        )
-        zero = _made(0.0, "N/m", "assumed", why)
-        return {"law": "preload", "preload": _made(-HOLD * pull, "N", "assumed", why), "stiffness": zero}
     preload = sheet.si("spring.preload", 0.0)
     if preload >= pull:
         raise InputError(
             f"spring.preload = {preload:g} N: expected less than the {pull:.3g} N of the magnet at full gap"
             f" and {current:.3g} A"
         )
-    table: dict[str, Any] = {"law": "preload"}
-    absent = "the sheet does not tell"
-    for name, unit, otherwise in (("preload", "N", HOLD * pull), ("stiffness", "N/m", 0.0)):
-        key = f"spring.{name}"
-        table[name] = (
-            sheet.constant(key) if key in sheet.entries else _made(otherwise, unit, "assumed", absent)
-        )
+    zero: dict[str, Any] = {"preload": _made(0.0, "N", "assumed", "the sheet does not tell")}
+    zero["stiffness"] = _made(0.0, "N/m", "assumed", "the sheet does not tell")
+    table: dict[str, Any] = {
+        "law": "preload",
+        **zero,
+        **{name: sheet.constant(f"spring.{name}") for name in stated},
+    }
     # The spring drives the armature back to the backstop.
     table["preload"]["value"] = plain(-float(table["preload"]["value"]))
     return table

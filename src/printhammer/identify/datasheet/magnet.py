@@ -133,8 +133,7 @@ def fit_magnet(sheet: Sheet) -> SheetMagnet:
             rows.append(math.log(inductance_of(part, sheet) / sheet.inductance[0]) / INDUCTANCE_ERROR)
         return np.array([*rows, *moved[free:]])
 
-    close = {"xtol": 1e-14, "ftol": 1e-14, "gtol": 1e-12}
-    best = least_squares(off, start, x_scale=1.0, max_nfev=400, **close)
+    best = least_squares(off, start, xtol=1e-14, ftol=1e-14, gtol=1e-12, max_nfev=400)
     slopes = np.asarray(best.jac)
     spread = np.sqrt(np.diag(np.linalg.pinv(slopes.T @ slopes)))[free:]
     part = made(best.x)
