@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.errors import InputError
 from printhammer.kernel.compile.variational import variational
 from printhammer.kernel.model.layout import BACKSTOP_PART, COIL, DAMPING, FRONT, MAGNET, PACK, SPRING
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
@@ -78,7 +79,17 @@ def carry_columns(
         Ascending numbers of nodes at which to look as well, of a record in one piece.
     renormalise : bool, optional
         Whether to keep the columns orthonormal and to note their growth.
+
+    Raises
+    ------
+    InputError
+        A voltage drives the coil: the equation does not go through its circuit.
     """
+    if problem.laws.circuit:
+        raise InputError(
+            "the drive is a voltage, expected a current or a force: derivatives do not go through the circuit"
+            " of the coil"
+        )
     forced, count = forcing is not None, initial.shape[1]
     rows = V.ROWS if forced else V.ENERGY
     kernel = variational(problem.kernel, forced=forced)

@@ -48,7 +48,7 @@ from printhammer.drive.trains import Burst, Drive, PulseTrain, SineForce
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
 from printhammer.errors import InputError, located
-from printhammer.support.constants import quantities, sentence, shown
+from printhammer.support.constants import options, quantities, sentence, shown
 from printhammer.support.texts import read_text
 
 if TYPE_CHECKING:
@@ -283,7 +283,7 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     if model is Sampled and "file" not in data:
         return _samples(data, where)
     notes = quantities(model)
-    _known(data, {*notes, *({"file", "interpolation"} if model is Sampled else ())}, where)
+    _known(data, {*notes, *(set(options(model)) - {"quantity"})}, where)
     fields: dict[str, Any] = {}
     for key, value in data.items():
         if key not in notes:

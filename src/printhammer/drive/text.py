@@ -49,8 +49,12 @@ def waveform_text(waveform: Waveform) -> dict[str, Any]:
     if isinstance(waveform, Switched):
         result["at"] = column_text(waveform.at, "s")
         result["levels"] = column_text(waveform.levels, waveform.unit)
+    if waveform.replaces:
+        result["decay"] = getattr(waveform, "decay", "diode")
     for name, note in quantities(type(waveform)).items():
-        result[name] = quantity_text(getattr(waveform, name), waveform.unit if note.also else note.si)
+        value = getattr(waveform, name)
+        if value is not None:
+            result[name] = quantity_text(value, waveform.unit if note.also else note.si)
     return result
 
 

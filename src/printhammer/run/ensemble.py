@@ -133,7 +133,7 @@ class Ensemble:
     states : tuple or array, optional
         Displacement, m, and velocity, m/s, at the start: one for all or one row for each member; by default
         the rest state of the member's hammer. Rows of four also hold the mode and the memory, as in
-        `Strobes`, for a start inside the pack.
+        `Strobes`, for a start inside the pack. Under a voltage a run begins without current.
     starts : float or array, optional
         Time of these states, s, not negative, one for all or one for each; by default 0. What was fired
         before is under way then.

@@ -157,7 +157,10 @@ def _run(
     reached = np.isfinite(table.x[:, -1])
     status = np.where(reached, OK, np.array(result.status_names)).astype(_STATUS)
     last = [
-        handed_on(regime.hammer, x, v, int(branch), memory) if ok else FROM_REST
+        # A state that is handed on has no current: under a voltage every train begins at rest.
+        handed_on(regime.hammer, x, v, int(branch), memory)
+        if ok and regime.fired.quantity != "voltage"
+        else FROM_REST
         for regime, x, v, branch, memory, ok in zip(
             regimes,
             table.x[:, -1].tolist(),

@@ -37,6 +37,9 @@ class _Driver(Waveform):
     decay_voltage: float | None = measured(
         "V", "Vd", "voltage against which the current decays", ge=0.0, default=None
     )
+    decay_resistance: float = measured(
+        "ohm", "Rd", "resistor through which the current decays", ge=0.0, default=0.0
+    )
     source_resistance: float = measured("ohm", "Rs", "resistance of the supply", ge=0.0, default=0.0)
     coils: float = measured("1", "n", "equal coils on the supply, fired together", ge=1.0, default=1.0)
     diode_voltage: float = measured(
@@ -72,7 +75,7 @@ class _Driver(Waveform):
         against = self.decay_voltage
         if against is None:
             against = self.voltage if self.decay == "rail" else DIODE
-        series = self.series if self.decay == "rail" else 0.0
+        series = self.decay_resistance + (self.series if self.decay == "rail" else 0.0)
         return (at, DECAY, against, series, float(self.decay == "rail"), 0.0)
 
     def _on(self, at: float, upper: float = math.inf, lower: float = 0.0) -> tuple[float, ...]:

@@ -165,7 +165,10 @@ def summary(motion: Motion, units: Units) -> list[tuple[str, str | None]]:
     )
     source = "drive" if force else "coil"
     damped = "" if motion.hammer.damping is None else f" + damping {damping}"
-    share = energy.residual / energy.throughput if energy.throughput else 0.0
+    residual = max(energy.residual, energy.electric_residual, key=abs)
+    share = residual / energy.throughput if energy.throughput else 0.0
+    if motion.drive.quantity == "voltage":
+        rows.append(_supply_row(motion, units))
     return [
         *rows,
         (
@@ -174,3 +177,21 @@ def summary(motion: Motion, units: Units) -> list[tuple[str, str | None]]:
         ),
         ("residual", f"{share:+.1e} of the energy that passed through"),
     ]
+
+
+def _supply_row(motion: Motion, units: Units) -> tuple[str, str]:
+    """Return what the supply of a voltage gave, and where it went."""
+    energy = motion.energy
+    supply, copper, driver, eddy, field, coil = (
+        with_unit(value, "energy", units)
+        for value in (
+            energy.supply_work,
+            energy.copper_loss,
+            energy.driver_loss,
+            energy.eddy_loss,
+            energy.field,
+            energy.coil_work,
+        )
+    )
+    turn = f" + eddies {eddy}" if energy.eddy_loss else ""
+    return "supply", f"{supply} = copper {copper} + driver {driver}{turn} + coil {coil} + field {field}"
