@@ -97,6 +97,14 @@ def test_a_pot_magnet_pulls_in_on_its_rail() -> None:
     assert motion.current[motion.t < touch].max() > 1.5 * np.interp(touch, motion.t, motion.current)
 
 
+@pytest.mark.parametrize("preload", np.linspace(0.5, 3.0, 11).tolist())
+def test_a_plunger_leaves_its_stop_whatever_holds_it(preload: float) -> None:
+    coil = ph.load("pinball-coil").replace("spring.preload", -preload)
+    motion = ph.simulate(coil, ph.PulseTrain(coil.waveform, at=[0.0]), duration=0.1)
+    assert motion.status == "ok"
+    assert motion.dots[0].struck
+
+
 def test_a_wire_prints_with_the_current_chopped() -> None:
     wire = ph.load("impact-wire")
     motion = ph.simulate(wire, ph.PulseTrain(wire.waveform, at=[0.0]), duration="2 ms", ledger=True)
