@@ -126,6 +126,40 @@ def test_a_bridge_drives_the_current_through_zero() -> None:
     assert times[1] == pytest.approx(3e-3 + tau * math.log1p(-second * R / 24.0), abs=1e-12)
 
 
+def test_a_moving_coil_is_linear() -> None:
+    """Force k i and back-EMF k v: the matrix exponential, to 1e-12."""
+    mass, stiffness, damping, factor, voltage = 0.01, 400.0, 0.3, 6.0, 12.0
+    hammer = ph.Hammer.build(
+        mass,
+        magnet={"law": "moving-coil", "constant": factor},
+        spring={"law": "preload", "preload": "0 N", "stiffness": stiffness},
+        damping={"law": "viscous", "coefficient": damping},
+        coil={"resistance": R, "inductance": L},
+    )
+    a = np.array(
+        [
+            [0.0, 1.0, 0.0],
+            [-stiffness / mass, -damping / mass, factor / mass],
+            [0.0, -factor / L, -R / L],
+        ]
+    )
+    steady = np.linalg.solve(a, [0.0, 0.0, -voltage / L])
+    start = np.array([1e-3, 0.2, 0.0])
+    drive = ph.PulseTrain(Rail(voltage=voltage, width=1.0), rate="1 Hz", pulses=1)
+    with interpreted():
+        motion = ph.simulate(hammer, drive, state=(1e-3, 0.2), duration=0.02, tolerance=TIGHT)
+        times = np.linspace(0.0, 0.02, 21)
+        x, v = motion.at(times)
+        current = motion.driven_at(times)
+        ledger = motion.energy
+    exact = np.array([steady + expm(a * t) @ (start - steady) for t in times])
+    assert np.abs(x - exact[:, 0]).max() < 1e-12 * np.abs(exact[:, 0]).max()
+    assert np.abs(v - exact[:, 1]).max() < 1e-12 * np.abs(exact[:, 1]).max()
+    assert np.abs(current - exact[:, 2]).max() < 1e-12 * np.abs(exact[:, 2]).max()
+    assert abs(ledger.residual) < 1e-12 * ledger.throughput
+    assert abs(ledger.electric_residual) < 1e-12 * ledger.throughput
+
+
 def paper(resistance: float, inductance: float, **more: Any) -> ph.Hammer:
     """The paper's hammer without its pack, behind a rail."""
     return ph.load("hendriks-1983").replace(

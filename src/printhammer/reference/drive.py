@@ -122,6 +122,8 @@ class ReferenceDrive:
     """The current (or force) of a drive at any time, as a series, and the times where it is not analytic."""
 
     def __init__(self, drive: Any) -> None:
+        if drive.quantity == "voltage":
+            raise ValueError("the drive is a voltage, the reference integrates currents and forces")
         self.is_current = drive.quantity == "current"
         self.add = drive.overlap == "add"
         self.times = [float(time) for time in np.atleast_1d(drive.times)]

@@ -56,6 +56,8 @@ class SchemeProblem(Problem):
             raise InputError(f"step_scale = {scale!r}, expected a positive number")
         if hammer.damping is not None:
             raise InputError(f"{hammer.path}: the schemes of 1983 expect a hammer without [damping]")
+        if drive.quantity == "voltage":
+            raise InputError("the drive is a voltage, expected a current or a force for the schemes of 1983")
         super().__init__(hammer, drive, state, 0.0, tolerance)
         self._scheme: schemes_1983.Scheme = scheme
         self._scale = scale

@@ -267,7 +267,9 @@ def quality(
     judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
     run = judgement.run[0, judged]
     heat = None
-    if hammer.coil_resistance is not None:
+    if drive.quantity == "voltage":
+        heat = motion.energy.copper_loss
+    elif hammer.coil_resistance is not None:
         squared = squared_current(drive, 0.0, motion.end) if drive.quantity == "current" else 0.0
         heat = hammer.coil_resistance * squared
     return Quality(

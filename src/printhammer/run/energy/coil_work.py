@@ -9,6 +9,7 @@ import numpy as np
 
 from printhammer.hammer.static_force import StaticForce
 from printhammer.results import Declared, scalar
+from printhammer.run.supply import winding_of
 
 if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
@@ -57,7 +58,12 @@ def coil_work_of(problem: Problem, record: Record) -> CoilWork:
     resistance = problem.hammer.coil_resistance
     squared = squared_current(problem.drive, start, end) if problem.drive.quantity == "current" else 0.0
     heat = None if resistance is None else resistance * squared
-    if problem.drive.quantity != "current" or problem.hammer.magnet is None:
+    if problem.laws.circuit:
+        times = record.nodes[:, 0]
+        whole = problem.quadratures(record, np.arange(len(times) - 1), times[:-1], times[1:])
+        heat, warm = math.fsum(whole[:, 6]), winding_of(problem.hammer).warm_resistance
+        squared = heat / warm if warm > 0.0 else math.nan
+    if problem.drive.quantity == "force" or problem.hammer.magnet is None:
         return CoilWork(0.0, 0.0, squared, heat)
     steps, starts, ends = _stretches(problem, record)
     work = problem.quadratures(record, steps, starts, ends)[:, 0] if steps.size else np.zeros(0)
