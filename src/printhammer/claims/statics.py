@@ -92,7 +92,7 @@ def current_range(context: Context, _claim: Claim) -> Measured:
     """Largest current of the paper's drives: single pulse, pairs, trains down to the shortest period."""
     waveform = context.waveform
     if waveform.quantity != "current":
-        raise NotMeasurableError("The hammer is driven by a force, not by a current")
+        raise NotMeasurableError(f"The hammer is driven by a {waveform.quantity}, not by a current")
     settings = {name: claim.settings for name, claim in claims().items()}
     drives = [PulseTrain(waveform)]
     drives += [
