@@ -119,3 +119,11 @@ def test_what_has_no_rail_is_refused(hammer: ph.Hammer) -> None:
 def test_what_is_no_grid_is_refused(wire: ph.Hammer, wrong: dict[str, object], said: str) -> None:
     with pytest.raises(ph.InputError, match=said):
         ph.dead_time(wire, **wrong)  # type: ignore[arg-type]
+
+
+def test_a_run_that_ends_early_is_told(wire: ph.Hammer) -> None:
+    # A soft paper lets the clapper come to its pole, where its law ends.
+    soft = wire.replace({"pack.stiffness": "1 N/mm", "pack.damping": "0 N s/m"})
+    table = ph.dead_time(soft, voltage=[38.0], temperature=[20.0], blow=2.0)
+    assert table.status[0, 0] == "range left"
+    assert table.to_dataframe()["status"].tolist() == ["range left"]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, TextArray
 
 MOST: Final = 10_000
 """Number of pairs of rail and temperature above which a grid is refused."""
@@ -65,6 +65,9 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
     speed: FloatArray = column("m/s", "speed of impact with it", "voltage temperature")
     current: FloatArray = column("A", "largest current with it", "voltage temperature")
     heat: FloatArray = column("J", "heat of the coil with it", "voltage temperature")
+    status: TextArray = column(
+        "", "how the run with the own pulse ended", "voltage temperature", more="as a motion says it"
+    )
     strongest: FloatArray = column(
         "m/s", "speed of impact with a pulse that lasts until then", "voltage temperature"
     )
@@ -110,6 +113,7 @@ class _Fired:
     speed: float = np.nan
     current: float = np.nan
     heat: float = np.nan
+    status: str = "ok"
 
 
 def dead_time(
@@ -159,6 +163,7 @@ def dead_time(
     shape = rails.size, warm.size
     names = ("time", "speed", "current", "heat", "strongest", "width", "width_time", "width_heat")
     arrays = {name: np.full(shape, np.nan) for name in names}
+    status = np.full(shape, "ok", dtype=object)
     for j, degrees in enumerate(warm.tolist()):
         coil = hammer.replace("coil.temperature", degrees)
         for i, volts in enumerate(rails.tolist()):
@@ -166,6 +171,7 @@ def dead_time(
                 progress(j * rails.size + i, rails.size * warm.size)
             pulse = waveform.scaled(volts / own.voltage)
             fired = _fire(coil, pulse, reach, tolerance)
+            status[i, j] = fired.status
             longest = _fire(coil, of_width(pulse, reach), reach, tolerance)
             width = _same_blow(coil, pulse, wanted, longest, tolerance)
             again = _Fired() if width is None else _fire(coil, of_width(pulse, width), reach, tolerance)
@@ -182,6 +188,7 @@ def dead_time(
         own_time=reference.time,
         voltage=rails,
         temperature=warm,
+        status=status.astype(np.str_),
         **arrays,
     )
 
@@ -206,8 +213,9 @@ def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fi
     motion = simulate(hammer, drive, duration=span, tolerance=tolerance, ledger=True)
     dot = motion.dots[0]
     if not dot.struck or dot.flight_time is None or dot.impact_speed is None:
-        return _Fired()
-    return _Fired(dot.flight_time, dot.impact_speed, float(motion.current.max()), motion.energy.copper_loss)
+        return _Fired(status=motion.status)
+    peak = float(motion.current.max())
+    return _Fired(dot.flight_time, dot.impact_speed, peak, motion.energy.copper_loss, motion.status)
 
 
 def _same_blow(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.cli import options as opt
-from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import Column, facts, table
 from printhammer.cli.units import Units, with_unit
 from printhammer.errors import InputError
@@ -55,7 +55,7 @@ def dead_time(
             f"\n[yellow]No width gives the blow at {many}; {with_unit(reached, 'speed', units)} is the"
             " strongest that all of them reach: --blow.[/yellow]"
         )
-    return Answer(shown, files={"out": Content.of(made)})
+    return Answer(shown, files={"out": Content.of(made)}, complaints=ended_early(made.status.ravel()))
 
 
 def _between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float]:
