@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.control.dead_time import DeadTime
+from printhammer.control.dead_time.table import DeadTime
 from printhammer.control.widths import of_width
 from printhammer.run.contacts import Dot
 

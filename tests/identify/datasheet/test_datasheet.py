@@ -68,7 +68,8 @@ def test_forces_of_the_law_are_met(area: float, residual: float, turns: float, w
     forces = forces_of(part, asked)
     fitted = fit_magnet(Sheet(current, gaps, forces, None, turns, None, None, wide))
     assert fitted.misfit < 0.02
-    assert fitted.part.pole_area == pytest.approx(area, rel=0.1)
+    # The area goes with what the guesses make of gap and fringe.
+    assert fitted.part.pole_area == pytest.approx(area, rel=0.25)
 
 
 def test_a_constant_that_the_sheet_does_not_settle_stays_where_it_was_guessed() -> None:

@@ -14,7 +14,7 @@ from printhammer.figures.elements.style import new_figure, sign, styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from printhammer.control.dead_time import DeadTime
+    from printhammer.control.dead_time.table import DeadTime
 
 
 @styled

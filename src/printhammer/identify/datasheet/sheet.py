@@ -26,13 +26,13 @@ key.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
 from printhammer.errors import InputError, located, nearest
+from printhammer.hammer.file import read_document
 from printhammer.support.constants import shown
 from printhammer.support.texts import read_text
 from printhammer.units import describe, split, to_si
@@ -131,11 +131,7 @@ def read_sheet(path: str | Path) -> DataSheet:
         or out of its bounds; the sentence names file, key, value and what was expected.
     """
     source = Path(path)
-    text = read_text(source, "the data sheet")
-    try:
-        document = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{source}: expected a TOML file ({' '.join(str(error).split())})") from None
+    document = read_document(read_text(source, "the data sheet"), str(source))
     with located(str(source)):
         return _sheet(document, str(source))
 

@@ -13,7 +13,7 @@ from printhammer.cli.units import Units, with_unit
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.control.dead_time import DeadTime
+    from printhammer.control.dead_time.table import DeadTime
     from printhammer.hammer.hammer import Hammer
 
 _ROWS = 24
@@ -38,7 +38,7 @@ def dead_time(
     **passed: Any,
 ) -> Answer:
     """Find the time from switching on to impact against rail and temperature, and pulses of the same blow."""
-    from printhammer.control.dead_time import dead_time as timed
+    from printhammer.control.dead_time.table import dead_time as timed
 
     grid: dict[str, Any] = {
         "voltage": _between(voltage, "V", "--voltage"),

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.control.dead_time.header import header_text
 from printhammer.control.duty.heat import read_temperature
 from printhammer.control.widths import of_width
 from printhammer.drive.input import read_positive
@@ -22,7 +23,6 @@ from printhammer.errors import InputError
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.files import ENDINGS
 from printhammer.run.problem import TOLERANCE
-from printhammer.support import c_code
 from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
@@ -44,7 +44,6 @@ SHORTEST: Final = 1.0 / 64.0
 _DOUBLINGS: Final = 6
 _WIDTH_ERROR: Final = 1e-9  # Of the flight time
 _SAME: Final = 1e-9  # Of the blow
-_NANOSECOND: Final = 1e-9
 
 
 class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
@@ -89,7 +88,8 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     def to_header(self) -> str:
         """Return a C header (C99) with widths and dead times in nanoseconds, and a function between them."""
-        return header_text(self)
+        tables = {"width": self.width, "dead_time": self.width_time}
+        return header_text(self.hammer.name, self.hammer.fingerprint, self.voltage, self.temperature, tables)
 
     def save(self, path: str | Path) -> None:
         """Write the table, a C header (.h) among others, by the ending of the name; whole or not at all.
@@ -248,64 +248,3 @@ def _shortest(pulse: Waveform, width: float) -> float:
             of_width(pulse, width * 2.0**doubling)
             return width * 2.0**doubling
     return width
-
-
-def header_text(made: DeadTime) -> str:
-    """Return the C header of a dead time: rails in millivolts, tenths of a degree, nanoseconds."""
-    prefix = c_code.identifier(made.hammer.name)
-    upper, guard = prefix.upper(), f"{prefix}_dead_time_h".upper()
-
-    def whole(values: FloatArray) -> Any:
-        return np.where(np.isfinite(values), np.rint(np.nan_to_num(values) / _NANOSECOND), 0.0)
-
-    tables = "\n".join(
-        c_code.table("int32_t", f"{prefix}_{name}", whole(values))
-        for name, values in (("width", made.width), ("dead_time", made.width_time))
-    )
-    return f"""\
-#ifndef {guard}
-#define {guard}
-
-/* Dead time of the hammer {c_code.comment(made.hammer.name)},
-   fingerprint {made.hammer.fingerprint}.
-   [rail][temperature of the coil]; times are in nanoseconds, 0 where no pulse gives the blow.
-   A dot is fired `dead_time` before its impact with a pulse of `width`. */
-
-#include <stdint.h>
-
-#define {upper}_RAILS {made.voltage.size}
-#define {upper}_TEMPERATURES {made.temperature.size}
-
-/* Rails, in millivolts. */
-static const int32_t {prefix}_rail[{made.voltage.size}] = {{
-{c_code.numbers(np.rint(1e3 * made.voltage))}
-}};
-
-/* Temperatures of the coil, in tenths of a degree Celsius. */
-static const int32_t {prefix}_temperature[{made.temperature.size}] = {{
-{c_code.numbers(np.rint(10.0 * made.temperature))}
-}};
-
-{tables}
-/* Between the entries of a table, and at its edges beyond them; 0 where one of the four is 0. */
-static inline int32_t {prefix}_between(
-  const int32_t table[{upper}_RAILS][{upper}_TEMPERATURES], int32_t millivolts, int32_t tenths)
-{{
-  const int32_t *rail = {prefix}_rail, *warm = {prefix}_temperature;
-  unsigned i = 0, j = 0;
-  while (i + 2u < {upper}_RAILS && millivolts > rail[i + 1u]) i++;
-  while (j + 2u < {upper}_TEMPERATURES && tenths > warm[j + 1u]) j++;
-  unsigned k = {upper}_RAILS > 1 ? i + 1u : i, l = {upper}_TEMPERATURES > 1 ? j + 1u : j;
-  int64_t a = table[i][j], b = table[k][j], c = table[i][l], d = table[k][l];
-  if (a == 0 || b == 0 || c == 0 || d == 0) return 0;
-  int64_t p = millivolts < rail[i] ? rail[i] : millivolts > rail[k] ? rail[k] : millivolts;
-  int64_t q = tenths < warm[j] ? warm[j] : tenths > warm[l] ? warm[l] : tenths;
-  if (k > i) {{
-    a += (b - a) * (p - rail[i]) / (rail[k] - rail[i]);
-    c += (d - c) * (p - rail[i]) / (rail[k] - rail[i]);
-  }}
-  return (int32_t)(l > j ? a + (c - a) * (q - warm[j]) / (warm[l] - warm[j]) : a);
-}}
-
-#endif
-"""
