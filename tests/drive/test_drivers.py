@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,6 +13,9 @@ from printhammer.drive.file import load_drive, save_drive
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.drivers import Bridge, Capacitor, Chopper, PeakAndHold, Rail
 from printhammer.drive.waveforms.shapes import HalfSine, Waveform
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 EACH = [
     Rail(voltage=24.0, width=2e-4, decay="zener", decay_voltage=30.0),

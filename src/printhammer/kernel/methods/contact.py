@@ -14,7 +14,13 @@ from printhammer.kernel.model.layout import BACKSTOP_PART, INVERSE_MASS, MAGNET,
 if TYPE_CHECKING:
     from printhammer.kernel.methods.crossing import closes, contact_gap_and_change, land_on_gap_in_contact
     from printhammer.kernel.methods.dop853 import contact_step, whole_contact_step
-    from printhammer.kernel.model.circuit import Electric, electric_rates, fastest_rate, moved
+    from printhammer.kernel.model.circuit import (
+        Electric,
+        electric_rates,
+        fastest_rate,
+        moved,
+        path_may_change,
+    )
     from printhammer.kernel.model.forces import Hammer, backstop_acceleration
     from printhammer.kernel.model.laws import BACKSTOP_PULLS, HAS_CIRCUIT, backstop_elastic, backstop_switch
     from printhammer.kernel.model.pulses import Drive
@@ -273,6 +279,8 @@ def advance_contact(
             span = h
             if end[0] != t1:
                 span, electric = electric_in_contact(start, end[0], hammer, drive)
+            if not path_may_change(drive[0]):
+                return switch, end, following, electric
             g0, d0 = contact_gap_and_change(t, w, v, kv, drive[1], span, hammer, drive[0])
             g1, d1 = contact_gap_and_change(end[0], end[1], end[2], end[3], electric, span, hammer, drive[0])
             code = closes(g0, d0, g1, d1)

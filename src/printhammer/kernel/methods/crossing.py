@@ -16,7 +16,14 @@ from printhammer.kernel.model.layout import POSITION, Control, ForceLaw
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.dop853 import whole_contact_step, whole_time_step
-    from printhammer.kernel.model.circuit import Electric, driven, electric_rates, moved, path_gap
+    from printhammer.kernel.model.circuit import (
+        Electric,
+        driven,
+        electric_rates,
+        moved,
+        path_gap,
+        path_may_change,
+    )
     from printhammer.kernel.model.forces import Hammer, acceleration
     from printhammer.kernel.model.pulses import Drive
 
@@ -157,6 +164,8 @@ def circuit_switch(
     result = M.NO_SWITCH
     resting = M.RESTING <= law.mode <= M.HELD_UNLOADING
     for which in range(2 if resting else 1):
+        if which == PATH_GAP and not path_may_change(live):
+            continue
         span = end[0] - start[0]
         g0, d0 = gap_and_change(
             which, start[0], start[1], start[2], start[3], law.drive[1], span, law, live, control

@@ -184,16 +184,22 @@ def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
 def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
     """Return the slopes at the start of a step, of which the first three are known."""
     if HAS_CIRCUIT:
-        return time_slope(y[0], y, law)
+        rates = electric_rates(y[0], y[1], y[2], electric_of(y), law.hammer, law.drive[0])
+        if M.RESTING <= law.mode <= M.HELD_UNLOADING:
+            return 1.0, 0.0, 0.0, rates[0], rates[1], rates[2]
+        return 1.0, place_rate, rate, rates[0], rates[1], rates[2]
     return 1.0, place_rate, rate
 
 
 @inlined
 def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Point:
     """Return the slopes at the start of a step in the backstop, of which the first three are known."""
+    pace = 2.0 * y[1]
     if HAS_CIRCUIT:
-        return contact_slope(y, hammer, drive)
-    return 2.0 * y[1], -y[2], rate
+        x = hammer[POSITION] - y[1] * y[1]
+        rates = electric_rates(y[0], x, y[2], electric_of(y), hammer, drive[0])
+        return pace, -y[2], rate, pace * rates[0], pace * rates[1], pace * rates[2]
+    return pace, -y[2], rate
 
 
 @inlined

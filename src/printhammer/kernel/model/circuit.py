@@ -220,6 +220,15 @@ def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float
     return linkage_at(x, 0.0, hammer), electric[1], electric[2]
 
 
+@inlined
+def path_may_change(live: Any) -> bool:
+    """Tell whether anything but an edge can put the current on another path."""
+    kind = kind_of(live)
+    if kind == SWITCHED_PIECE:
+        return path_of(live) != SOURCE or not math.isinf(live[6])
+    return kind == DECAY_PIECE
+
+
 @compiled
 def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
     """Return a number, of the order of one, that is positive while the path of the current stays."""
