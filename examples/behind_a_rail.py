@@ -21,7 +21,7 @@ wanted = pulse.value(t)
 
 
 def behind(voltage, logarithms):
-    """The hammer behind a rail: resistance, inductance, on-time, resistor of the decay."""
+    """The hammer behind a rail: resistance, inductance, on-time, decay resistor."""
     resistance, inductance, width, decay = np.exp(logarithms)
     return hammer.replace(
         {

@@ -136,10 +136,25 @@ def least_work_rates(hammer: Hammer) -> Result:
     )
 
 
+def dead_time(hammer: Hammer) -> Result:
+    # With a blow that one of the rails does not reach.
+    wire = ph.load("impact-wire")
+    return ph.dead_time(wire, voltage=[20.0, 38.0], temperature=[20.0], blow=3.2)
+
+
+def thermal_duty(hammer: Hammer) -> Result:
+    # Bursts of which one may last, and one melts the copper.
+    bursts = ["100 Hz", "1 kHz", "1 MHz"]
+    return ph.thermal_duty(
+        "4 mJ", "12 K/W", 91.0, ambient=[25.0, 95.0], burst=bursts, thermal_capacity="2 J/K"
+    )
+
+
 SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     **CHAOS,
     "CompensationTable": compensation_table,
     "DampingStudy": damping_study,
+    "DeadTime": dead_time,
     "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
     "EnsembleResult": ensemble,
     "Feedback": feedback,
@@ -154,5 +169,7 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "SafeRate": safe_rate,
     "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
     "TableReport": table_report,
+    "ThermalDuty": thermal_duty,
+    "ThermalLimit": lambda hammer: ph.thermal_limit([25.0, 50.0], [1173.0, 728.0]),
     "ToleranceYield": tolerance_yield,
 }

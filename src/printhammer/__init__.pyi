@@ -17,6 +17,9 @@ from .chaos.impacts.train import impact_train as impact_train
 from .chaos.orbits.manifolds import manifolds as manifolds
 from .chaos.orbits.search import orbits as orbits
 from .chaos.strobe.points import strobe as strobe
+from .control.dead_time.table import dead_time as dead_time
+from .control.duty.duty import thermal_duty as thermal_duty
+from .control.duty.limit import thermal_limit as thermal_limit
 from .control.feedback.comparison import feedback as feedback
 from .control.learning.learn import learn as learn
 from .control.learning.sensor import ImpactSensor as ImpactSensor

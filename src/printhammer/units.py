@@ -53,6 +53,8 @@ DIMENSIONS: dict[str, str] = {
     "F": "a capacitance",
     "degC": "a temperature",
     "K": "a difference of temperatures",
+    "K/W": "a thermal resistance",
+    "J/K": "a heat capacity",
     "1": "a pure number",
 }
 """Names of the dimensions that the program uses, by their SI unit; for messages."""

@@ -12,7 +12,10 @@ from printhammer.cli.verbs.chaos.lyapunov import lyapunov
 from printhammer.cli.verbs.chaos.orbits import orbits
 from printhammer.cli.verbs.chaos.strobe import strobe
 from printhammer.cli.verbs.laboratory import fit, hammer, reconstruct
+from printhammer.cli.verbs.laboratory.datasheet import from_datasheet
 from printhammer.cli.verbs.laboratory.measure import measure
+from printhammer.cli.verbs.printing.dead_time import dead_time
+from printhammer.cli.verbs.printing.duty import duty
 from printhammer.cli.verbs.printing.energy import energy
 from printhammer.cli.verbs.printing.feedback import feedback
 from printhammer.cli.verbs.printing.learn import learn
@@ -33,8 +36,8 @@ if TYPE_CHECKING:
 
 VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),
-    *(print_, energy, feedback, quality, tune, learn, bench, studio, sweep, measure, warm),
-    *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped),
+    *(print_, energy, feedback, quality, tune, learn, dead_time, duty, bench, studio, sweep, measure, warm),
+    *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped, from_datasheet),
     *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),
     *(reconstruct.schemes, reconstruct.front, reconstruct.predictions, reconstruct.family, reconstruct.ship),

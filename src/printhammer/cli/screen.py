@@ -23,7 +23,13 @@ if TYPE_CHECKING:
 
 Row = TypeVar("Row")
 
-STATUS_STYLES: Final = {"stated": "green", "derived": "cyan", "reconstructed": "yellow", "assumed": "magenta"}
+STATUS_STYLES: Final = {
+    "stated": "green",
+    "datasheet": "green",
+    "derived": "cyan",
+    "reconstructed": "yellow",
+    "assumed": "magenta",
+}
 
 
 @dataclass(frozen=True)

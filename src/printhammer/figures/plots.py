@@ -16,6 +16,7 @@ PLOTS: Final = {
     "Branches": "chaos.continuation.plot",
     "CompensationTable": "control.compensation.plot",
     "CorrelationDimension": "chaos.correlation.plot",
+    "DeadTime": "control.dead_time.plot",
     "DampingStudy": "printing.damping.plot",
     "Feedback": "control.feedback.plot",
     "Feedback.run": "control.feedback.plot_run",
@@ -42,6 +43,8 @@ PLOTS: Final = {
     "StabilityChart": "chaos.stability_chart.plot",
     "Strobe": "chaos.strobe.plot",
     "TableReport": "control.compensation.plot_report",
+    "ThermalDuty": "control.duty.plot",
+    "ThermalLimit": "control.duty.plot_limit",
     "ToleranceYield": "printing.tolerance.plot",
     "ZeroOne": "chaos.lyapunov.plot_zero_one",
 }

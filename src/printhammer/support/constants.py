@@ -25,7 +25,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-Status = Literal["stated", "derived", "reconstructed", "assumed"]
+Status = Literal["stated", "datasheet", "derived", "reconstructed", "assumed"]
 STATUSES: tuple[str, ...] = get_args(Status)
 
 _KEY = "quantity"
@@ -64,7 +64,7 @@ class Constant:
     si: float
     """Value in `si_unit`."""
     status: str
-    """"stated", "derived", "reconstructed" or "assumed"."""
+    """One of `STATUSES`."""
     source: str
     """Where the value comes from."""
     meaning: str

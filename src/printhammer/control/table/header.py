@@ -9,6 +9,7 @@ import numpy as np
 
 from printhammer.control.table.drive import COLUMNS
 from printhammer.control.table.histories import entries_of
+from printhammer.support.c_code import comment, identifier, nested, numbers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,24 +46,21 @@ def header_text(
     With an `axis`, its name and its values, times are arrays (values, rates, entries).
     """
     gaps, reach = head["gaps"], head["reach"]
-    prefix = re.sub(r"\W+", "_", f"printhammer_{head['hammer']}", flags=re.ASCII).lower()
+    prefix = identifier(head["hammer"])
     guard, upper = f"{prefix}_table_h".upper(), prefix.upper()
     entries, fingerprint = entries_of(gaps, reach), re.sub(r"[^0-9a-zA-Z]", "", head["fingerprint"])
     nanoseconds = round(tick / NANOSECOND)
     unit = "nanoseconds" if nanoseconds == 1 else f"ticks of {nanoseconds} ns"
-    name = head["hammer"].encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
-    name = "".join(letter if letter.isprintable() else " " for letter in name)
+    name = comment(head["hammer"])
     arrays, bits = "", bits_of(times, tick)
     places, said = "", ""
     if axis is not None:
         word, places = axis[0], f"[{axis[1].size}]"
-        arrays = f"\nstatic const int32_t {prefix}_{word}{places} = {{\n{_numbers(axis[1])}\n}};\n"
+        arrays = f"\nstatic const int32_t {prefix}_{word}{places} = {{\n{numbers(axis[1])}\n}};\n"
         said = f"\n   Before them stands the place in {prefix}_{word}; between two, interpolate."
     for column, values in times.items():
         shape = f"{places}[{rates.size}][{entries}]"
-        arrays += (
-            f"\nstatic const int{bits}_t {prefix}_{column}{shape} = {_nested(np.rint(values / tick))};\n"
-        )
+        arrays += f"\nstatic const int{bits}_t {prefix}_{column}{shape} = {nested(np.rint(values / tick))};\n"
     return f"""\
 #ifndef {guard}
 #define {guard}
@@ -86,7 +84,7 @@ def header_text(
 
 /* Slots per second, in millihertz. */
 static const uint32_t {prefix}_rate[{rates.size}] = {{
-{_numbers(np.rint(1e3 * rates))}
+{numbers(np.rint(1e3 * rates))}
 }};
 {arrays}
 /* Number of a history; what lies before a rest does not count. */
@@ -103,17 +101,3 @@ static inline unsigned {prefix}_history(const unsigned *gaps)
 
 #endif
 """
-
-
-def _nested(values: FloatArray) -> str:
-    """Write an array of whole numbers of two dimensions or more."""
-    if values.ndim == 1:
-        return f"{{\n{_numbers(values)}\n  }}"
-    rows = "\n".join(f"  {_nested(row)}," for row in values)
-    return f"{{\n{rows}\n}}"
-
-
-def _numbers(values: FloatArray) -> str:
-    """Write whole numbers, ten a line."""
-    texts = [str(int(value)) for value in values]
-    return ",\n".join("    " + ", ".join(texts[at : at + 10]) for at in range(0, len(texts), 10))

@@ -131,7 +131,8 @@ def land_on_gap(
                 break
         x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, middle * h, law)
         gap = gap_at(which, t + middle * h, x1, v1, e1, law, live, control)
-        if gap > 0.0:
+        # A rest ends where the armature is driven off, not where nothing drives it yet.
+        if gap > 0.0 or (which == REST_GAP and gap == 0.0):
             low, low_gap = middle, gap
             # The weight of an end that stays is halved: the Illinois rule.
             high_gap *= 0.5 if side == 1 else 1.0
@@ -140,7 +141,7 @@ def land_on_gap(
             high, high_gap = middle, gap
             low_gap *= 0.5 if side == -1 else 1.0
             side = -1
-        if abs(gap) <= 1e-15:
+        if abs(gap) <= 1e-15 and (which == PATH_GAP or gap < 0.0):
             high = middle
             break
     x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, high * h, law)

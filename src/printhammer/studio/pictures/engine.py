@@ -117,11 +117,11 @@ def points_of(ends: FloatArray) -> FloatArray:
 
 
 def pulse_of(waveform: Waveform) -> dict[str, list[float]]:
-    """Return the curve of one pulse for the waveform editor, s and A or N."""
+    """Return the curve of one pulse for the waveform editor, s and A, N or V."""
     shown = waveform.support
     width, decay = getattr(waveform, "width", None), getattr(waveform, "decay", None)
-    # An exponential decay goes on far beyond what can be seen.
-    if width is not None and decay is not None:
+    # An exponential decay goes on far beyond what can be seen; that of a driver is the name of a path.
+    if width is not None and isinstance(decay, float):
         shown = min(shown, float(width + 5.0 * decay))
     tau = np.linspace(0.0, shown, 160)
     return {"t": tau.tolist(), "value": waveform.value(tau).tolist()}

@@ -62,8 +62,13 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "dankowicz-schilder-2013": _BLOWS,
     "duffing-holmes": _BLOWS,
     "housner-1963": _PUSHES,
+    "dot-peen": {"rate": 40.0, "pulses": 5, "low": 10.0, "high": 160.0},
+    "pinball-coil": {"rate": 10.0, "pulses": 3, "low": 10.0, "high": 20.0},
+    "pinball-flipper": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 12.0},
+    "pot-magnet": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 20.0},
+    "relay-5v": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 40.0},
 }
-"""What the shipped hammers without a pulse open with, whose times and forces are not those of printers."""
+"""What those shipped hammers open with whose times and forces are not those of printers."""
 
 
 def describe(hammer: Hammer) -> dict[str, Any]:
@@ -112,9 +117,9 @@ def describe(hammer: Hammer) -> dict[str, Any]:
 
 
 def opening_of(hammer: Hammer) -> dict[str, Any]:
-    """Return the entries of a state that show a hammer which comes without a pulse to fire."""
+    """Return the entries of a state that show a hammer which has no pulse to fire, or other times."""
     if hammer.waveform is not None:
-        return {}
+        return OPENINGS.get(hammer.name, {})
     quantity = "current" if "magnet" in hammer.parts else "force"
     pulse = {"shape": "half-sine", "amplitude": 1.0, "width": 3e-4, "quantity": quantity}
     opening: dict[str, Any] = {"waveform": pulse, **OPENINGS.get(hammer.name, {})}

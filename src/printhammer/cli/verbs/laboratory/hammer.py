@@ -55,8 +55,7 @@ def show(
             f"constants: {honesty(loaded)}\n",
             *note,
             constants_table(loaded, sources),
-            "\n[bold]sources[/bold]",
-            *(f"[dim]{number}  {escape(source)}[/dim]" for number, source in enumerate(sources, 1)),
+            *numbered(sources),
             "",
             statics(loaded, picture, units),
         ]
@@ -104,6 +103,12 @@ def list_shipped() -> Answer:
         Column("title", lambda name: escape(load(name).title), left=True),
     )
     return Answer([table(columns, shipped())])
+
+
+def numbered(sources: list[str]) -> list[str]:
+    """Return the sources that the table of constants numbers."""
+    lines = (f"[dim]{number}  {escape(source)}[/dim]" for number, source in enumerate(sources, 1))
+    return ["\n[bold]sources[/bold]", *lines]
 
 
 def constants_table(hammer: Hammer, sources: list[str]) -> Table:

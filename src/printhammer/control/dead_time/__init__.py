@@ -1,0 +1,1 @@
+"""Time from switching on to impact, as a table for the firmware."""

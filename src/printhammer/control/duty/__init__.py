@@ -1,0 +1,1 @@
+"""How fast a coil may be fired before it is too hot."""

@@ -1,0 +1,1 @@
+"""From what a maker prints of an actuator to a hammer file."""

@@ -1,0 +1,266 @@
+"""Data sheets of actuators: TOML with what a maker prints, read and checked.
+
+    name = "pull-12v"
+    source = "data sheet of the maker, page 3"
+    rail = "12 V"
+    resistance = "10 ohm"                    # at 20 degC
+    force = [["0.25 mm", "85.9 N"], ["5 mm", "3.59 N"]]
+    stroke = "4.75 mm"
+    mass = "26 g"
+
+These are needed. Optional are
+
+- `current`, that of the forces (rail over resistance), and `end_gap`, what is left of the gap at the end of
+  the stroke (0 mm);
+- `inductance`, with the gap at which it was measured, as ``["45 mH", "4 mm"]``; `turns`; `pole_diameter`;
+  `residual_gap`, air in series with the gap;
+- `spring`, with `preload` at rest and `stiffness`; `target`, the way to what is struck, where that is not the
+  end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of what is
+  struck;
+- `on_time`; `driver`, a waveform table but for its voltage; `title` and `note`.
+
+What the reader of the sheet has guessed is named in `assumed`, and ``[why]`` tells a source of its own for a
+key.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from printhammer.errors import InputError, located, nearest
+from printhammer.hammer.file import read_document
+from printhammer.support.constants import shown
+from printhammer.support.texts import read_text
+from printhammer.units import describe, split, to_si
+
+TEXTS: Final = {"name": True, "source": True, "title": False, "note": False}
+"""Texts of a sheet, and whether they are needed."""
+
+QUANTITIES: Final = {
+    "rail": ("V", True),
+    "resistance": ("ohm", True),
+    "stroke": ("m", True),
+    "mass": ("kg", True),
+    "current": ("A", False),
+    "end_gap": ("m", False),
+    "turns": ("1", False),
+    "pole_diameter": ("m", False),
+    "residual_gap": ("m", False),
+    "target": ("m", False),
+    "on_time": ("s", False),
+}
+"""Quantities of a sheet, their SI units, and whether they are needed."""
+
+TABLES: Final = {
+    "spring": {"preload": "N", "stiffness": "N/m"},
+    "stop": {"restitution": "1", "stiffness": "N/m", "damping": "N s/m"},
+}
+"""Tables of a sheet, and the quantities in them."""
+
+_ZERO: Final = ("end_gap", "spring.preload", "spring.stiffness", "stop.restitution", "stop.damping")
+_OTHERS: Final = ("force", "inductance", "driver", "assumed", "why")
+_PAIR: Final = 2
+_WHOLE: Final = 1e6
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A quantity of a sheet."""
+
+    key: str
+    value: float
+    unit: str
+    """As written."""
+    si: float
+
+
+@dataclass(frozen=True)
+class DataSheet:
+    """What a data sheet says."""
+
+    where: str
+    """Name of the file, for messages."""
+    texts: dict[str, str]
+    entries: dict[str, Entry]
+    """Quantities by key, such as "mass" and "spring.preload"."""
+    force: list[tuple[Entry, Entry]]
+    """Gaps and forces, in the order of the sheet."""
+    inductance: tuple[Entry, Entry] | None
+    """Inductance and gap."""
+    driver: dict[str, Any]
+    assumed: frozenset[str]
+    """Keys that the reader of the sheet has guessed."""
+    why: dict[str, str] = field(default_factory=dict)
+    """Source of its own of a key."""
+
+    def si(self, key: str, otherwise: float = math.nan) -> float:
+        """Return a quantity in SI."""
+        return self.entries[key].si if key in self.entries else otherwise
+
+    def origin(self, key: str) -> tuple[str, str]:
+        """Return status and source of a key: itself, or the table or text that it belongs to."""
+        holder = key.partition(".")[0]
+        guessed = not self.assumed.isdisjoint((key, holder))
+        otherwise = "assumed beside the data sheet" if guessed else f"data sheet: {self.texts['source']}"
+        why = self.why.get(key, self.why.get(holder, otherwise))
+        return "assumed" if guessed else "datasheet", why
+
+    def constant(self, key: str) -> dict[str, Any]:
+        """Return a quantity as a constant of a hammer file."""
+        entry = self.entries[key]
+        status, source = self.origin(key)
+        return {"value": plain(entry.value), "unit": entry.unit, "status": status, "source": source}
+
+
+def plain(value: float) -> float | int:
+    """Return a number as one writes it, without a fraction where it has none."""
+    return int(value) if value.is_integer() and abs(value) < _WHOLE else value
+
+
+def read_sheet(path: str | Path) -> DataSheet:
+    """Read a data sheet.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is not TOML, or something in it is missing, not known, of another dimension
+        or out of its bounds; the sentence names file, key, value and what was expected.
+    """
+    source = Path(path)
+    document = read_document(read_text(source, "the data sheet"), str(source))
+    with located(str(source)):
+        return _sheet(document, str(source))
+
+
+def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
+    known = (*TEXTS, *QUANTITIES, *TABLES, *_OTHERS)
+    for key in document:
+        if key not in known:
+            raise InputError(
+                f"the key {shown(key, quotes=False)} is not known, expected {nearest(key, known)}"
+            )
+    for key in [key for key, needed in TEXTS.items() if needed] + [
+        *(key for key, (_si, needed) in QUANTITIES.items() if needed),
+        "force",
+    ]:
+        if key not in document:
+            raise InputError(f"{key} is missing, expected {_WANTED.get(key) or _quantity_text(key)}")
+    texts = {key: document[key] for key in TEXTS if key in document}
+    for key, text in texts.items():
+        if not isinstance(text, str) or not text.strip():
+            raise InputError(f"{key} = {shown(text)}: expected text in quotes")
+    entries = {
+        key: _entry(key, document[key], si) for key, (si, _needed) in QUANTITIES.items() if key in document
+    }
+    for name, units in TABLES.items():
+        table = document.get(name, {})
+        if not isinstance(table, Mapping):
+            raise InputError(f"{name} = {shown(table)}: expected a table with {' and '.join(units)}")
+        for key, value in table.items():
+            if key not in units:
+                raise InputError(f"the key {name}.{key} is not known, expected {nearest(key, units)}")
+            entries[f"{name}.{key}"] = _entry(f"{name}.{key}", value, units[key])
+    force = document["force"]
+    if not isinstance(force, list) or not force:
+        raise InputError(f"force = {shown(force)}: expected {_WANTED['force']}")
+    points = [
+        _pair(f"force, point {number}", pair, ("m", "N"), _WANTED["force"])
+        for number, pair in enumerate(force, 1)
+    ]
+    inductance = None
+    if "inductance" in document:
+        inductance = _pair("inductance", document["inductance"], ("H", "m"), '["45 mH", "4 mm"]')
+    driver = document.get("driver", {})
+    if not isinstance(driver, Mapping):
+        raise InputError(f"driver = {shown(driver)}: expected a table with a shape")
+    sheet = DataSheet(
+        where, texts, entries, points, inductance, dict(driver), _assumed(document), _why(document)
+    )
+    _check(sheet)
+    return sheet
+
+
+_WANTED: Final = {
+    "name": "a short name of the device",
+    "source": "where the sheet comes from",
+    "force": 'gaps and forces such as [["0.5 mm", "40 N"], ["5 mm", "3.6 N"]]',
+}
+
+
+def _quantity_text(key: str) -> str:
+    return f"{describe(QUANTITIES[key][0])} in quotes, with its unit"
+
+
+def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
+    """Read a quantity that must be positive, or may be `zero`."""
+    zero = zero or key in _ZERO
+    if isinstance(written, bool) or not isinstance(written, str | int | float):
+        raise InputError(f"{key} = {shown(written)}: expected {describe(si)} in quotes, with its unit")
+    with located(key):
+        value, unit = split(written if isinstance(written, str) else repr(written), si)
+        size = to_si(value, unit, si)
+    if size < 0.0 or (size == 0.0 and not zero):
+        least = "0 or more" if zero else "more than 0"
+        raise InputError(f"{key} = {shown(written)}: expected {least}")
+    return Entry(key, value, unit, size)
+
+
+def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[Entry, Entry]:
+    """Read two quantities, of which a length may be 0."""
+    if not isinstance(written, list) or len(written) != _PAIR:
+        raise InputError(f"{key} = {shown(written)}: expected {wanted}")
+    first, second = (_entry(key, part, si, zero=si == "m") for part, si in zip(written, units, strict=True))
+    return first, second
+
+
+def _keys(document: Mapping[str, Any]) -> list[str]:
+    """List the keys of a sheet whose origin may be told: tables, and what is in them."""
+    whole = [key for key in document if key not in (*TEXTS, "assumed", "why")]
+    inner = [f"{name}.{key}" for name in (*TABLES, "driver") for key in document.get(name, {})]
+    return [*whole, *inner]
+
+
+def _assumed(document: Mapping[str, Any]) -> frozenset[str]:
+    assumed = document.get("assumed", [])
+    if not isinstance(assumed, list):
+        raise InputError(f'assumed = {shown(assumed)}: expected keys of this sheet, such as ["mass"]')
+    known = _keys(document)
+    for key in assumed:
+        if key not in known:
+            expected = nearest(str(key), known)
+            raise InputError(f"assumed: {shown(key)} is no key of this sheet, expected {expected}")
+    return frozenset(assumed)
+
+
+def _why(document: Mapping[str, Any]) -> dict[str, str]:
+    why = document.get("why", {})
+    if not isinstance(why, Mapping) or not all(
+        isinstance(text, str) and text.strip() for text in why.values()
+    ):
+        raise InputError(f"why = {shown(why)}: expected a table of keys and texts")
+    for key in why:
+        if key not in _keys(document):
+            raise InputError(f"why.{key} is given, expected a key of this sheet")
+    return dict(why)
+
+
+def _check(sheet: DataSheet) -> None:
+    """Refuse what does not fit together."""
+    gaps = [gap.si for gap, _force in sheet.force]
+    if len(set(gaps)) < len(gaps):
+        raise InputError("force: a gap is given twice, expected one force at each")
+    restitution = sheet.si("stop.restitution", 0.0)
+    if restitution > 1.0:
+        raise InputError(f"stop.restitution = {restitution:g}: expected 1 or less")
+    if ("stop.stiffness" in sheet.entries) != ("stop.damping" in sheet.entries):
+        raise InputError("stop: expected both stiffness and damping, or neither")
+    if sheet.si("target", 0.0) > sheet.si("stroke"):
+        target, stroke = sheet.entries["target"], sheet.entries["stroke"]
+        raise InputError(
+            f"target = {target.value:g} {target.unit}: expected it within the stroke of {stroke.value:g}"
+            f" {stroke.unit}"
+        )

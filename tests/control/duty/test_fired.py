@@ -1,0 +1,33 @@
+"""Heat of one dot of a hammer, from its circuit or its current."""
+
+import pytest
+
+import printhammer as ph
+from printhammer.control.duty.fired import heat_of
+
+
+def test_a_driver_heats_a_warm_coil_as_the_circuit_says() -> None:
+    relay = ph.load("relay-5v")
+    heat = heat_of(relay)
+    warm = relay.replace("coil.temperature", 60.0)
+    motion = ph.simulate(warm, ph.PulseTrain(warm.waveform, at=[0.0]), duration=0.2, ledger=True)
+    assert heat.at(60.0) == pytest.approx(motion.energy.copper_loss, rel=1e-3)
+    # On the rail for long, a relay draws what its resistance allows.
+    assert heat.at(60.0) < heat.at(40.0) < heat.at(20.0)
+    assert heat.at(20.0) < 5.0**2 / 70.0 * relay.waveform.width
+
+
+def test_a_current_that_is_kept_up_heats_a_warm_coil_more(hammer: ph.Hammer) -> None:
+    heat = heat_of(hammer.replace("coil.resistance", "4 ohm"))
+    motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=[0.0]))
+    from scipy.integrate import trapezoid
+
+    assert heat.at(20.0) == pytest.approx(4.0 * trapezoid(motion.current**2, motion.t), rel=1e-3)
+    assert heat.at(100.0) == pytest.approx(heat.at(20.0) * (1.0 + 80.0 * 3.93e-3), rel=1e-12)
+    duty = ph.thermal_duty(heat, "10 K/W", 91.0)
+    assert duty.limit_heat == heat.at(91.0)
+
+
+def test_without_a_resistance_there_is_no_heat(hammer: ph.Hammer) -> None:
+    with pytest.raises(ph.InputError, match=r"coil\.resistance is missing"):
+        heat_of(hammer)
