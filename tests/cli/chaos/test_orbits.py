@@ -2,6 +2,7 @@ import json
 from collections.abc import Callable
 from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -9,7 +10,9 @@ import xarray as xr
 
 import printhammer as ph
 from printhammer.chaos.orbits import search
+from printhammer.cli.verbs.chaos.orbits import columns_for
 from printhammer.cli.verbs.chaos.orbits import orbits as verb
+from printhammer.run.regime import Regime
 
 SMALL = ("--longest", "1", "--starts", "60", "--guesses", "6")
 
@@ -72,3 +75,16 @@ def test_defaults_are_those_of_the_library() -> None:
     assert int(defaults["longest"]) == search.LONGEST
     assert int(defaults["starts"]) == search.STARTS
     assert int(defaults["guesses"]) == search.GUESSES
+
+
+def test_energies_in_the_table_are_those_that_there_are() -> None:
+    """The work of what drives the hammer, and the loss of a damping that it has."""
+
+    def headings(name: str, **firing: Any) -> set[str]:
+        return {column.heading for column in columns_for(Regime.of(ph.load(name), **firing))}
+
+    force = ph.SineForce("1 N", "1 Hz")
+    assert {"drive work", "damping loss"} <= headings("shaw-holmes-1983", drive=force)
+    assert "coil work" not in headings("shaw-holmes-1983", drive=force)
+    assert "damping loss" not in headings("linear-impact-oscillator", drive=force)
+    assert {"coil work", "pack loss"} <= headings("hendriks-1983", period=1e-3)
