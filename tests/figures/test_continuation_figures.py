@@ -121,3 +121,23 @@ def test_a_chart_is_drawn(branch: Branch) -> None:
     assert len(figure.axes[0].collections) == 1
     told = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert {"from rest: period 1", "fold", "period doubling", "the hammer's own"} <= set(told)
+
+
+def test_a_curve_is_drawn_with_and_without_attractors(branch: Branch) -> None:
+    curve = ph.bifurcation_curve(
+        branch, "backstop.restitution", (0.48, 0.52), event="period doubling", grid=(4, 3)
+    )
+    figure = curve.plot()
+    (line,) = lines(figure, "period doubling")
+    np.testing.assert_array_equal(line.get_xdata(), curve.first)
+    np.testing.assert_array_equal(line.get_ydata(), curve.second)
+    assert not lines(figure, "subcritical")
+    assert len(figure.axes[0].collections) == 1
+    texts = {text.get_text() for text in figure.axes[0].get_legend().get_texts()}
+    assert {"period 1", "period doubling"} <= texts
+    alone = curve.plot(attractors=False)
+    assert not alone.axes[0].collections
+    with pytest.raises(ph.InputError, match="expected at least two"):
+        dataclasses.replace(
+            curve, **{name: getattr(curve, name)[:1] for name in ("first", "second", "state", "multipliers")}
+        ).plot()

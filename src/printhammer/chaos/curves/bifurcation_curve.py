@@ -12,7 +12,7 @@ from printhammer.chaos.curves.attractors import settled_plane
 from printhammer.chaos.curves.curve import BifurcationCurve
 from printhammer.chaos.curves.normal_forms import MOST_PERIODS, grazing_sides, root_coefficient
 from printhammer.chaos.curves.starts import start_of
-from printhammer.chaos.curves.systems import GRAZING, Plane
+from printhammer.chaos.curves.systems import GRAZING, Plane, check_two
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer, Traced
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -81,8 +81,7 @@ def bifurcation_curve(
     """
     start = start_of(source, event, regime)
     unit = start.regime.quantity(start.first).si
-    if second == start.first:
-        raise InputError(f"second = {second!r}, expected another constant than that of the branch")
+    check_two(start.first, second)
     own = start.bounds if first is None else read_bounds(start.regime, start.first, first)
     ends = read_bounds(start.regime, second, bounds)
     value = start.regime.value(second) if start.other is None else start.other

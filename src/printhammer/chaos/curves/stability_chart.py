@@ -19,7 +19,7 @@ from printhammer.chaos.curves.attractors import GRID_TOLERANCE, settled_plane
 from printhammer.chaos.curves.bifurcation_curve import MOST, curve_of
 from printhammer.chaos.curves.curve import SAME, BifurcationCurve
 from printhammer.chaos.curves.starts import Start, start_of
-from printhammer.chaos.curves.systems import TESTS, Plane
+from printhammer.chaos.curves.systems import TESTS, Plane, check_two
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -166,8 +166,7 @@ def stability_chart(
     else:
         branch = continuation(branch, first[0], first[1:], threads=threads, **firing)
     regime = branch.regime
-    if second == branch.parameter:
-        raise InputError(f"second = {second!r}, expected another constant than that of the branch")
+    check_two(branch.parameter, second)
     ends = read_bounds(regime, second, bounds)
     value = regime.value(second)
     if not ends[0] <= value <= ends[1]:

@@ -25,6 +25,7 @@ from printhammer.chaos.continuation.family import cyclic
 from printhammer.chaos.continuation.fixed_points import MapValue
 from printhammer.chaos.strobe.map import image_of
 from printhammer.errors import InputError
+from printhammer.hammer.names import PERIOD, RATE
 from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
@@ -73,6 +74,12 @@ class Plane:
     def at(self, first: float, second: float) -> Regime:
         """Return the regime with these constants; InputError where they are not possible."""
         return self.regime.with_(self.names[1], float(second)).with_(self.names[0], float(first))
+
+
+def check_two(first: str, second: str) -> None:
+    """Refuse the same constant twice; a rate is its period. InputError says so."""
+    if second == first or {first, second} == {PERIOD, RATE}:
+        raise InputError(f"second = {second!r}, expected another constant than that of the branch, {first}")
 
 
 class Place(Declared):

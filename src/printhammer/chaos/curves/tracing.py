@@ -333,6 +333,7 @@ class CurveTracer:
             "bound": f"{at} is the bound" if "parameter" in stop.sentence else stop.sentence,
             "closed": f"the curve closes upon itself at {at}",
             "length": f"the number of steps was used up at {at}",
+            "no value": f"beyond {at} there is no strobe map: {stop.sentence.partition(': ')[2]}",
         }
         why = stop.sentence.rpartition(": ")[2]
         return replace(stop, sentence=sentences.get(stop.reason, f"beyond {at} {why}"))

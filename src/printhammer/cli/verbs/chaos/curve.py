@@ -85,6 +85,7 @@ def curve(
     """
     from printhammer.chaos.continuation.continuation import continuation
     from printhammer.chaos.curves.bifurcation_curve import bifurcation_curve
+    from printhammer.chaos.curves.systems import check_two
     from printhammer.run.regime import Regime
 
     bounds = both(second_from, second_to, "--second-from", "--second-to", second)
@@ -103,8 +104,7 @@ def curve(
         )
     else:
         ends = both(lowest, highest, "--from", "--to", parameter)
-        if second == parameter:
-            raise InputError(f"--second {second}: expected another constant than --parameter")
+        check_two(parameter, second)
         orbit: dict[str, Any] = {"firings": firings, "state": state, "phase": phase}
         with job.counting("orbits", remaining=False) as tell:
             branch = continuation(hammer, parameter, ends, progress=tell, **firing, **orbit, **passed)
