@@ -59,6 +59,35 @@ def table_report(hammer: Hammer) -> Result:
     return judge_table(hammer, by_hand(hammer), rates=[900.0], perturbations=[Perturbation()])
 
 
+def learning(hammer: Hammer) -> Result:
+    from tests.control.table.by_hand import by_hand
+
+    from printhammer.control.learning.result import Learning
+    from printhammer.control.learning.sensor import ImpactSensor
+    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.rates.variability import Variability
+
+    off = np.array([[0.0, 0.2, np.nan], [0.01, 0.02, 0.0]])
+    return Learning(
+        hammer=hammer,
+        unit=hammer,
+        table=by_hand(hammer),
+        rate=900.0,
+        driver="own",
+        sensor=ImpactSensor(),
+        variability=Variability(),
+        limits=Limits(),
+        dots=np.array([0, 25]),
+        learned=np.array([False, True]),
+        slot=np.array([192, 194, 195]),
+        force_deviation=off,
+        arrival_deviation=1e-4 * off,
+        good=np.abs(off) <= 0.1,
+        contraction=np.array([0.98]),
+        seed=1,
+    )
+
+
 def fit(hammer: Hammer) -> Result:
     from printhammer.identify.result import Fit, FittedConstant
 
@@ -160,6 +189,7 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "Feedback": feedback,
     "Fit": fit,
     "Front": front,
+    "Learning": learning,
     "LeastWork": least_work,
     "LeastWorkRates": least_work_rates,
     "Measurement": lambda hammer: ph.measure("pack", hammer, seed=1, points=5),
