@@ -21,6 +21,7 @@ SILENT = (
     "errors",
     "figures",
     "results",
+    "support/c_code",
     "support/constants",
     "support/outputs",
     "support/sheets",

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import Column, facts, table
@@ -38,6 +36,8 @@ def dead_time(
     **passed: Any,
 ) -> Answer:
     """Find the time from switching on to impact against rail and temperature, and pulses of the same blow."""
+    import numpy as np
+
     from printhammer.control.dead_time.table import dead_time as timed
 
     grid: dict[str, Any] = {
@@ -59,6 +59,8 @@ def dead_time(
 
 
 def _between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float]:
+    import numpy as np
+
     from printhammer.drive.input import read_number
 
     if span is None:
