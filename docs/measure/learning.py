@@ -14,6 +14,7 @@ one unit prints while it learns, ``--curves FILE`` how many units print all dots
 
 import argparse
 import time
+from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 
@@ -53,7 +54,7 @@ SHOWN = 2
 FAMILY = {"02": 880.0, "06": 965.0}
 """Two of the family, and their open-loop safe rates, Hz."""
 AFTER = (50, 200, 1000)
-ROOMS = (*MOTION, "control/learning", "control/widths", "printing/dots", "printing/rates")
+ROOMS = (*MOTION, "control/learning", "control/table", "control/widths", "printing/dots", "printing/rates")
 CYCLE = slots_of(cycle_with_lead_in())
 
 
@@ -181,9 +182,7 @@ def family(count: int, seed: int) -> list[list[Cell]]:
 
 def curves(path: Path) -> None:
     """Draw which share of the units prints all dots, by rate and way, from the measured tables."""
-    from printhammer.figures.elements import style
-    from printhammer.figures.elements.style import foot, in_style, new_figure
-
+    style = import_module("printhammer.figures.elements.style")
     looks = {
         "open loop, own": (style.MUTED, "-", "o"),
         "table, own": (style.YELLOW, "--", "s"),
@@ -197,8 +196,8 @@ def curves(path: Path) -> None:
     learned, seen = read("learning"), read("learning-feedback")
     count = {row[1]: learned.settings["units"] for row in learned.rows}
     count |= {row[1]: seen.settings["units"] for row in seen.rows}
-    with in_style():
-        figure = new_figure(3.6)
+    with style.in_style():
+        figure = style.new_figure(3.6)
         ax = figure.subplots()
         for way, (colour, line, mark) in looks.items():
             points = [
@@ -213,7 +212,9 @@ def curves(path: Path) -> None:
         ax.set_xlabel("Rate, in open-loop safe rates of the nominal hammer")
         ax.set_ylabel("Units that print all dots  [%]")
         ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        foot(figure, f"hendriks-1983 · {learned.settings['units']} units, feedback {seen.settings['units']}")
+        style.foot(
+            figure, f"hendriks-1983 · {learned.settings['units']} units, feedback {seen.settings['units']}"
+        )
         drawn = BytesIO()
         figure.savefig(drawn, dpi=110)
     path.write_bytes(drawn.getvalue())
