@@ -17,6 +17,8 @@ from printhammer.identify.tables import read_table
 
 HAMMER = hammers.crude()
 MANY = np.linspace(60e-6, 300e-6, 4000)
+OWN = [kind for kind in KINDS if kind != "current"]
+"""What the hammer of the paper has: its waveform is no voltage."""
 RECORD = {"sampling_rate": "200 kHz"}
 
 
@@ -24,7 +26,7 @@ def short(kind: str) -> dict[str, float]:
     return {"duration": 200e-6} if kind == "motion" else {}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OWN)
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(kind: str, tmp_path: Path) -> None:
     paths = [tmp_path / f"{number}.csv" for number in range(3)]
     for path, seed in zip(paths, (5, 5, 6), strict=True):
@@ -54,7 +56,7 @@ def test_kinds_and_columns_do_not_disturb_each_other() -> None:
     assert abs(apart) < 0.9
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OWN)
 def test_a_table_is_read_back_as_it_was_measured(kind: str, tmp_path: Path) -> None:
     measured = ph.measure(kind, HAMMER, seed=1, **short(kind))
     path = tmp_path / "table.csv"
@@ -262,7 +264,7 @@ def test_sensors_that_cannot_be(options: dict, said: str) -> None:
         Sensor({}, **options)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OWN)
 def test_a_hammer_that_lacks_what_is_measured(kind: str) -> None:
     key = "waveform" if kind == "motion" else kind
     with pytest.raises(ph.InputError, match=rf"has no \[{key}\]"):

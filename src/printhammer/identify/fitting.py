@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.result import Fit
 
-KINDS: Final = ("magnet", "solenoid", "spring", "pack", "backstop", "motion")
+KINDS: Final = ("magnet", "solenoid", "spring", "pack", "backstop", "motion", "coil")
 
 
 def fit(
@@ -29,14 +29,15 @@ def fit(
         "magnet": F0, Am, Bm (and Bs, As) from forces against displacement and current; "solenoid": the
         circuit of the law `reluctance` from forces and inductances against the gap; "spring": Bs, As from
         forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
-        rebounds; "motion": mass, damping and others from records of single shots.
+        rebounds; "motion": mass, damping and others from records of single shots;
+        "coil": resistance, inductance and others from records of the current under a voltage.
     path : path, or sequence of path
-        The table, CSV with units in its heading; for "motion" several are allowed, for "magnet" a second one
-        without currents, that of the spring alone.
+        The table, CSV with units in its heading; for "motion" and "coil" several are allowed, for "magnet"
+        a second one without currents, that of the spring alone.
     hammer : Hammer, optional
         What is known already: position of the backstop, thickness of the pack, stiffness of the backstop; for
-        "motion", which needs one, all constants that are not fitted. What it knows with an error counts with
-        that error.
+        "motion" and "coil", which need one, all constants that are not fitted. What it knows with an error
+        counts with that error, but for "coil".
     **options
         Of the kind; lengths in m or with a unit. All: `robust` (true), whether rows that lie too far off are
         left out. "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the
@@ -44,7 +45,8 @@ def fit(
         `printhammer.identify.static.solenoid.fit_solenoid`. "spring": `position`. "pack":
         `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
         `printhammer.identify.static.backstop.Stiffness`. "motion": as
-        `printhammer.identify.shots.motion.fit_motion`.
+        `printhammer.identify.shots.motion.fit_motion`. "coil": as
+        `printhammer.identify.coil.fit.fit_coil`.
 
     Returns
     -------
@@ -61,11 +63,14 @@ def fit(
     if kind not in KINDS:
         raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
     many = [path] if isinstance(path, str) or not hasattr(path, "__iter__") else list(path)
-    if kind == "motion":
+    if kind in ("motion", "coil"):
+        from printhammer.identify.coil.fit import fit_coil
         from printhammer.identify.shots.motion import fit_motion
 
         if hammer is None:
             raise InputError("the hammer is missing, expected one with the constants known already")
+        if kind == "coil":
+            return fit_coil(many, hammer, **options)
         return fit_motion(many, hammer, **options)
     if kind == "magnet" and len(many) == 2 and options.get("spring") is None:
         many, options["spring"] = _magnet_and_spring(many)

@@ -12,17 +12,38 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from printhammer.drive.input import read_number
 from printhammer.drive.segments import EXPONENTIAL, POLYNOMIAL
+from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
+    from printhammer.identify.tables import Readings
     from printhammer.support.arrays import FloatArray
 
 
 def time_constant(bandwidth: float | None) -> float:
     """Return the time constant, s, of a sensor of a bandwidth, Hz; 0 for None, a sensor without delay."""
     return 0.0 if bandwidth is None else 1.0 / (2.0 * math.pi * bandwidth)
+
+
+def bandwidth_of(table: Readings) -> float | None:
+    """Return the bandwidth that a comment of a table tells, Hz; None where it tells of no limit.
+
+    Raises
+    ------
+    InputError
+        The comment is no positive frequency.
+    """
+    text = table.comments.get("bandwidth", "")
+    if text in ("", "none", "unlimited"):
+        return None
+    where = f"{table.path}: the comment 'bandwidth'"
+    value = read_number(text, "Hz", where)
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError(f"{where}: {text}, expected a positive number")
+    return value
 
 
 def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) -> FloatArray:
@@ -45,6 +66,22 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
     for k in range(len(h)):
         result[k + 1] = at_end[k] + (result[k] - at_start[k]) * kept[k]
     return result
+
+
+def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArray:
+    """Return what the sensor shows of straight lines between ascending times, s, shape (n,).
+
+    The sensor has settled at the first value.
+    """
+    if tau == 0.0 or len(times) < 2:
+        return values.copy()
+    h = np.diff(times)
+    lag = tau * np.diff(values) / h
+    at_start, at_end = (values[:-1] - lag).tolist(), (values[1:] - lag).tolist()
+    result = [float(values[0])]
+    for kept, start, end in zip(np.exp(-h / tau).tolist(), at_start, at_end, strict=True):
+        result.append(end + (result[-1] - start) * kept)
+    return np.array(result)
 
 
 def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:

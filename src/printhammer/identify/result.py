@@ -96,7 +96,7 @@ class Fit(Result):
     """The result of a fit."""
 
     kind: str = scalar(
-        "", "what was fitted", more='"magnet", "solenoid", "spring", "pack", "backstop" or "motion"'
+        "", "what was fitted", more='"magnet", "solenoid", "spring", "pack", "backstop", "motion" or "coil"'
     )
     source: tuple[str, ...] = scalar("", "names of the files", more="without their folders")
     constants: Mapping[str, FittedConstant] = part("constants by key")
@@ -218,6 +218,9 @@ class Fit(Result):
 
     @property
     def _laws(self) -> dict[str, str]:
+        if self.kind == "coil":
+            # Any law of the magnet has a current.
+            return {}
         return {**LAWS, "magnet": "reluctance"} if self.kind == "solenoid" else LAWS
 
     def _source(self, constant: FittedConstant) -> str:
@@ -238,7 +241,7 @@ class Fit(Result):
             remarks.append(f"the data reject the law: {self.rejected}")
         constants = self.for_file
         sections = {key.rpartition(".")[0]: None for key in constants}
-        laws = [(f"{section}.law", self._laws[section]) for section in sections if section in LAWS]
+        laws = [(f"{section}.law", self._laws[section]) for section in sections if section in self._laws]
         comments = "".join(f"# {' '.join(remark.split())}\n" for remark in remarks)
         # Tables come last, or the constants at the top would become theirs.
         return changed_text(comments, sorted([*laws, *constants.items()], key=lambda edit: "." in edit[0]))
@@ -260,7 +263,7 @@ class Fit(Result):
             The hammer has another law for the part, or takes as different what the fit took as known.
         """
         constants = self.for_file
-        sections = {key.rpartition(".")[0] for key in constants} & set(LAWS)
+        sections = {key.rpartition(".")[0] for key in constants} & set(self._laws)
         for section in sorted(sections):
             part = hammer.parts.get(section)
             if part is None or part.law != self._laws[section]:

@@ -10,6 +10,8 @@ backstop
     The armature alone thrown at the backstop at several speeds: the speed with which it comes back.
 motion
     One shot from rest: displacement and current, a while before the firing included.
+current
+    The current of one shot whose driver is a voltage, the armature free or locked.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.hammer.static_force import StaticForce, law_of
+from printhammer.identify.coil.probe import check_driver, probe_current
 from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_constant
 from printhammer.parts.backstop._hertz import damping_from_restitution
 from printhammer.parts.backstop.hertz import HertzBackstop
@@ -79,6 +82,7 @@ class Bench(Declared, eq=False):
     suspect: str = part("column in which wrong readings occur")
     words: dict[str, tuple[str, ...]] = part("columns of words", default_factory=dict)
     exact: tuple[str, ...] = part("columns that have no error, such as the time", default=())
+    notes: dict[str, str] = part("comments that a fit of the table reads", default_factory=dict)
 
 
 def magnet(
@@ -187,24 +191,12 @@ def motion(
     hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
     """Record one shot from rest for a duration after the firing, s, and a while before, s."""
-    from printhammer.drive.input import read_number, read_positive
     from printhammer.drive.trains import PulseTrain
 
     if hammer.waveform is None:
         raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
-    rate = sensor.sampling_rate
-    if rate is None:
-        raise InputError("the sensor has no sampling rate, expected one for a record")
-    length = CYCLE if duration is None else read_positive(duration, "s", "duration")
-    early = read_number(before, "s", "before")
-    if early < 0.0:
-        raise InputError(f"before = {before!r} is expected to be 0 s or more")
-    first, last = -math.floor(early * rate + 1e-9), math.floor(length * rate + 1e-9)
-    if last < 1:
-        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz has no sample after the firing")
+    first, last, rate, length = _record(sensor, duration, before)
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
-    if last * each - first > _MOST:
-        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz is too long, expected a shorter one")
     t = np.arange(first, last + 1) / rate
     fine = np.arange(last * each + 1) / (rate * each)
     shot = simulate(hammer, PulseTrain(hammer.waveform), duration=max(float(fine[-1]), length), times=fine)
@@ -223,13 +215,60 @@ def motion(
     return Bench(what, true, "displacement", exact=("time",))
 
 
+def current(
+    hammer: Hammer,
+    sensor: Sensor,
+    *,
+    duration: float | str | None = None,
+    before: float | str = BEFORE,
+    locked: float | str | None = None,
+) -> Bench:
+    """Record the current of one shot by voltage, the armature free or locked at a displacement, m."""
+    from printhammer.drive.input import read_number
+
+    check_driver(hammer)
+    waveform = hammer.waveform
+    assert waveform is not None
+    first, last, rate, _length = _record(sensor, duration, before)
+    t = np.arange(first, last + 1) / rate
+    place = None if locked is None else read_number(locked, "m", "locked")
+    shown = probe_current(hammer, waveform, t, locked=place, tau=time_constant(sensor.bandwidth))
+    held = "free" if place is None else "locked"
+    what = f"current in the coil in one shot, switched on at time 0, armature {held}"
+    notes = {} if place is None else {"locked": f"{place!r} m"}
+    return Bench(what, {"time": t, "current": shown}, "current", exact=("time",), notes=notes)
+
+
 BENCHES: Final[dict[str, Callable[..., Bench]]] = {
     "magnet": magnet,
     "spring": spring,
     "pack": pack,
     "backstop": backstop,
     "motion": motion,
+    "current": current,
 }
+
+
+def _record(
+    sensor: Sensor, duration: float | str | None, before: float | str
+) -> tuple[int, int, float, float]:
+    """Return the first and the last sample of a record, their rate, Hz, and the duration, s."""
+    from printhammer.drive.input import read_number, read_positive
+
+    rate = sensor.sampling_rate
+    if rate is None:
+        raise InputError("the sensor has no sampling rate, expected one for a record")
+    length = CYCLE if duration is None else read_positive(duration, "s", "duration")
+    early = read_number(before, "s", "before")
+    if early < 0.0:
+        raise InputError(f"before = {before!r} is expected to be 0 s or more")
+    first, last = -math.floor(early * rate + 1e-9), math.floor(length * rate + 1e-9)
+    if last < 1:
+        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz has no sample after the firing")
+    each = max(1, math.ceil(1.0 / (rate * _FINEST)))
+    if last * each - first > _MOST:
+        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz is too long, expected a shorter one")
+    return first, last, rate, length
 
 
 def _array(values: npt.ArrayLike, name: str) -> FloatArray:

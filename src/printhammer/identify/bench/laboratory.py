@@ -65,6 +65,7 @@ SENSORS: Final = {
     "pack": Sensor({"indentation": _LENGTH, "force": _FORCE}),
     "backstop": Sensor({"impact speed": _SPEED, "rebound speed": _SPEED}),
     "motion": Sensor({"displacement": _LENGTH, "current": _CURRENT}, SAMPLING_RATE, BANDWIDTH),
+    "current": Sensor({"current": _CURRENT}, SAMPLING_RATE, BANDWIDTH),
 }
 """The sensors of an ordinary bench, by what is measured."""
 
@@ -72,7 +73,7 @@ SENSORS: Final = {
 class Measurement(Result):
     """One table of measurements."""
 
-    kind: str = scalar("", "what was measured", more='"magnet", "spring", "pack", "backstop" or "motion"')
+    kind: str = scalar("", "what was measured", more=f"{', '.join(BENCHES)}")
     comments: dict[str, str] = scalar(
         "", "what was measured, of which hammer, with what sensors and which seed"
     )
@@ -144,7 +145,8 @@ def measure(
     ----------
     kind : str
         "magnet": static force of magnet and spring over displacement and current; "spring": that of the
-        spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": the record of one shot.
+        spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": the record of one shot;
+        "current": that of a current probe in one shot by voltage.
     sensor : Sensor or mapping, optional
         By default that of an ordinary bench, `SENSORS`; or what is different there, such as
         {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `sensor_settings.adjusted`.
@@ -153,7 +155,8 @@ def measure(
     **bench
         What is measured where, in SI: `displacements`, `currents` (magnet); `displacements` (spring);
         `peaks`, the largest indentations, and `points` of a branch (pack); `speeds` (backstop); `duration`
-        and `before`, the time before the firing (motion).
+        and `before`, the time before the firing (motion, current); `locked`, where the armature is held
+        (current).
 
     Raises
     ------
@@ -181,6 +184,7 @@ def measure(
             shown[rows] = channel.rounded(shown[rows] + errors, true)
         values[name] = shown
     comments = _comments(kind, hammer, used, there.true, there.exact, there.what)
+    comments |= there.notes
     comments["outliers"] = f"{len(rows)} of {len(values[there.suspect])} rows"
     comments["seed"] = str(seed)
     return Measurement(kind, comments, values, there.words, there.true, rows, hammer)
@@ -201,7 +205,7 @@ def _comments(
             continue
         channel = sensor.channels.get(name, Channel())
         comments[name] = channel.described(*UNITS[name], full_scale(values))
-    if kind == "motion":
+    if sensor.sampling_rate is not None:
         comments["sampling rate"] = _frequency(sensor.sampling_rate)
         comments["bandwidth"] = _frequency(sensor.bandwidth)
     return comments

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.bench.laboratory import KINDS, SENSORS, measure
+from printhammer.identify.bench.laboratory import SENSORS, measure
 from printhammer.identify.bench.sensor_settings import applicable
 from printhammer.identify.shots.motion import fit_motion
 from printhammer.identify.static.backstop import Stiffness, fit_backstop
@@ -33,6 +33,9 @@ STEEL: Final = ((200e9, 0.01), (0.3, 0.01))
 
 RADIUS_ERROR: Final = 0.01
 """Relative standard error of the radius that is measured."""
+
+_TABLES: Final = ("magnet", "spring", "pack", "backstop", "motion")
+"""What is measured."""
 
 _START: Final = 0.2
 """The fit of the motion begins with constants wrong by up to this share."""
@@ -79,11 +82,11 @@ def recover(
         with tempfile.TemporaryDirectory() as place:
             return recover(hammer, seed, sensor=sensor, folder=place)
     where = Path(folder)
-    paths = {kind: where / f"{kind}.csv" for kind in KINDS}
+    paths = {kind: where / f"{kind}.csv" for kind in _TABLES}
     for kind, path in paths.items():
         settings = applicable(SENSORS[kind], sensor or {})
         measure(kind, hammer, sensor=settings, seed=seed).write(path)
-    rng = np.random.default_rng(np.random.SeedSequence([seed, len(KINDS)]))
+    rng = np.random.default_rng(np.random.SeedSequence([seed, len(_TABLES)]))
     fits = {
         "magnet": fit_magnet(paths["magnet"], position=hammer.origin, spring=paths["spring"]),
         "pack": fit_pack(paths["pack"], thickness=true_value(hammer, "pack.thickness")),

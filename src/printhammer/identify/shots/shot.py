@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from printhammer.drive.input import read_number
 from printhammer.errors import InputError
+from printhammer.identify.lowpass import bandwidth_of
 from printhammer.identify.residuals import noise_of_record, running_median
-from printhammer.identify.tables import Readings, read_table
+from printhammer.identify.tables import read_table
 from printhammer.results import Declared, part, scalar
 from printhammer.units import from_si
 
@@ -110,7 +110,7 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
         x=x,
         current=table.values.get("current"),
         lines=table.lines,
-        bandwidth=_bandwidth(table) if bandwidth is None else bandwidth,
+        bandwidth=bandwidth_of(table) if bandwidth is None else bandwidth,
         noise=noise,
         touches=touches,
         joints=np.array(joints, dtype=np.int64),
@@ -204,18 +204,6 @@ def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> 
         left = np.abs(x[rows] - powers @ parabola)
         weights = 1.0 / np.maximum(1.0, left / max(3.0 * float(np.median(left)), noise, 1e-15))
     return float(parabola[0]), float(parabola[1] / scale)
-
-
-def _bandwidth(table: Readings) -> float | None:
-    """Return the bandwidth that a comment of the file tells, Hz."""
-    text = table.comments.get("bandwidth", "")
-    if text in ("", "none", "unlimited"):
-        return None
-    where = f"{table.path}: the comment 'bandwidth'"
-    value = read_number(text, "Hz", where)
-    if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{where}: {text}, expected a positive number")
-    return value
 
 
 def stroke_of(hammer: Hammer, x: FloatArray) -> float:

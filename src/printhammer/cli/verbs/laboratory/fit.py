@@ -247,6 +247,48 @@ def motion(
     return _fitted(job, hammer, strict, made)
 
 
+@verb(
+    "fit coil",
+    "printhammer fit coil current.csv --hammer driven.toml --locked '100 um' --out coil.toml",
+    {
+        **_PASSED,
+        "bandwidth": opt.quantity("Hz", "FREQUENCY", "Of the current probe, such as '200 kHz'."),
+        "locked": opt.quantity("m", "LENGTH", "Where the armature was locked; without it, it is free."),
+    },
+    **_FILES,
+)
+def coil(
+    job: Job,
+    files: list[Path] = _measured(
+        "Columns time, current and perhaps voltage; one shot each.", many=True, default=...
+    ),
+    hammer: str | None = _HAMMER,
+    free: str | None = opt.text("KEYS", "Constants to find, instead of coil.resistance, coil.inductance."),
+    also: str | None = opt.text("KEYS", "Further ones, such as 'magnet.saturation_flux'."),
+    strict: bool = _STRICT,
+    **passed: Any,
+) -> Answer:
+    """Find resistance and inductance of the coil, a shorted turn or the saturation, from its current.
+
+    The hammer's own driver switches the coil, or the voltage of the table. Constants to find begin with the
+    values of --hammer.
+    """
+
+    def made(known: Hammer | None) -> Fit:
+        from printhammer.identify.coil.fit import FREE, fit_coil
+
+        if known is None:
+            raise InputError("the hammer is missing, expected --hammer with the constants known already")
+        keys = list(FREE) if free is None else _keys(free)
+        return fit_coil(files, known, free=[*keys, *_keys(also or "")], **passed)
+
+    return _fitted(job, hammer, strict, made)
+
+
+def _keys(text: str) -> list[str]:
+    return [key.strip() for key in text.split(",") if key.strip()]
+
+
 def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[Fit]:
     """Fit tables of the parts of a hammer, whose other constants are known."""
     from printhammer.identify.fitting import fit

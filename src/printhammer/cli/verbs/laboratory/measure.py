@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 ALL: Final = "all"
 _LISTS: Final = {"displacements": "m", "currents": "A", "peaks": "m", "speeds": "m/s"}
-_TIMES: Final = ("duration", "before")
+_TEXTS: Final = ("duration", "before", "locked")
 _SENSORS: Final = "Sensors (default: an ordinary bench)"
 _sensor = partial(opt.text, panel=_SENSORS)
 _bench = partial(opt.text, panel="Bench")
@@ -37,7 +37,7 @@ _bench = partial(opt.text, panel="Bench")
         ),
         "resolution": _sensor("AMOUNT", "Step of the readings, in the same form.", many=True),
         "offset": _sensor("AMOUNT", "Reading at zero, in the same form.", many=True),
-        "sampling_rate": _sensor("RATE", "Of a record of motion (1 MHz)."),
+        "sampling_rate": _sensor("RATE", "Of a record of motion or current (1 MHz)."),
         "bandwidth": _sensor("RATE", "Of its sensors, first-order low-pass (200 kHz), or none."),
         "outliers": _sensor("SHARE", "Of readings that are wrong, such as '2 %' (0)."),
         "displacements": _bench("LIST", "Where the armature is held, '60 um, 100 um'."),
@@ -46,11 +46,12 @@ _bench = partial(opt.text, panel="Bench")
         "speeds": _bench("LIST", "Impact speeds on the backstop, '0.2 m/s, 1 m/s'."),
         "duration": _bench("TIME", "Of the record after the firing (4 ms)."),
         "before": _bench("TIME", "Of the record before the firing (100 us)."),
+        "locked": _bench("LENGTH", "Where the armature is locked in a record of the current."),
     },
 )
 def measure(
     job: Job,
-    kind: str = opt.argument("KIND", "magnet, spring, pack, backstop, motion, or all of them.", default=...),
+    kind: str = opt.argument("KIND", "magnet, spring, pack, backstop, motion, current, or all.", default=...),
     hammer: Hammer = opt.HAMMER,
     out: Path | None = opt.folder("Table to write, CSV; a folder for all.", metavar="FILE"),
     exact: bool = opt.switch("Begin with sensors without any error.", panel=_SENSORS),
@@ -64,7 +65,7 @@ def measure(
     from printhammer.identify.bench.laboratory import measure as measured
 
     kinds, paths = _places(kind, out, job)
-    bench = {name: passed.pop(name) for name in (*_LISTS, *_TIMES) if name in passed}
+    bench = {name: passed.pop(name) for name in (*_LISTS, *_TEXTS) if name in passed}
     settings = _settings(kinds, {**passed, **opt.given(exact=exact or None)})
     options = _options(kinds, bench)
     if kind == ALL:
@@ -125,7 +126,7 @@ def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str,
         if name in settings and not recorded:
             flag = name.replace("_", "-")
             raise InputError(
-                f"--{flag} {settings[name]} is given with {kinds[0]}, expected it with motion only"
+                f"--{flag} {settings[name]} is given with {kinds[0]}, expected it with motion or current only"
             )
     return {kind: applicable(SENSORS[kind], settings) for kind in kinds}
 
@@ -146,7 +147,7 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
             raise InputError(f"--{name} {text} is given with {kinds[0]}, expected it with {right} only")
         value: Any = (
             text
-            if name in _TIMES
+            if name in _TEXTS
             else [read_number(part.strip(), _LISTS[name], f"--{name}") for part in text.split(",")]
         )
         for kind in owners:
@@ -155,10 +156,14 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
 
 
 def _possible(kinds: list[str], hammer: Hammer) -> list[str]:
-    """Return what the hammer has; say what it lacks."""
-    needed = {kind: hammer.waveform if kind == "motion" else hammer.parts.get(kind) for kind in kinds}
+    """Return what the hammer has; say what it lacks. Only a hammer on a voltage has a current to show."""
+    waveform = hammer.waveform
+    if waveform is None or waveform.unit != "V":
+        kinds = [kind for kind in kinds if kind != "current"]
+    shots = "motion", "current"
+    needed = {kind: waveform if kind in shots else hammer.parts.get(kind) for kind in kinds}
     for kind, part in needed.items():
         if part is None:
-            what = "waveform" if kind == "motion" else kind
+            what = "waveform" if kind in shots else kind
             say(f"{hammer.path}: the hammer has no {what}, {kind} is left out")
     return [kind for kind, part in needed.items() if part is not None]

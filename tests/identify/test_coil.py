@@ -1,0 +1,98 @@
+"""The circuit of the coil from its current: what made a record is found, within the errors stated."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+
+RAIL = {"shape": "rail", "voltage": "24 V", "width": "2 ms", "decay": "zener", "decay_voltage": "30 V"}
+RECORD = {"sampling_rate": "100 kHz", "bandwidth": "20 kHz"}
+PLACE = 1e-4
+
+
+def driven(**coil: str) -> ph.Hammer:
+    """A mass on a spring, with a coil on a rail and no magnet."""
+    spring = {"law": "preload", "preload": "0 N", "stiffness": "100 N/m"}
+    coil = coil or {"resistance": "10 ohm", "inductance": "8 mH"}
+    return ph.Hammer.build("1 kg", spring=spring, coil=coil, waveform=RAIL)
+
+
+def record(hammer: ph.Hammer, path: Path, seed: int = 1, **options: Any) -> Path:
+    options = {"sensor": RECORD, "duration": "3 ms", "before": "50 us", "locked": PLACE, **options}
+    ph.measure("current", hammer, seed=seed, **options).write(path)
+    return path
+
+
+def test_resistance_and_inductance_are_found_within_their_errors(tmp_path: Path) -> None:
+    path = record(driven(), tmp_path / "current.csv")
+    text = path.read_text("utf-8")
+    assert "# locked: 0.0001 m\n" in text
+    assert "# bandwidth: 20 kHz\n" in text
+    # The hammer states no coil: where the fit begins is estimated.
+    fit = ph.fit("coil", path, hammer=driven().replace("coil", None))
+    for name, value in (("coil.resistance", 10.0), ("coil.inductance", 8e-3)):
+        constant = fit[name]
+        assert abs(constant.value - value) < 3.0 * constant.standard_error
+        assert 0.0 < constant.standard_error < 2e-3 * value
+    assert not fit.rejected
+    assert "[coil]" in fit.fragment()
+    assert fit.into(driven().replace("coil", None)).constants["coil.inductance"].status == "derived"
+
+
+def test_a_shorted_turn_is_found(tmp_path: Path) -> None:
+    made = {"resistance": "10 ohm", "inductance": "8 mH", "turn_resistance": "20 ohm", "leakage": "1 mH"}
+    path = record(driven(**made), tmp_path / "turn.csv")
+    free = ["coil.turn_resistance", "coil.leakage"]
+    guess = driven(**{**made, "turn_resistance": "25 ohm", "leakage": "0.8 mH"})
+    fit = ph.fit("coil", path, hammer=guess, free=free)
+    for name, value in zip(free, (20.0, 1e-3), strict=True):
+        assert abs(fit[name].value - value) < 3.0 * fit[name].standard_error < 0.1 * value
+
+
+def test_the_voltage_of_the_table_drives_the_coil(tmp_path: Path) -> None:
+    """A ramp of the voltage, which no driver makes; the current has the closed form of a coil on a ramp."""
+    t = np.linspace(0.0, 3e-3, 31)
+    tau, slope = 8e-4, 5e3
+    current = slope / 10.0 * (t + tau * np.expm1(-t / tau))
+    columns = zip(t.tolist(), current.tolist(), (slope * t).tolist(), strict=True)
+    rows = "\n".join(",".join(map(repr, row)) for row in columns)
+    path = tmp_path / "ramp.csv"
+    path.write_text(f"time [s],current [A],voltage [V]\n{rows}\n", "utf-8")
+    fit = ph.fit("coil", path, hammer=driven().replace("waveform", None), locked=PLACE)
+    assert fit["coil.resistance"].value == pytest.approx(10.0, rel=1e-5)
+    assert fit["coil.inductance"].value == pytest.approx(8e-3, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("table", "options", "sentence"),
+    [
+        ("time [us],current [A]\n0,0\n2,1\n1,1\n", {}, r"line 4: time 1e-06 s, expected ascending times"),
+        ("time [us],current [A]\n-2,0\n-1,1\n", {}, "no time after 0 s"),
+        ("time [us],current [A]\n0,0\n1,0\n", {}, "there is no current or no voltage"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.turns"]}, "coil.turns"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.leakage"]}, "coil.leakage is not more than 0"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"free": []}, "no constants to find"),
+        ("time [us],current [A]\n0,0\n1,1\n", {}, "2 rows, too few for the constants of the coil"),
+        ("# locked: here\ntime [us],current [A]\n0,0\n1,1\n", {}, "the comment 'locked'"),
+    ],
+)
+def test_bad_input(table: str, options: dict[str, Any], sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text(table, "utf-8")
+    with pytest.raises(ph.InputError, match=sentence):
+        ph.fit("coil", path, hammer=driven(), **options)
+
+
+def test_a_hammer_without_a_driver(tmp_path: Path) -> None:
+    path = tmp_path / "current.csv"
+    path.write_text("time [us],current [A]\n0,0\n1,1\n", "utf-8")
+    paper = ph.load("hendriks-1983")
+    with pytest.raises(ph.InputError, match=r"no column 'voltage': .*no \[waveform\] that is a voltage"):
+        ph.fit("coil", path, hammer=paper)
+    with pytest.raises(ph.InputError, match=r"no \[waveform\] that is a voltage"):
+        ph.measure("current", paper)
+    with pytest.raises(ph.InputError, match="the hammer is missing"):
+        ph.fit("coil", path)
