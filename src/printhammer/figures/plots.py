@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 PLOTS: Final = {
     "Basins": "chaos.basins.plot",
     "Bifurcation": "chaos.bifurcation.plot",
-    "BifurcationCurve": "chaos.bifurcation_curve.plot",
+    "BifurcationCurve": "chaos.curves.bifurcation_curve.plot",
     "Branch": "chaos.continuation.plot",
     "Branches": "chaos.continuation.plot",
     "CompensationTable": "control.compensation.plot",
@@ -40,7 +40,7 @@ PLOTS: Final = {
     "SafeRate": "printing.quality.plot_safe_rate",
     "Section": "chaos.sections.plot",
     "Sensitivities": "chaos.sensitivity.plot",
-    "StabilityChart": "chaos.stability_chart.plot",
+    "StabilityChart": "chaos.curves.stability_chart.plot",
     "Strobe": "chaos.strobe.plot",
     "TableReport": "control.compensation.plot_report",
     "ThermalDuty": "control.duty.plot",

@@ -8,7 +8,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.figures.chaos.continuation import axis_of
-from printhammer.figures.chaos.stability_chart import CURVES, edges
+from printhammer.figures.chaos.curves.stability_chart import CURVES, edges
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import legend_in_columns
 from printhammer.figures.elements.style import new_panel, sign, styled
