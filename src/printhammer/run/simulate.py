@@ -123,6 +123,8 @@ def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) 
 def end_of_run(drive: Drive, duration: float | str | None) -> float:
     """Return the end of a run, s: `duration`, or 4 ms after the last firing.
 
+    Under a driver, whose devices may be slow, 4 ms after the supply is off for the last time.
+
     Raises
     ------
     InputError
@@ -131,7 +133,7 @@ def end_of_run(drive: Drive, duration: float | str | None) -> float:
     if duration is None:
         if not math.isfinite(drive.end):
             raise InputError("duration is missing, and the drive does not end")
-        return float(drive.times[-1]) + CYCLE
+        return (drive.end if drive.waveform.replaces else float(drive.times[-1])) + CYCLE
     if isinstance(duration, str):
         from printhammer.units import parse
 

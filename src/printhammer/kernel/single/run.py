@@ -268,7 +268,7 @@ def run(
             HAS_CIRCUIT and not is_quiet(t, x, time_scale, electric, hammer, live)
         ):
             pause = t_next - t
-            if first < last:
+            if first < last and not HAS_CIRCUIT:
                 pause = min(pause, wait)
             least, most = (-math.inf, 0.0) if mode == M.RESTING else (-still, still)
             if mode != M.RESTING:
