@@ -33,7 +33,7 @@ VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, lyapunov),
     *(print_, energy, feedback, quality, tune, bench, studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped),
-    *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion),
+    *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion, fit.coil),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),
     *(reconstruct.schemes, reconstruct.front, reconstruct.predictions, reconstruct.family, reconstruct.ship),
 )
