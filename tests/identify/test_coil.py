@@ -98,6 +98,7 @@ def test_a_hammer_without_a_driver(tmp_path: Path) -> None:
         ph.fit("coil", path)
 
 
+@pytest.mark.slow
 def test_saturation_and_resistance_from_two_places_of_a_locked_armature(tmp_path: Path) -> None:
     circuit: dict[str, Any] = {
         "law": "reluctance",
