@@ -96,3 +96,27 @@ def test_a_hammer_without_a_driver(tmp_path: Path) -> None:
         ph.measure("current", paper)
     with pytest.raises(ph.InputError, match="the hammer is missing"):
         ph.fit("coil", path)
+
+
+@pytest.mark.slow
+def test_saturation_and_resistance_from_two_places_of_a_locked_armature(tmp_path: Path) -> None:
+    circuit: dict[str, Any] = {
+        "law": "reluctance",
+        "turns": 900,
+        "pole_area": "40 mm^2",
+        "residual_gap": "0.2 mm",
+        "core_reluctance": 4e5,
+        "saturation_flux": 1.2e-4,
+        "closed_at": "1 mm",
+    }
+    hammer = driven(resistance="10 ohm").replace({"magnet": circuit, "waveform.width": "6 ms"})
+    paths = [
+        record(hammer, tmp_path / f"{k}.csv", seed=k, locked=f"{place} mm", duration="8 ms")
+        for k, place in enumerate((0.1, 0.8))
+    ]
+    free = ["coil.resistance", "magnet.saturation_flux", "magnet.core_reluctance"]
+    guess = hammer.replace({"magnet.saturation_flux": 1.5e-4, "coil.resistance": 9.0})
+    fit = ph.fit("coil", paths, hammer=guess, free=free)
+    for name in free:
+        constant, value = fit[name], hammer.constants[name].si
+        assert abs(constant.value - value) < 3.0 * constant.standard_error < 0.1 * value

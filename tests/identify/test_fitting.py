@@ -31,8 +31,8 @@ def test_what_the_hammer_knows(tmp_path: Path, hammer: ph.Hammer) -> None:
 
 def test_what_it_refuses(tmp_path: Path, hammer: ph.Hammer) -> None:
     forces = write(tmp_path / "m.csv", lab.magnet())
-    with pytest.raises(InputError, match="kind = 'coil', expected one of magnet"):
-        ph.fit("coil", forces)
+    with pytest.raises(InputError, match="kind = 'wheel', expected one of magnet"):
+        ph.fit("wheel", forces)
     with pytest.raises(InputError, match="2 tables, expected one of the kind 'pack'"):
         ph.fit("pack", [forces, forces], hammer=hammer)
     with pytest.raises(InputError, match="one table with the column 'current' and one without"):

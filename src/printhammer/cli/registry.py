@@ -38,7 +38,7 @@ VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),
     *(print_, energy, feedback, quality, tune, learn, dead_time, duty, bench, studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped, from_datasheet),
-    *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion),
+    *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion, fit.coil),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),
     *(reconstruct.schemes, reconstruct.front, reconstruct.predictions, reconstruct.family, reconstruct.ship),
 )

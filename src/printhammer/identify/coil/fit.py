@@ -245,7 +245,8 @@ def _stated(hammer: Hammer, name: str) -> bool:
 def _unit(hammer: Hammer, name: str) -> str:
     note = quantity_of(hammer, name)
     if note is None or name.startswith("waveform."):
-        raise unknown(name, [key for key in hammer.constants if not key.startswith("waveform.")], "constant")
+        known = [key for key in hammer.constants if not key.startswith("waveform.")]
+        raise unknown(name, known, f"{hammer.path}: constant")
     return note.si
 
 
