@@ -150,3 +150,12 @@ def test_the_start_of_the_page_is_a_state(request: pytest.FixtureRequest) -> Non
     views = json.loads(text.partition("VIEWS = ")[2].partition(";")[0])
     assert set(re.findall(r"(\w+): ", start)) == set(STATE)
     assert read_state({**STATE, "views": views}).views == tuple(views)
+
+
+def test_a_driver_by_voltage_is_a_state_of_the_page() -> None:
+    from printhammer.drive.waveforms.drivers import Rail
+    from printhammer.studio.states.controls import fields_of
+    from printhammer.studio.states.state import READERS
+
+    rail = Rail(voltage=150.0, width=2e-4, decay="diode", decay_resistance=159.0)
+    assert dict(READERS["waveform"](fields_of(rail))) == fields_of(rail)

@@ -28,6 +28,9 @@ LONGEST_TIME: Final = 20e-3
 LARGEST_CURRENT: Final = 100.0
 """Largest amplitude, A or N."""
 
+LARGEST: Final = {"V": 1e4, "ohm": 1e6}
+"""Largest constants of a driver, by their units."""
+
 SPAN: Final = 10.0
 """Factor by which a constant may differ from the one of the hammer that is loaded."""
 

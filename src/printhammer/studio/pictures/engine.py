@@ -54,7 +54,7 @@ def motion_frame(
     motion = limited_run(hammer, drive, end_of_run(drive, None), bounds.MOST_STEPS)
     times = points_of(motion.step_times)
     places, speeds = motion.at(times)
-    force, values = motion.forces_at(times), drive.value(times)
+    force, values = motion.forces_at(times), motion.driven_at(times)
     fired, x, v = motion.strobe
     arrays: dict[str, Any] = {
         "t": times,

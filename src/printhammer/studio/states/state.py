@@ -251,18 +251,26 @@ def _waveform(content: Any) -> tuple[tuple[str, Any], ...] | None:
     if shape == Sampled.shape:
         table = _table(content, "waveform", {"shape", "times", "values", "quantity"})
         columns = {name: _samples(table.get(name), f"waveform.{name}") for name in ("times", "values")}
-        quantity = _choice(table.get("quantity"), "waveform.quantity", ("current", "force"))
+        quantity = _choice(table.get("quantity"), "waveform.quantity", ("current", "force", "voltage"))
         return (("shape", shape), *columns.items(), ("quantity", quantity))
     fields = quantities(SHAPES[shape])
-    table = _table(content, "waveform", {"shape", "quantity", *fields})
+    made = SHAPES[shape].model_fields
+    table = _table(content, "waveform", {"shape", "quantity", *made})
     pairs: list[tuple[str, Any]] = [("shape", shape)]
     for name, note in fields.items():
         if name not in table:
             raise ProtocolError(f"waveform.{name} is missing")
-        most = bounds.LARGEST_CURRENT if note.si == "A" else bounds.LONGEST_TIME
+        if table[name] is None and made[name].default is None:
+            pairs.append((name, None))
+            continue
+        most = bounds.LONGEST_TIME if note.si == "s" else bounds.LARGEST.get(note.si, bounds.LARGEST_CURRENT)
         pairs.append((name, _number(table[name], f"waveform.{name}", -most, most)))
+    if "decay" in made and "decay" not in fields:
+        pairs.append(("decay", _choice(table.get("decay"), "waveform.decay", ("diode", "zener", "rail"))))
     if "quantity" in table:
-        pairs.append(("quantity", _choice(table["quantity"], "waveform.quantity", ("current", "force"))))
+        pairs.append(
+            ("quantity", _choice(table["quantity"], "waveform.quantity", ("current", "force", "voltage")))
+        )
     return tuple(pairs)
 
 
