@@ -24,6 +24,7 @@ ORDER = (
     "backstops",
     "damping_materials",
     "energy_ledger",
+    "behind_a_rail",
     "brake_pulse",
     "compensation_table",
     "least_work",
