@@ -2,9 +2,9 @@
 
     python benchmarks/circuit.py [--rounds N]
 
-The first two are the paper's hammer under its current and behind a rail of 100 V that makes the same current,
-fired nine times at 800 Hz, at equal tolerances; the error is that of the displacement up to 3 ms against a run
-at 1e-13. The third is one pulse of that hammer without its pack, integrated by the kernel and by SciPy's
+The first two are the paper's hammer under its current and behind a rail of 100 V that makes the same
+current, fired nine times at 800 Hz, at equal tolerances; the error is that of the displacement up to 3 ms
+against a run at 1e-13. The third is one pulse of that hammer without its pack, integrated by the kernel and by SciPy's
 DOP853 with events, as the tests have it. Each has its turn in each round; printed are medians.
 """
 
@@ -47,8 +47,8 @@ def main() -> None:
         spent = medians(runs, rounds)
         errors = {"i": error_of(current, tolerance), "u": error_of(voltage, tolerance)}
         print(
-            f"tolerance {tolerance:.0e}: by current {1e6 * spent['i']:5.0f} us, error {errors['i']:.0e} of the"
-            f" stroke; by voltage {1e6 * spent['u']:5.0f} us, {errors['u']:.0e};"
+            f"tolerance {tolerance:.0e}: by current {1e6 * spent['i']:5.0f} us, error {errors['i']:.0e} of"
+            f" the stroke; by voltage {1e6 * spent['u']:5.0f} us, {errors['u']:.0e};"
             f" speed {spent['i'] / spent['u']:.2f} of that by current"
         )
     sys.path.insert(0, str(Path(__file__).parents[1]))
