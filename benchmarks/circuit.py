@@ -4,8 +4,8 @@
 
 The first two are the paper's hammer under its current and behind a rail of 100 V that makes the same
 current, fired nine times at 800 Hz, at equal tolerances; the error is that of the displacement up to 3 ms
-against a run at 1e-13. The third is one pulse of that hammer without its pack, integrated by the kernel and by SciPy's
-DOP853 with events, as the tests have it. Each has its turn in each round; printed are medians.
+against a run at 1e-13. The third is one pulse of that hammer without its pack, integrated by the kernel and
+by SciPy's DOP853 with events, as the tests have it. Each has its turn in each round; printed are medians.
 """
 
 from __future__ import annotations
