@@ -10,7 +10,7 @@ of higher order, from run to run. L(s) = -G+ K(s): K(s) is the linear estimate, 
 all deviations of force and arrival from what the sensor shows, over hammers drawn from the stated
 variability; G is the sensitivity of the deviations to the entries, of the nominal hammer, and G+ its
 regularised inverse. The noise of a mean falls with the number of its runs, and the gains follow, as in
-stochastic learning control (S. S. Saab, IEEE Trans. Autom. Control 46 (2001) 1761).
+stochastic learning control (S. S. Saab, IEEE Trans. Autom. Control 46 (2001) 877).
 
 Convergence: corrections that differ come together, or at least not apart, where no eigenvalue of Q + L(s) G
 is beyond 1 in absolute value, L(s) being the columns for the line of the stage, and G the sensitivity of what
