@@ -12,7 +12,7 @@ import printhammer as ph
 from printhammer.claims.judging import judge_all
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "behind_a_rail.py"
-ROOMS = (*MOTION, "claims", "chaos", "maps", "printing")
+ROOMS = (*MOTION, "claims", "chaos", "derivatives", "maps", "printing")
 
 
 def main() -> None:

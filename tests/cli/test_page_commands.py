@@ -98,7 +98,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / f"{name}.toml").write_text(TOML.findall(text)[0])
     sheet = files("printhammer").joinpath("hammers", "sheets", "dot-peen.toml")
     (folder / "sheet.toml").write_text(sheet.read_text("utf-8"), "utf-8")
-    family = re.findall(r"^```csv\n(.*?)^```", (ROOT / "docs/howto/duty.md").read_text("utf-8"), re.M | re.S)
+    family = re.findall(r"^```text\n(.*?)^```", (ROOT / "docs/howto/duty.md").read_text("utf-8"), re.M | re.S)
     (folder / "family.csv").write_text(family[0])
     Image.fromarray(255 - 255 * (np.arange(9 * 40).reshape(9, 40) % 7 == 0).astype(np.uint8)).save(
         folder / "drawing.png"

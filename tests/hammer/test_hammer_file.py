@@ -75,7 +75,7 @@ BAD = {
     ),
     "no status": (
         changed(', status = "stated"', ""),
-        ["platen = 0.015", "has no status", "(stated, derived"],
+        ["platen = 0.015", "has no status", "(stated, "],
     ),
     "unknown status": (
         changed('"stated"', '"sworn"'),
