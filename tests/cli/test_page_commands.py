@@ -28,6 +28,7 @@ ELSEWHERE = {
     "pip ": "installs",
     "make ": "installs, and runs this test",
     "mkdir ": "the tests have a folder of their own",
+    "printhammer fit coil": "in test_fit_coil.py, which has hammers with records of their currents",
 }
 # What takes minutes as printed runs with fewer values.
 FEWER = {
