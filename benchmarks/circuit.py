@@ -1,19 +1,23 @@
-"""What the circuit of the coil costs: a run by voltage beside one by current, and beside SciPy.
+"""What the circuit of the coil costs: a run by voltage beside one by current, SciPy and heyoka.
 
     python benchmarks/circuit.py [--rounds N]
 
 The first two are the paper's hammer under its current and behind a rail of 100 V that makes the same
 current, fired nine times at 800 Hz, at equal tolerances; the error is that of the displacement up to 3 ms
 against a run at 1e-13. The third is one pulse of that hammer without its pack, integrated by the kernel and
-by SciPy's DOP853 with events, as the tests have it. Each has its turn in each round; printed are medians.
+by SciPy's DOP853 with events, as the tests have it, and by heyoka, where that is installed (see
+`benchmarks/peers`); the error is the largest relative one of displacement and velocity at the end
+against a run at 1e-13. Each has its turn in each round, five calls in a row, since what ran before empties
+the caches; printed are medians of the shortest.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import statistics
 import sys
-import time
+import timeit
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,15 +63,37 @@ def main() -> None:
     device = as_device(bare, 28.612, 6.5468e-3)
     phases = [Phase(0.0, 100.0), Phase(rail.width, 0.7, series=159.08, decay=True)]
     start = (initial_state(bare, None)[0], 0.0)
-    spent = medians(
-        {
-            "ours": run_of(bare, 1e-11, pulses=1, end=6e-4),
-            "SciPy": lambda: integrate(device, phases, [0.0], start, 6e-4, longest=2e-5, tolerance=1e-11),
-        },
-        max(3, rounds // 4),
-    )
-    ratio = spent["SciPy"] / spent["ours"]
-    print(f"one pulse: {1e6 * spent['ours']:.0f} us, SciPy {1e3 * spent['SciPy']:.0f} ms: {ratio:.0f} times")
+    end = 6e-4
+    exact = final_of(bare, 1e-13, end)
+    runs = {
+        "printhammer, 1e-11": (run_of(bare, 1e-11, pulses=1, end=end), lambda: final_of(bare, 1e-11, end)),
+        "SciPy, 1e-11": 2
+        * (lambda: tuple(integrate(device, phases, [0.0], start, end, tolerance=1e-11).final),),
+    }
+    try:
+        import heyoka
+    except ImportError:
+        print("heyoka: not installed")
+    else:
+        from benchmarks.circuit_heyoka import Pulse
+
+        for tolerance in (1e-8, 1e-11):
+            pulse = Pulse(heyoka, bare, phases, start[0], tolerance)
+            runs[f"heyoka, {tolerance:.0e}"] = 2 * (functools.partial(pulse.run, end),)
+    times = medians({name: run for name, (run, _final) in runs.items()}, max(3, rounds // 4))
+    ours = times["printhammer, 1e-11"]
+    for name, (_run, final) in runs.items():
+        error = float(np.max(np.abs(np.subtract(final(), exact)[:2] / exact[:2])))
+        spent = 1e6 * times[name]
+        print(f"one pulse, {name}: {spent:.0f} us, {times[name] / ours:.1f} times, error {error:.0e}")
+
+
+def final_of(hammer: Hammer, tolerance: float, end: float) -> tuple[float, float, float]:
+    """Return displacement, m, velocity, m/s, and current, A, at the end of one pulse."""
+    drive = ph.PulseTrain(hammer.waveform, rate=800.0, pulses=1)
+    motion = ph.simulate(hammer, drive, duration=end, tolerance=tolerance)
+    (x,), (v,), (i,) = *motion.at([end]), motion.driven_at([end])
+    return float(x), float(v), float(i)
 
 
 def run_of(hammer: Hammer, tolerance: float, pulses: int = 9, end: float = END) -> Callable[[], object]:
@@ -79,13 +105,11 @@ def run_of(hammer: Hammer, tolerance: float, pulses: int = 9, end: float = END) 
 
 
 def medians(runs: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
-    """Return the median time of each run, s."""
+    """Return the median over rounds of the shortest of five calls in a row, s."""
     times: dict[str, list[float]] = {name: [] for name in runs}
     for _ in range(rounds):
         for name, run in runs.items():
-            begin = time.perf_counter()
-            run()
-            times[name].append(time.perf_counter() - begin)
+            times[name].append(min(timeit.repeat(run, number=1, repeat=5)))
     return {name: statistics.median(each) for name, each in times.items()}
 
 
