@@ -19,7 +19,15 @@ TEXTBOOK = {
 }
 PRINTED = {"dankowicz-schilder-2013"}
 """Its source prints every constant."""
-DEVICES = {"dot-peen", "impact-wire", "pinball-coil", "pinball-flipper", "pot-magnet", "relay-5v"}
+DEVICES = {
+    "braille-embosser",
+    "dot-peen",
+    "impact-wire",
+    "pinball-coil",
+    "pinball-flipper",
+    "pot-magnet",
+    "relay-5v",
+}
 """Of data sheets; see tests of those."""
 
 

@@ -57,6 +57,14 @@ def test_a_marker_strikes_once_while_its_pulse_lasts() -> None:
     assert all(dot.flight_time is not None and dot.flight_time < 4e-3 for dot in motion.dots)
 
 
+def test_an_embosser_presses_one_dot_of_the_height_of_the_specification() -> None:
+    embosser = ph.load("braille-embosser")
+    motion = ph.simulate(embosser, ph.PulseTrain(embosser.waveform, period="50 ms", pulses=2), duration=0.1)
+    assert motion.status == "ok"
+    assert [dot.extra_contacts for dot in motion.dots] == [0, 0]
+    assert motion.x.max() - embosser.front == pytest.approx(0.48e-3, rel=0.1)
+
+
 def test_a_flipper_is_held_until_it_is_let_go() -> None:
     flipper = ph.load("pinball-flipper")
     width = flipper.waveform.width

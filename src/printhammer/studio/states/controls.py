@@ -62,6 +62,7 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "dankowicz-schilder-2013": _BLOWS,
     "duffing-holmes": _BLOWS,
     "housner-1963": _PUSHES,
+    "braille-embosser": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 60.0},
     "dot-peen": {"rate": 40.0, "pulses": 5, "low": 10.0, "high": 160.0},
     "pinball-coil": {"rate": 10.0, "pulses": 3, "low": 10.0, "high": 20.0},
     "pinball-flipper": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 12.0},
