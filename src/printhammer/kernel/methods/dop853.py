@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.methods import dop853_tableau as T
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import (
@@ -154,7 +154,8 @@ def electric_of(y: Point) -> Electric:
     return ()
 
 
-@inlined
+# In line at every stage, a coil's circuit would make the machine code seven times as long to compile.
+@(called if HAS_CIRCUIT else inlined)
 def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
     """Return the rates of time, position and velocity; `t` is exact where the time in `y` is a sum."""
     mode, memory, hammer, drive = law
@@ -168,7 +169,7 @@ def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
     return 1.0, y[2], acceleration(t, y[1], y[2], mode, memory, hammer, drive)
 
 
-@inlined
+@(called if HAS_CIRCUIT else inlined)
 def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
     """Return the derivatives of time, w and velocity with s."""
     pace = 2.0 * y[1]
