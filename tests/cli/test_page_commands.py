@@ -28,6 +28,9 @@ ELSEWHERE = {
     "pip ": "installs",
     "make ": "installs, and runs this test",
     "mkdir ": "the tests have a folder of their own",
+    "printhammer basins hendriks-1983 --period '1.05 ms' --x '30 um, 260 um, 24'": (
+        "takes a minute; with another hammer in chaos/test_basins.py"
+    ),
     "printhammer fit coil": "in test_fit_coil.py, which has hammers with records of their currents",
 }
 # What takes minutes as printed runs with fewer values.
