@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.base import Supply, Waveform
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
 _PLACES: Final = 33
@@ -114,6 +115,11 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
         upper = getattr(waveform, "upper", None)
         largest = max(largest, current if upper is None else min(upper, current))
     return largest or 1.0
+
+
+def current_scale(regime: Regime) -> float:
+    """Return by what differences of the current in a coil are divided, A: 1 where no voltage drives it."""
+    return typical_current(regime.hammer, regime.pulses(1)) if regime.fired.quantity == "voltage" else 1.0
 
 
 def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
