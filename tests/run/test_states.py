@@ -137,5 +137,5 @@ def test_a_current_in_a_state_needs_a_voltage() -> None:
     drive = ph.PulseTrain(hammer.waveform)
     with pytest.raises(ph.InputError, match="belongs to the state under a voltage only"):
         ph.simulate(hammer, drive, state=(1e-4, 0.0, 0.1))
-    with pytest.raises(ph.InputError, match="expected none but under a voltage"):
+    with pytest.raises(ph.InputError, match="under a voltage then with the current"):
         ph.Ensemble(hammer, drive, 1e-3, states=[1e-4, 0.0, 0.1]).run()

@@ -230,11 +230,14 @@ class Ensemble:
             full[:, 1] = np.array([rest_state(hammer) for hammer in hammers])[hammer_of]
             return full
         places = FORMS.get(rows.shape[-1]) if rows.ndim in (1, 2) else None
-        if places is None:
+        fired = self.drives.pulses if isinstance(self.drives, PulseTrains) else self.drives
+        if places is None or (
+            max(places, default=0) > 1 and any(drive.quantity != "voltage" for drive in fired)
+        ):
             raise InputError(
                 f"states: an array of shape {rows.shape}, expected rows of displacement and velocity, or of"
-                " these with branch and memory, under a voltage then with the currents and the voltage of the"
-                " capacitor"
+                " these with branch and memory; under a voltage then with the current, or with currents and"
+                " the voltage of the capacitor"
             )
         full[:, [1, 2, *(3 + place for place in places)]] = rows
         hammers, hammer_of = self._own_hammers

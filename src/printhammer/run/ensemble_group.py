@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.drive.ragged import Ragged, starts_of
-from printhammer.errors import InputError
 from printhammer.kernel.lanes import layout as lane_layout
 from printhammer.kernel.model.layout import MAGNET, PLACES, ROOM
 from printhammer.kernel.single import carry
@@ -60,8 +59,6 @@ class Group:
         tables = [fired.tables[number] for number in own_tables.tolist()]
         self.kernel: Kernel = problems[0].kernel
         self.laws = problems[0].laws
-        if not self.laws.circuit and states[members, 5:7].any():
-            raise InputError("states: a current in the coil, expected none but under a voltage")
         constants = np.zeros((len(problems), max(problem.constants.size for problem in problems)))
         for row, problem in enumerate(problems):
             constants[row, : problem.constants.size] = problem.constants

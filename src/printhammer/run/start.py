@@ -101,7 +101,7 @@ def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -
     numbers = tuple(float(number) for number in state or (0.0, 0.0))
     places = FORMS.get(len(numbers))
     if places is None or not all(math.isfinite(number) for number in numbers[:6]):
-        raise InputError(f"state = {numbers!r}, expected {STATE}")
+        raise InputError(f"state = {numbers!r}, expected two finite numbers, {STATE}")
     beyond = Beyond(**{Beyond._fields[k]: number for k, number in zip(places, numbers[2:], strict=True)})
     if beyond.branch >= 0.0:
         check_branch(hammer, (*numbers[:2], *beyond[:2]))

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.base import Supply, Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
 _PLACES: Final = 33
@@ -117,9 +116,9 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
     return largest or 1.0
 
 
-def current_scale(regime: Regime) -> float:
+def current_scale(hammer: Hammer, drive: Drive) -> float:
     """Return by what differences of the current in a coil are divided, A: 1 where no voltage drives it."""
-    return typical_current(regime.hammer, regime.pulses(1)) if regime.fired.quantity == "voltage" else 1.0
+    return typical_current(hammer, drive) if drive.quantity == "voltage" else 1.0
 
 
 def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:

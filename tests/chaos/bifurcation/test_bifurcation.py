@@ -270,7 +270,7 @@ def test_periods_are_those_of_the_verdict(q: int, noise: float, seed: int, in_pa
 
 
 def test_columns_that_were_not_run_have_no_period() -> None:
-    cycles, distances = cycles_of(blank_columns(2, 10), np.full(2, np.inf), np.ones((2, 3)))
+    cycles, distances = cycles_of(blank_columns(2, 10), np.full(2, np.inf), np.ones((2, 4)))
     assert cycles.tolist() == [0, 0]
     assert np.isnan(distances).all()
 

@@ -270,7 +270,7 @@ def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
         if key not in known or regime.drive is not None or regime.fired.quantity == "voltage":
             window = window_of(regime.hammer, drive if drive is not None else regime.train(1)[0])
             way, speed = window.half_widths.tolist()
-            known[key] = (way, speed, way, current_scale(regime))
+            known[key] = (way, speed, way, current_scale(regime.hammer, regime.train(1)[0]))
         rows.append(known[key])
     return np.array(rows)
 

@@ -104,7 +104,7 @@ class States:
 
 def _scales(train: Train) -> FloatArray:
     width, speed = window_of(train.hammer, train.drive).half_widths
-    current = [current_scale(train.regime)] if train.regime.fired.quantity == "voltage" else []
+    current = [current_scale(train.hammer, train.drive)] if train.regime.fired.quantity == "voltage" else []
     return np.array([width, speed, width, *current])
 
 
