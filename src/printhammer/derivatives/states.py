@@ -211,7 +211,7 @@ def strobe_exponent(
     *,
     first: int = 1,
     last: int,
-    state: tuple[float, float] | None = None,
+    state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Exponent:
     """Return the largest exponent of the strobe map, with its standard error.
@@ -341,7 +341,7 @@ def standard_error(series: npt.ArrayLike) -> float:
     return float(math.sqrt(b / ((n - b) * (n - b + 1.0)) * float(means @ means)))
 
 
-def _problem(hammer: Hammer, drive: Drive, state: tuple[float, float] | None, tolerance: float) -> Problem:
+def _problem(hammer: Hammer, drive: Drive, state: Sequence[float] | None, tolerance: float) -> Problem:
     check_tolerance(tolerance)
     return Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
 

@@ -23,7 +23,7 @@ from printhammer.results import Result, column, part
 from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job
 from printhammer.run.fired import Fired
 from printhammer.run.problem import MAX_STEPS, TOLERANCE, check_tolerance, laws_of
-from printhammer.run.start import check_branch, initial_state
+from printhammer.run.start import AT_REST, FORMS, check_branch, initial_state
 from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
@@ -76,6 +76,29 @@ class Strobes(Result):
     memory: FloatArray = column(
         "m", "latest local maximum inside the pack", _TIMES, more="0 but on the unloading branch"
     )
+    current: FloatArray | None = column(
+        "A",
+        "current in the coil",
+        _TIMES,
+        more="None unless a voltage drives a member, nan for the others",
+        default=None,
+    )
+    turn: FloatArray | None = column(
+        "A", "current in the shorted turn", _TIMES, more="likewise", default=None
+    )
+    reservoir: FloatArray | None = column(
+        "V", "voltage of the supply's capacitor", _TIMES, more="likewise", default=None
+    )
+
+    def entries(self) -> Entries:
+        """Return the states by name, the electric part of them only where there is one."""
+        return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
+
+    @property
+    def electric(self) -> FloatArray | None:
+        """Currents and voltage, shape (members, strobes, 3), if there are any."""
+        parts = [part for part in (self.current, self.turn, self.reservoir) if part is not None]
+        return np.stack(parts, axis=2) if parts else None
 
 
 class EnsembleResult(Result):
@@ -133,7 +156,9 @@ class Ensemble:
     states : tuple or array, optional
         Displacement, m, and velocity, m/s, at the start: one for all or one row for each member; by default
         the rest state of the member's hammer. Rows of four also hold the mode and the memory, as in
-        `Strobes`, for a start inside the pack. Under a voltage a run begins without current.
+        `Strobes`, for a start inside the pack. Under a voltage three more columns may follow: the currents in
+        the coil and in its shorted turn, A, and the voltage of the supply's capacitor, V; by default there is
+        no current, and the capacitor is charged.
     starts : float or array, optional
         Time of these states, s, not negative, one for all or one for each; by default 0. What was fired
         before is under way then.
@@ -196,27 +221,34 @@ class Ensemble:
         self.states[:, 0] = self._checked_starts(begun)
 
     def _states(self, rows: FloatArray | None) -> FloatArray:
-        full = np.zeros((self.size, 5))
-        full[:, 3] = -1.0
+        full = np.zeros((self.size, 3 + len(AT_REST)))
+        full[:, 3:] = AT_REST
         if rows is None:
             from printhammer.hammer.equilibrium import rest_state
 
             hammers, hammer_of = self._own_hammers
             full[:, 1] = np.array([rest_state(hammer) for hammer in hammers])[hammer_of]
             return full
-        if rows.ndim not in (1, 2) or rows.shape[-1] not in (2, 4):
+        places = FORMS.get(rows.shape[-1]) if rows.ndim in (1, 2) else None
+        fired = self.drives.pulses if isinstance(self.drives, PulseTrains) else self.drives
+        if places is None or (
+            max(places, default=0) > 1 and any(drive.quantity != "voltage" for drive in fired)
+        ):
             raise InputError(
                 f"states: an array of shape {rows.shape}, expected rows of displacement and velocity, or of"
-                " these with branch and memory"
+                " these with branch and memory; under a voltage then with the current, or with currents and"
+                " the voltage of the capacitor"
             )
-        full[:, 1 : 1 + rows.shape[-1]] = rows
+        full[:, [1, 2, *(3 + place for place in places)]] = rows
         hammers, hammer_of = self._own_hammers
-        different = np.unique(np.column_stack([hammer_of, full[:, 1:]]), axis=0, return_index=True)[1]
+        different = np.unique(np.column_stack([hammer_of, full[:, 1:5]]), axis=0, return_index=True)[1]
         for i in np.sort(different):
             hammer, row = hammers[hammer_of[i]], full[i, 1:].tolist()
             initial_state(hammer, row[:2])
-            if rows.shape[-1] == 4:
+            if row[2] >= 0.0:
                 check_branch(hammer, row)
+        if not np.isfinite(full[:, 5:7]).all():
+            raise InputError("states: a current that is not a finite number, A")
         return full
 
     def _checked_starts(self, begun: FloatArray) -> FloatArray:
@@ -273,16 +305,14 @@ class Ensemble:
         """
         from printhammer.run.simulate import simulate
 
-        if self.states[member, 3] >= 0.0:
-            raise InputError(f"member {member} starts on a branch inside the pack, which a motion cannot yet")
         if self.states[member, 0] > 0.0:
             raise InputError(f"member {member} starts later than at time 0, which a motion cannot yet")
-        x, v = self.states[member, 1:3]
+        drive, state = self.drives[member], self.states[member, 1:].tolist()
         return simulate(
             self.hammers[member],
-            self.drives[member],
+            drive,
             duration=float(self.ends[member]),
-            state=(float(x), float(v)),
+            state=state if drive.quantity == "voltage" else state[:4],
             tolerance=self.tolerance,
         )
 
@@ -362,9 +392,10 @@ class Ensemble:
     def _spread(self, rows: Sequence[Ragged]) -> FloatArray:
         """Return rows of the members of each group as an array (members, rows, columns), filled with NaN."""
         most = max((own.longest for own in rows), default=0)
-        whole = np.empty((self.size, most, rows[0].values.shape[1] if rows else MOST_COLUMNS))
+        width = max((own.values.shape[1] for own in rows), default=MOST_COLUMNS)
+        whole = np.full((self.size, most, width), np.nan)
         for group, own in zip(self.groups, rows, strict=True):
-            whole[group.members] = own.filled(most)
+            whole[group.members, :, : own.values.shape[1]] = own.filled(most)
         return whole
 
     def _dot_table(self, jobs: Sequence[Job]) -> DotTable:
@@ -394,6 +425,7 @@ class Ensemble:
             v=states[:, :, 1],
             branch=np.where(np.isnan(mode), -1, np.nan_to_num(mode)).astype(np.int64),
             memory=states[:, :, 3],
+            **dict(zip(("current", "turn", "reservoir"), np.moveaxis(states[:, :, 4:], 2, 0), strict=False)),
         )
 
     def _moments(self, strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None) -> Ragged:

@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.drive.ragged import Ragged, starts_of
 from printhammer.kernel.lanes import layout as lane_layout
-from printhammer.kernel.model.layout import MAGNET, NODE_WIDTH, PLACES, ROOM
+from printhammer.kernel.model.layout import MAGNET, PLACES, ROOM
 from printhammer.kernel.single import carry
 from printhammer.run.problem import Problem, live_size, node_width, scales_of
 
@@ -28,6 +28,7 @@ _CONTACTS: Final = 256
 MOST_COLUMNS: Final = 6
 _DOT_WIDTH: Final = 6
 _STROBE_WIDTH: Final = 4
+_ELECTRIC_WIDTH: Final = 3
 _PIECE: Final = 4 * lane_layout.LANES
 """Members in one piece of work for lanes."""
 
@@ -38,7 +39,7 @@ class Group:
     All this is decided for each member, so that one kernel serves it in whatever company. `members` are their
     numbers in the ensemble; `hammers` and `hammer_of` say whose hammer is which, and `fired` is what the
     drives of all members do. For each member of the ensemble there is a row of `states` (time, displacement,
-    velocity, mode and memory at the start) and an end, s. No run takes more than `max_steps`.
+    velocity and what is beyond them at the start) and an end, s. No run takes more than `max_steps`.
     """
 
     def __init__(
@@ -175,7 +176,9 @@ class Job:
             reached=np.zeros(count),
             steps=np.zeros(count, np.int64),
             dots=np.empty((group.batch.firings.size if want_dots else 0, _DOT_WIDTH)),
-            strobes=np.empty((own.values.size, _STROBE_WIDTH + node_width(group.laws) - NODE_WIDTH)),
+            strobes=np.empty(
+                (own.values.size, _STROBE_WIDTH + (_ELECTRIC_WIDTH if group.laws.circuit else 0))
+            ),
             x=x if count == len(x) else np.empty((count, grid.size), np.float32),
         )
 

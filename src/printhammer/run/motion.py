@@ -16,6 +16,7 @@ from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading
 from printhammer.run.energy.coil_work import CoilWork, coil_work_of
 from printhammer.run.energy.ledger import Ledger, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
+from printhammer.run.start import state_to_begin
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -198,6 +199,26 @@ class Motion(Result, fields=False):
         """
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
+
+    def state_at(self, t: float) -> tuple[float, ...]:
+        """Return the state at a time of the run, s, with which another run can go on: see `simulate`.
+
+        Displacement, m, velocity, m/s, branch of the pack (-1 outside of it) and memory, m; under a voltage
+        then the currents in the coil and in its shorted turn, A, and the voltage of the supply's capacitor,
+        V. A run that begins with it and with a firing goes on as this one does.
+
+        Raises
+        ------
+        InputError
+            The time is outside the run, or the pack has just released the armature for good.
+        """
+        (row,) = self._resampled(t)
+        node = self._record.nodes[np.searchsorted(self._record.nodes[:, 0], t, side="right") - 1]
+        x, v, mode = row[[0, 1, 9]].tolist()
+        begun = state_to_begin(self.hammer, x, v, int(mode), float(node[4]))
+        if begun is None:
+            raise InputError(f"t = {t:.9g} s: no run can begin where the pack has just released the armature")
+        return (*begun, *(row[[10, 14, 13]].tolist() if self._problem.laws.circuit else ()))
 
     def forces_at(self, t: npt.ArrayLike) -> Mapping[str, FloatArray]:
         """Return the forces by name, N, at any times of the run, s.

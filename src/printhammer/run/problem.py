@@ -18,6 +18,7 @@ from printhammer.kernel.model.layout import CIRCUIT_NODE_WIDTH, NODE_WIDTH
 from printhammer.kernel.model.modes import OK, PAUSED, STATUS_NAMES, STEP_LIMIT
 from printhammer.kernel.single import carry
 from printhammer.results import Declared, part, scalar
+from printhammer.run.start import AT_REST, Beyond
 from printhammer.run.supply import take_supply, typical_current
 
 if TYPE_CHECKING:
@@ -91,10 +92,15 @@ class _TooLong(Exception):
     """A stretch does not fit."""
 
 
-def fresh_carry(pause_after: float = math.inf) -> FloatArray:
+def fresh_carry(pause_after: float = math.inf, beyond: Beyond = AT_REST) -> FloatArray:
     """Return what the kernel's `run` needs to begin, and to pause after so many nodes."""
     array = np.zeros(carry.SIZE)
     array[carry.PAUSE_AFTER] = pause_after
+    if beyond.branch >= 0.0:
+        array[carry.STATE] = carry.ON_BRANCH
+        array[carry.MODE], array[carry.PEAK] = beyond.branch, beyond.memory
+    array[carry.WITH_CURRENT] = 1.0
+    array[carry.ELECTRIC : carry.ELECTRIC + 3] = beyond.current, beyond.turn, beyond.reservoir
     return array
 
 
@@ -190,18 +196,26 @@ class Problem:
     """One hammer under one drive, ready to be integrated.
 
     The state, displacement, m, and velocity, m/s, is that at the time `start`, s. The tolerance is the error
-    allowed in one step, in units of the stroke and of a typical speed.
+    allowed in one step, in units of the stroke and of a typical speed. In the pack and under a voltage more
+    belongs to the state, which is `beyond`.
     """
 
     max_steps: int | None = None
     """Number of steps after which a run is given up; None: `MAX_STEPS`."""
 
     def __init__(
-        self, hammer: Hammer, drive: Drive, state: tuple[float, float], start: float, tolerance: float
+        self,
+        hammer: Hammer,
+        drive: Drive,
+        state: tuple[float, float],
+        start: float,
+        tolerance: float,
+        beyond: Beyond = AT_REST,
     ) -> None:
         self.hammer = hammer
         self.drive = drive
         self.state = state
+        self.beyond = beyond
         self.start = start
         self.tolerance = tolerance
         self.laws = laws_of(hammer, drive)
@@ -243,7 +257,7 @@ class Problem:
     @property
     def columns(self) -> int:
         """Number of columns that `resample` fills."""
-        return 14 if self.laws.circuit else 10
+        return 15 if self.laws.circuit else 10
 
     def room(self, count: int) -> FloatArray:
         """Return an array for so many nodes."""
@@ -257,8 +271,9 @@ class Problem:
         contact_capacity = _CONTACTS + int(flights)
         while True:
             nodes, contacts = self.room(capacity), np.empty((contact_capacity, 7))
+            carried = fresh_carry(beyond=self.beyond)
             status, used, touched, steps = self._advance(
-                end, self.max_steps or MAX_STEPS, self.drive_arrays(), nodes, contacts, fresh_carry()
+                end, self.max_steps or MAX_STEPS, self.drive_arrays(), nodes, contacts, carried
             )
             if used <= capacity and touched <= contact_capacity:
                 return Record(status, nodes[:used].copy(), contacts[:touched].copy(), steps)
@@ -306,7 +321,7 @@ class Problem:
 
     def _stretches(self, end: float, capacity: int) -> Iterator[Stretch]:
         drive, nodes, contacts = self.drive_arrays(), self.room(capacity), np.empty((capacity, 7))
-        state = fresh_carry(max(capacity // 2, 2))
+        state = fresh_carry(max(capacity // 2, 2), self.beyond)
         status = PAUSED
         while status == PAUSED:
             status, used, touched, _steps = self._advance(end, MAX_STEPS, drive, nodes, contacts, state)
@@ -319,7 +334,7 @@ class Problem:
                 contacts[0] = contacts[touched - 1]
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
-        """Return states and forces, shape (n, 10), at ascending times, s; see the kernel's `resample`."""
+        """Return states and forces, `columns` for each ascending time, s; see the kernel's `resample`."""
         out = np.empty((times.size, self.columns))
         self.kernel.resample(times, record.nodes, self.drive_arrays(), self.constants, out)
         return out

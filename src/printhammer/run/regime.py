@@ -143,6 +143,11 @@ class Regime(Declared):
         return 1.0 / self.period
 
     @property
+    def has_derivatives(self) -> bool:
+        """Whether derivatives of its motions are known: they do not go through the circuit of the coil."""
+        return self.fired.quantity != "voltage"
+
+    @property
     def memory(self) -> int:
         """Number of pulses fired before one that can still be under way with it; 0 for an endless force.
 

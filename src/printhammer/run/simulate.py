@@ -10,10 +10,10 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.run.motion import Motion
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
-from printhammer.run.start import initial_state
+from printhammer.run.start import initial_state, state_beyond
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import numpy.typing as npt
 
@@ -36,7 +36,7 @@ def simulate(
     drive: Drive,
     *,
     duration: float | str | None = None,
-    state: tuple[float, float] | None = None,
+    state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
     points: int | None = None,
     times: npt.ArrayLike | None = None,
@@ -55,8 +55,11 @@ def simulate(
     duration : float or str, optional
         End of the run, s, or text with a unit; by default 4 ms after the last firing, and required for a
         drive that does not end.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
+    state : sequence of float, optional
+        Displacement, m, and velocity, m/s, at time 0; by default the rest state. In the pack with the mode
+        and the memory, as in `printhammer.run.ensemble.Strobes`; under a voltage then with the current in the
+        coil, A, or with that, the current in its shorted turn, A, and the voltage of the supply's capacitor,
+        V; by default there is no current, and the capacitor is charged. `Motion.state_at` hands out all.
     tolerance : float, optional
         Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
     points : int, optional
@@ -84,9 +87,10 @@ def simulate(
         raise InputError(f"scheme = {scheme!r}, expected one of {', '.join(SCHEMES)}")
     check_tolerance(tolerance)
     end = end_of_run(drive, duration)
-    start = initial_state(hammer, state)
+    beyond = state_beyond(hammer, state, drive.quantity)
+    start = initial_state(hammer, None if state is None else state[:2])
     if scheme == "default":
-        problem = Problem(hammer, drive, start, 0.0, tolerance)
+        problem = Problem(hammer, drive, start, 0.0, tolerance, beyond)
     else:
         from printhammer.run.scheme_runs import SchemeProblem
 

@@ -1,17 +1,55 @@
-"""The state in which a run begins: the rest state, or one that is checked."""
+"""The state in which a run begins: the rest state, or one that is checked.
+
+In the pack its branch and memory belong to the state, under a voltage the currents of the coil: see `Beyond`.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from printhammer.errors import InputError
-from printhammer.kernel.model.modes import LOADING, RELOADING, UNLOADING
+from printhammer.kernel.model.modes import (
+    HELD_LOADING,
+    HELD_UNLOADING,
+    LOADING,
+    PACK_RELEASED,
+    RELOADING,
+    UNLOADING,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.hammer.hammer import Hammer
+
+
+class Beyond(NamedTuple):
+    """What belongs to a state beside displacement and velocity; by default outside the pack, without current.
+
+    The branch of the pack, a place in `printhammer.run.ensemble.MODE_NAMES` or -1 (as follows from
+    displacement and velocity), and the latest local maximum in the pack, m; under a voltage the currents in
+    the coil and in its shorted turn, A, and the voltage of the supply's capacitor, V, NaN for a charged one.
+    """
+
+    branch: float = -1.0
+    memory: float = 0.0
+    current: float = 0.0
+    turn: float = 0.0
+    reservoir: float = math.nan
+
+
+AT_REST: Final = Beyond()
+FORMS: Final = {2: (), 3: (2,), 4: (0, 1), 5: (2, 3, 4), 7: (0, 1, 2, 3, 4)}
+"""Lengths of a state, and what of `Beyond` follows displacement and velocity in it."""
+
+STATE: Final = (
+    "displacement in m and velocity in m/s; in the pack with branch and memory in m; under a voltage then"
+    " with the current in A, or with that, the one of the shorted turn in A and the capacitor's voltage in V"
+)
+
+HELD_BRANCHES: Final = {HELD_LOADING: LOADING, HELD_UNLOADING: UNLOADING}
+"""Branches of the pack on which the armature rests, and those that they are part of."""
 
 _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
 
@@ -29,6 +67,10 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
         from printhammer.hammer.equilibrium import rest_state
 
         return rest_state(hammer), 0.0
+    if len(state) != 2:
+        raise InputError(
+            f"state = {tuple(state)!r}, expected two numbers, displacement in m and velocity in m/s"
+        )
     x, v = (float(number) for number in state)
     if not (math.isfinite(x) and math.isfinite(v)):
         raise InputError(
@@ -47,6 +89,50 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
     return x, v
 
 
+def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -> Beyond:
+    """Return what of a state follows displacement and velocity, under a drive by a quantity.
+
+    Raises
+    ------
+    InputError
+        None of the forms of a state, or not finite; no such branch of the pack; currents without a voltage,
+        or in a shorted turn that the coil has not.
+    """
+    numbers = tuple(float(number) for number in state or (0.0, 0.0))
+    places = FORMS.get(len(numbers))
+    if places is None or not all(math.isfinite(number) for number in numbers[:6]):
+        raise InputError(f"state = {numbers!r}, expected two finite numbers, {STATE}")
+    beyond = Beyond(**{Beyond._fields[k]: number for k, number in zip(places, numbers[2:], strict=True)})
+    if beyond.branch >= 0.0:
+        check_branch(hammer, (*numbers[:2], *beyond[:2]))
+    if len(numbers) in (3, 5, 7) and quantity != "voltage":
+        raise InputError(
+            f"state = {numbers!r} under a drive by {quantity}: the current belongs to the state under a"
+            " voltage only, expected displacement in m and velocity in m/s"
+        )
+    if beyond.turn and not getattr(hammer.coil, "turn_resistance", None):
+        raise InputError(f"state = {numbers!r}: the coil has no shorted turn, expected no current in it")
+    return beyond
+
+
+def state_to_begin(
+    hammer: Hammer, x: float, v: float, mode: int, memory: float
+) -> tuple[float, float, float, float] | None:
+    """Return displacement, velocity, branch and memory with which another run goes on where one is in a mode.
+
+    None where none can, since the pack has released the armature.
+    """
+    branch = HELD_BRANCHES.get(mode, mode)
+    if mode == PACK_RELEASED:
+        return None
+    rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
+    if rigid and hammer.position is not None:
+        x = max(x, hammer.position)
+    if branch not in _BRANCHES:
+        return x, v, -1.0, 0.0
+    return x, v, float(branch), memory
+
+
 def check_branch(hammer: Hammer, state: Sequence[float]) -> None:
     """Check a start inside the pack: displacement, velocity, code of the branch, memory.
 
@@ -55,7 +141,7 @@ def check_branch(hammer: Hammer, state: Sequence[float]) -> None:
     InputError
         No such branch; a displacement outside the pack; a memory that is not a displacement passed before.
     """
-    x, _v, branch, memory = (float(number) for number in state)
+    x, _v, branch, memory = (float(number) for number in state[:4])
     if branch not in _BRANCHES or hammer.front is None:
         known = ", ".join(f"{code} ({name})" for code, name in _BRANCHES.items())
         raise InputError(f"state with branch = {branch:g}, expected a pack and one of {known}")

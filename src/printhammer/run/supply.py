@@ -116,6 +116,11 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
     return largest or 1.0
 
 
+def current_scale(hammer: Hammer, drive: Drive) -> float:
+    """Return by what differences of the current in a coil are divided, A: 1 where no voltage drives it."""
+    return typical_current(hammer, drive) if drive.quantity == "voltage" else 1.0
+
+
 def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
     """Put the supply, and the scales of current and flux linkage, into the array of constants.
 

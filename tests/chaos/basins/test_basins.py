@@ -16,6 +16,7 @@ from printhammer.chaos.basins.attractors import Attractors
 from printhammer.chaos.basins.basins import FAILED, NO_STATE, UNDECIDED, Basins
 from printhammer.chaos.bifurcation.columns import Columns
 from printhammer.run.regime import Regime
+from printhammer.run.start import AT_REST
 
 PLANE = {"x": (20e-6, 260e-6, 9), "v": (-1.0, 1.0, 8)}
 LN2 = math.log(2.0)
@@ -120,13 +121,14 @@ def columns_of(points: np.ndarray) -> Columns:
         v=points[..., 1],
         branch=np.zeros((count, length), np.int8),
         memory=np.zeros((count, length)),
+        current=np.zeros((count, length)),
         status=np.full(count, "ok", "U16"),
-        last=np.column_stack([points[:, -1], np.full(count, -1.0), np.zeros(count)]),
+        last=np.column_stack([points[:, -1], np.tile(AT_REST, (count, 1))]),
     )
 
 
 def test_orbits_are_known_again_whatever_their_phase(hammer: "ph.Hammer") -> None:
-    attractors = Attractors(Regime.of(hammer, period=1e-3), np.ones(3), 1e-9)
+    attractors = Attractors(Regime.of(hammer, period=1e-3), np.ones(4), 1e-9)
     first = np.array([[3.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
     other = np.array([[3.0, 0.0], [2.0, 0.0], [1.0, 0.0]])
     trains = np.stack(

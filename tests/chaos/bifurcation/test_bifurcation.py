@@ -255,10 +255,11 @@ def test_periods_are_those_of_the_verdict(q: int, noise: float, seed: int, in_pa
         v=states[np.newaxis, :, 1],
         branch=branch[np.newaxis].astype(np.int8),
         memory=np.zeros((1, count)),
+        current=np.zeros((1, count)),
         status=np.array(["ok"]),
-        last=np.zeros((1, 4)),
+        last=np.zeros((1, 7)),
     )
-    cycles, distances = cycles_of(columns, np.array([-np.inf if in_pack else np.inf]), np.ones((1, 3)))
+    cycles, distances = cycles_of(columns, np.array([-np.inf if in_pack else np.inf]), np.ones((1, 4)))
     expected = repeats(
         np.column_stack([states, np.zeros(count)]), branch if in_pack else 0 * branch, np.ones(3)
     )
@@ -269,7 +270,7 @@ def test_periods_are_those_of_the_verdict(q: int, noise: float, seed: int, in_pa
 
 
 def test_columns_that_were_not_run_have_no_period() -> None:
-    cycles, distances = cycles_of(blank_columns(2, 10), np.full(2, np.inf), np.ones((2, 3)))
+    cycles, distances = cycles_of(blank_columns(2, 10), np.full(2, np.inf), np.ones((2, 4)))
     assert cycles.tolist() == [0, 0]
     assert np.isnan(distances).all()
 

@@ -58,7 +58,7 @@ class Attractor(Declared):
 class Attractors:
     """The attractors that were found so far, in the order in which they were.
 
-    Differences of displacement, velocity and memory are divided by the `scales`, shape (3,).
+    Differences of displacement, velocity, memory and current are divided by the `scales`, shape (4,).
     """
 
     def __init__(self, regime: Regime, scales: FloatArray, tolerance: float) -> None:
@@ -177,8 +177,8 @@ class Attractors:
             return int(
                 (self._periodic(points[:, -q:]) if shown(points, q)[0] else self._settling(points, q))[0]
             )
-        x, v, branch, _memory = longer.last[0].tolist()
-        if branch >= 0.0:
+        x, v, branch, *_ = longer.last[0].tolist()
+        if branch >= 0.0 or not self.regime.has_derivatives:
             return None
         (exponent,) = exponents_onward([(self.regime, (x, v))], CLOUD, self.tolerance, threads=1)
         if not is_positive(exponent):

@@ -25,6 +25,7 @@ from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, coordinate, part
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Firing, Regime
+from printhammer.run.start import AT_REST
 from printhammer.support.threads import Progress, shifted
 
 if TYPE_CHECKING:
@@ -163,6 +164,7 @@ def basins(
 
     A state in the pack meets fresh paper at its own depth: on the loading branch where it goes in, on the
     unloading branch from there where it comes out. A state in the backstop begins with that indentation.
+    Under a voltage all states begin without current, the supply's capacitor charged.
     Where the law of the magnet does not hold, and behind a rigid backstop, there is no state.
 
     Parameters
@@ -205,11 +207,11 @@ def basins(
     across = read_axis((*window.x, CELLS) if x is None else x, "x", "m")
     up = read_axis((*window.v, CELLS) if v is None else v, "v", "m/s")
     check_cells(across.size, up.size)
-    cells = np.zeros((up.size, across.size, 4))
+    cells = np.empty((up.size, across.size, 2 + len(AT_REST)))
     cells[..., 0], cells[..., 1] = across, up[:, np.newaxis]
-    cells[..., 2] = -1.0
+    cells[..., 2:] = AT_REST
     labels, used, status, attractors = _decided(
-        regime, cells.reshape(-1, 4), (count, most, tolerance), threads, progress
+        regime, cells.reshape(-1, cells.shape[-1]), (count, most, tolerance), threads, progress
     )
     shape = up.size, across.size
     order = sorted(range(len(attractors)), key=lambda place: _key(attractors[place]))

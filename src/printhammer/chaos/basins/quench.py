@@ -22,6 +22,7 @@ import numpy as np
 from printhammer.chaos.basins.basins import Range, check_cells, read_axis
 from printhammer.drive.input import read_positive
 from printhammer.drive.segments import table
+from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
@@ -150,6 +151,7 @@ class TwoPulseDrive(Drive):
 
     def __init__(self, waveform: TwoPulses, gap: float) -> None:
         super().__init__(waveform, self.firings(waveform.apart, gap))
+        self.pulses = waveform.first, waveform.second
 
     @staticmethod
     def firings(apart: float, gap: float) -> FloatArray:
@@ -282,9 +284,15 @@ def _piece(
     progress: Progress | None,
 ) -> tuple[npt.NDArray[Any], ...]:
     """Return second dot, status, peak, force and flight time of some gaps, each for all widths."""
-    begin = drives[0].begin
-    firings = [TwoPulseDrive.firings(0.5 * begin, gap) for gap in gaps.tolist()]
-    every = [drive.with_firings(times) for times in firings for drive in drives]
+    begin, number = 0.0, 1
+    every: list[Drive]
+    if drives[0].pulses[0].replaces:
+        # Of a driver's pulses the latest alone acts: none may be under way unseen.
+        every = [PulseSequence(drive.pulses, [0.0, gap]) for gap in gaps.tolist() for drive in drives]
+    else:
+        begin, number = drives[0].begin, _SECOND
+        firings = [TwoPulseDrive.firings(0.5 * begin, gap) for gap in gaps.tolist()]
+        every = [drive.with_firings(times) for times in firings for drive in drives]
     ends = np.repeat(begin + gaps + tail, len(drives))
     span = float(gaps[-1] - gaps[0]) + tail
     grid = begin + float(gaps[0]) + np.linspace(0.0, span, max(4, math.ceil(span / _SPACING) + 1))
@@ -295,16 +303,16 @@ def _piece(
     assert dots is not None
     assert x is not None
     assert hammer.front is not None
-    second = dots.struck[:, _SECOND]
+    second = dots.struck[:, number]
     after = np.repeat(begin + gaps, len(drives))
     turned = _highest(grid, x.astype(np.float64), after)
-    peak = np.where(second, np.fmax(hammer.front + dots.indentation[:, _SECOND], turned), turned)
+    peak = np.where(second, np.fmax(hammer.front + dots.indentation[:, number], turned), turned)
     return (
         second,
         np.array(result.status_names, "U16"),
         np.where(result.ok, peak, np.nan),
-        dots.peak_force[:, _SECOND],
-        dots.flight_time[:, _SECOND],
+        dots.peak_force[:, number],
+        dots.flight_time[:, number],
     )
 
 

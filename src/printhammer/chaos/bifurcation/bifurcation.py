@@ -21,7 +21,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Firing, Regime
-from printhammer.run.start import initial_state
+from printhammer.run.start import initial_state, state_beyond
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -136,7 +136,10 @@ def bifurcation(
         raise InputError(f"{len(grid)} values, expected at most {MOST_STATES} states in a diagram")
     begin = FROM_REST
     if state is not None:
-        begin = (*initial_state(regime.hammer, state), -1.0, 0.0)
+        begin = (
+            *initial_state(regime.hammer, state[:2]),
+            *state_beyond(regime.hammer, state, regime.fired.quantity),
+        )
     builder = DiagramBuilder(regime, name, ways, (count, skipped, tolerance), begin, threads, progress)
     try:
         builder.base(grid)

@@ -53,7 +53,7 @@ class DiagramBuilder:
         self.points = self.counts[0] - self.counts[1]
         whole, none = np.zeros(0, np.int64), np.zeros(0)
         self.values, self.levels, self.exponents, self.errors = none, whole, none, none
-        self.table = Trains([], blank_columns(0, self.points), whole, none, np.zeros((0, 3)))
+        self.table = Trains([], blank_columns(0, self.points), whole, none, np.zeros((0, 4)))
         self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
@@ -176,9 +176,11 @@ class DiagramBuilder:
         columns, table = self.table.columns, self.table
         begun = {}
         for row, regime in enumerate(table.regimes):
-            x, v, branch, _memory = columns.last[row].tolist()
+            x, v, branch, *_ = columns.last[row].tolist()
             # A start inside the pack would need its memory; such a train stays undecided.
-            if columns.status[row] == OK and not table.cycles[row] and branch < 0.0 and not math.isnan(x):
+            if not regime.has_derivatives or branch >= 0.0 or math.isnan(x):
+                continue
+            if columns.status[row] == OK and not table.cycles[row]:
                 begun[row] = regime, (x, v)
         self.known += len(begun)
         done = self.done

@@ -59,7 +59,7 @@ class Trains:
     """Their periods, 0 for none."""
     distances: Any
     scales: FloatArray
-    """By which differences of displacement, velocity and memory are divided. Shape (M, 3)."""
+    """By which differences of displacement, velocity, memory and current are divided. Shape (M, 4)."""
     carried: int = field(default=0)
     """Number of trains that were run again to close the joints."""
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.orbits.settled import Settled, settled, shown
-from printhammer.chaos.strobe.handing import FROM_REST, State, handed_on, pack_branches
+from printhammer.chaos.strobe.handing import FROM_REST, NO_CURRENT, State, handed_on, pack_branches
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.errors import InputError
 from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import Ensemble
-from printhammer.run.start import check_branch, initial_state
+from printhammer.run.start import AT_REST, check_branch, initial_state
+from printhammer.run.supply import current_scale
 from printhammer.run.window import window_of
 from printhammer.support.threads import Progress, mapped, shifted
 
@@ -55,10 +56,14 @@ class Columns(Declared):
     memory: FloatArray = column(
         "m", "latest local maximum on the unloading branch inside the pack", "train point", more="else 0"
     )
+    current: FloatArray = column(
+        "A", "current in the coil", "train point", more="0 unless a voltage drives it"
+    )
     status: TextArray = column("", "how the runs ended; `NOT_RUN` before", "train")
     last: FloatArray = part(
-        "displacement, velocity, branch of the pack or -1, and memory at the firing after all that are asked"
-        " for, where the next train can go on; `FROM_REST` where it cannot, shape (M, 4)"
+        "displacement, velocity, branch of the pack or -1, memory, and the electric part of the state at the"
+        " firing after all that are asked for, where the next train can go on; `FROM_REST` where it cannot,"
+        " shape (M, 7)"
     )
 
     def __len__(self) -> int:
@@ -67,8 +72,7 @@ class Columns(Declared):
 
     def handed(self, row: int) -> State:
         """Return the state with which the next train can go on."""
-        x, v, branch, memory = self.last[row].tolist()
-        return x, v, branch, memory
+        return tuple(self.last[row].tolist())
 
 
 def blank_columns(count: int, points: int) -> Columns:
@@ -78,6 +82,7 @@ def blank_columns(count: int, points: int) -> Columns:
         v=np.full((count, points), np.nan),
         branch=np.full((count, points), -1, np.int8),
         memory=np.full((count, points), np.nan),
+        current=np.zeros((count, points)),
         status=np.full(count, NOT_RUN, _STATUS),
         last=np.tile(np.array(FROM_REST), (count, 1)),
     )
@@ -102,9 +107,10 @@ def run_columns(
 ) -> Columns:
     """Fire many trains and keep their states at the last `firings` - `transient` firings.
 
-    States, shape (M, 4), are displacement, velocity, branch of the pack (negative: as follows from the state)
-    and memory at the first firing, with the pulses before it under way; a row of NaN is a train from rest
-    with nothing fired before (`FROM_REST`).
+    States, shape (M, 7), are displacement, velocity, branch of the pack (negative: as follows from the
+    state), memory, and under a voltage the electric part of the state (`printhammer.run.start.Beyond`) at the
+    first firing, with the pulses before it under way; a row of NaN is a train from rest with nothing fired
+    before (`FROM_REST`).
     """
     points = firings - transient
     columns = blank_columns(len(regimes), points)
@@ -141,13 +147,15 @@ def _run(
         np.append(times[transient:-1] + regime.phase * regime.period, times[-1])
         for regime, (_drive, times) in zip(regimes, trains, strict=True)
     ]
-    width = 4 if states[0, 2] >= 0.0 else 2
+    places = [0, 1, 2, 3] if states[0, 2] >= 0.0 else [0, 1]
+    if any(regime.fired.quantity == "voltage" for regime in known.values()):
+        places = list(range(states.shape[1]))
     ensemble = Ensemble(
         [regime.hammer for regime in regimes],
         [drive for drive, _times in trains],
         # One more period, so that no state depends on where the run ends.
         [float(times[-1]) + regime.period for regime, (_drive, times) in zip(regimes, trains, strict=True)],
-        states=None if rest else states[:, :width],
+        states=None if rest else states[:, places],
         starts=[float(times[0]) for _drive, times in trains],
         tolerance=tolerance,
     )
@@ -156,19 +164,14 @@ def _run(
     assert table is not None
     reached = np.isfinite(table.x[:, -1])
     status = np.where(reached, OK, np.array(result.status_names)).astype(_STATUS)
+    ends = np.column_stack(
+        [table.x[:, -1], table.v[:, -1], table.branch[:, -1], table.memory[:, -1]]
+    ).tolist()
+    electric = np.tile(NO_CURRENT, (len(regimes), 1)) if table.electric is None else table.electric[:, -1]
     last = [
-        # A state that is handed on has no current: under a voltage every train begins at rest.
-        handed_on(regime.hammer, x, v, int(branch), memory)
-        if ok and regime.fired.quantity != "voltage"
-        else FROM_REST
-        for regime, x, v, branch, memory, ok in zip(
-            regimes,
-            table.x[:, -1].tolist(),
-            table.v[:, -1].tolist(),
-            table.branch[:, -1],
-            table.memory[:, -1].tolist(),
-            reached,
-            strict=True,
+        handed_on(regime.hammer, x, v, int(branch), memory, currents) if ok else FROM_REST
+        for regime, (x, v, branch, memory), currents, ok in zip(
+            regimes, ends, electric.tolist(), reached, strict=True
         )
     ]
     return Columns(
@@ -176,6 +179,7 @@ def _run(
         table.v[:, :-1],
         table.branch[:, :-1].astype(np.int8),
         table.memory[:, :-1],
+        np.zeros_like(table.x[:, :-1]) if table.current is None else table.current[:, :-1],
         status,
         np.array(last),
     )
@@ -227,7 +231,7 @@ def run_in_stretches(
         if not left.size:
             return columns
         now = np.column_stack([np.maximum(table.x[going, 1], positions[left]), table.v[going, 1]])
-    columns.last[left, :2], columns.last[left, 2:] = now, (-1.0, 0.0)
+    columns.last[left, :2], columns.last[left, 2:] = now, AT_REST
     return columns
 
 
@@ -254,19 +258,19 @@ def state_or_rest(regime: Regime, state: State) -> State:
 
 
 def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
-    """Return by what differences of displacement, velocity and memory are divided, shape (M, 3).
+    """Return by what differences of displacement, velocity, memory and current are divided, shape (M, 4).
 
-    The half-widths of the window of each train, see `printhammer.run.window`.
+    The half-widths of the window of each train, see `printhammer.run.window`, and a typical current.
     """
-    known: dict[tuple[int, float], tuple[float, float, float]] = {}
+    known: dict[tuple[int, float], tuple[float, ...]] = {}
     rows = []
     for regime in regimes:
         drive = regime.train(1)[0] if regime.hammer.front is None or regime.hammer.position is None else None
         key = (id(regime.hammer), 0.0 if drive is None else regime.period)
-        if key not in known or regime.drive is not None:
+        if key not in known or regime.drive is not None or regime.fired.quantity == "voltage":
             window = window_of(regime.hammer, drive if drive is not None else regime.train(1)[0])
             way, speed = window.half_widths.tolist()
-            known[key] = (way, speed, way)
+            known[key] = (way, speed, way, current_scale(regime.hammer, regime.train(1)[0]))
         rows.append(known[key])
     return np.array(rows)
 
@@ -280,7 +284,7 @@ def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple
     those of `scales_of_columns`.
     """
     branch = pack_branches(columns.x, columns.branch, fronts[:, np.newaxis])
-    states = np.stack([columns.x, columns.v, columns.memory], axis=2) / scales[:, np.newaxis]
+    states = np.stack([columns.x, columns.v, columns.memory, columns.current], axis=2) / scales[:, np.newaxis]
     cycles = np.zeros(len(states), np.int64)
     distances = np.full(len(states), np.nan)
     left = np.flatnonzero(np.isfinite(states).all(axis=(1, 2)))
@@ -321,8 +325,8 @@ def confirm(
 
     for row, ends_at in zip(doubtful, mapped(settled_of, doubtful, threads), strict=True):
         q = cycles[row] = ends_at.period or 0
-        x, v, memory = (part[row] for part in (columns.x, columns.v, columns.memory))
-        points = np.column_stack([x, v, memory]) / scales[row]
+        parts = (columns.x, columns.v, columns.memory, columns.current)
+        points = np.column_stack([part[row] for part in parts]) / scales[row]
         distances[row] = np.abs(points[q:] - points[:-q]).max() if q else math.nan
 
 

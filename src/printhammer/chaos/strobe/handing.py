@@ -7,19 +7,24 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.run.ensemble import MODE_NAMES
+from printhammer.run.start import AT_REST, HELD_BRANCHES, state_to_begin
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray
 
-State = tuple[float, float, float, float]
-"""Displacement, m, velocity, m/s, branch of the pack or -1, and memory of the pack, m."""
+State = tuple[float, ...]
+"""Displacement, m, velocity, m/s, and what belongs to a state beside them: `printhammer.run.start.Beyond`."""
 
-FROM_REST: Final[State] = (math.nan, math.nan, -1.0, 0.0)
+NO_CURRENT: Final = AT_REST[2:]
+"""The electric part of a state without current."""
+
+FROM_REST: Final[State] = (math.nan, math.nan, *AT_REST)
 """Row of a state that stands for a train that begins at rest, with nothing fired before."""
 
 STRETCH: Final = 1
@@ -30,15 +35,6 @@ and leaves it again makes a hundred million times as much of that. Runs of one p
 that a motion that forgets its past repeats itself to the last bit.
 """
 
-HELD_BRANCHES: Final = {
-    MODE_NAMES.index(f"held on the {branch} branch"): MODE_NAMES.index(branch)
-    for branch in ("loading", "unloading")
-}
-"""Branches of the pack on which the armature rests, and those that they are part of."""
-
-_PACK_BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
-_PACK_RELEASED: Final = MODE_NAMES.index("pack released")
-
 
 def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
     """Return the branches of the pack on which states lie, 0 outside of it."""
@@ -48,17 +44,12 @@ def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: fl
     return branches
 
 
-def handed_on(hammer: Hammer, x: float, v: float, mode: int, memory: float) -> State:
+def handed_on(
+    hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
+) -> State:
     """Return the state with which another train goes on; `FROM_REST` where none can."""
-    branch = HELD_BRANCHES.get(mode, mode)
-    if mode == _PACK_RELEASED:
-        return FROM_REST
-    rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
-    if rigid and hammer.position is not None:
-        x = max(x, hammer.position)
-    if branch not in _PACK_BRANCHES:
-        return x, v, -1.0, 0.0
-    return x, v, float(branch), memory
+    begun = state_to_begin(hammer, x, v, mode, memory)
+    return FROM_REST if begun is None else (*begun, *electric)
 
 
 def forgets(regime: Regime) -> bool:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
 
@@ -72,6 +73,9 @@ class Strobe(Result):
     verdict: Verdict | None = part(
         "what kind of motion it is, with the evidence", more="None where it was not asked for"
     )
+    current: FloatArray | None = column(
+        "A", "current in the coil", "firing", more="None unless a voltage drives it", default=None
+    )
 
     @property
     def title(self) -> str:
@@ -88,6 +92,10 @@ class Strobe(Result):
         """The window in which the points are drawn."""
         return window_of(self.hammer, self.drive)
 
+    def entries(self) -> Entries:
+        """Return the states by name, the current only where it belongs to them."""
+        return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
+
     def notes(self) -> dict[str, Any]:
         """Return the verdict, for the attributes of the Dataset."""
         judged = {} if self.verdict is None else self.verdict.as_dict()
@@ -99,7 +107,7 @@ def strobe(
     *,
     points: SupportsIndex = POINTS,
     transient: SupportsIndex = 0,
-    state: tuple[float, float] | None = None,
+    state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
     verdict: bool = True,
     **firing: Unpack[Firing],
@@ -114,8 +122,9 @@ def strobe(
         Number of points; by default 200, as in Fig. 11.
     transient : int, optional
         Number of firings left out before the first point.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at the first firing; by default the rest state.
+    state : sequence of float, optional
+        Displacement, m, velocity, m/s, and what else belongs to the state at the first firing, as for
+        `printhammer.simulate`; by default the rest state.
     tolerance : float, optional
         As for `printhammer.simulate`.
     verdict : bool, optional
@@ -174,7 +183,8 @@ def strobes(
     points, transient, tolerance, verdict
         As for `strobe`, for all trains.
     states : sequence, optional
-        Displacement, m, and velocity, m/s, at the first firing of each train; by default the rest state.
+        Displacement, m, velocity, m/s, and what else belongs to the state at the first firing of each train,
+        as for `printhammer.simulate`, all of one form; by default the rest state.
     firings : tuple of int, optional
         First and last firing that the verdict is about; the very first one is number 1.
     every_exponent : bool, optional
@@ -200,12 +210,13 @@ def strobes(
         raise InputError(f"firings = {firings!r}, expected the first and the last firing to judge, ascending")
     fired = max(count + skipped, firings[1] if verdict else 1)
     many = regimes_of(hammers, periods, drives, waveform=waveform, overlap=overlap, phase=phase)
-    rows = None if states is None else np.asarray(states, dtype=np.float64).reshape(-1, 2).tolist()
+    table = None if states is None else np.asarray(states, dtype=np.float64)
+    rows = None if table is None else table.reshape(-1, table.shape[-1] or 2).tolist()
     size = max(len(many), 0 if rows is None else len(rows)) if many and rows != [] else 0
     for name, entries in (("hammers and periods", many), ("states", rows)):
         if entries is not None and len(entries) not in (1, size):
             raise InputError(f"{name}: {len(entries)} are given, expected 1 or {size}")
-    begun = [None] if rows is None else [(x, v) for x, v in rows]
+    begun: list[Any] = [None] if rows is None else [tuple(row) for row in rows]
     trains = [Train.of(many[i % len(many)], fired, begun[i % len(begun)]) for i in range(size)]
     chosen = np.arange(skipped + 1, skipped + count + 1)
     every, verdicts = run_trains(

@@ -142,7 +142,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
     """
     from printhammer.derivatives.states import tangent_map
 
-    if _in_pack(train, states, -1):
+    if _in_pack(train, states, -1) or not train.regime.has_derivatives:
         return np.inf
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
     tangent = tangent_map(
@@ -174,7 +174,7 @@ def _followed(
     verdicts = {
         i: verdict(row, judged, tolerance, None, why, ends_at[i])
         for i, (row, why) in enumerate(zip(distances, stopped, strict=True))
-        if why or not exponents or period_of(row) is not None
+        if why or not exponents or period_of(row) is not None or not trains[i].regime.has_derivatives
     }
     left = [i for i in range(len(trains)) if i not in verdicts]
     # A start inside the pack would need its memory; such a train gets its exponent the long way.

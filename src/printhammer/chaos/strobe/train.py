@@ -10,9 +10,10 @@ import numpy as np
 
 from printhammer.chaos.orbits.settled import Settled, settled
 from printhammer.chaos.strobe.handing import FROM_REST, STRETCH, forgets, handed_on, pack_branches
-from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
+from printhammer.chaos.strobe.verdict import UNKNOWN, Verdict, period_of, repeats, verdict
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import Ensemble
+from printhammer.run.supply import current_scale
 from printhammer.run.window import window_of
 from printhammer.support.threads import Progress, mapped, shifted
 
@@ -34,12 +35,15 @@ class Train(Declared):
 
     regime: Regime = part("hammer and periodic drive")
     drive: Drive = part("so many pulses, or the endless force")
-    state: tuple[float, float] | None = part(
-        "displacement, m, and velocity, m/s, at time 0", more="None for the rest state", default=None
+    state: tuple[float, ...] | None = part(
+        "displacement, m, velocity, m/s, and what else belongs to the state at time 0, as for"
+        " `printhammer.simulate`",
+        more="None for the rest state",
+        default=None,
     )
 
     @classmethod
-    def of(cls, regime: Regime, firings: int, state: tuple[float, float] | None = None) -> Self:
+    def of(cls, regime: Regime, firings: int, state: tuple[float, ...] | None = None) -> Self:
         """Make a train for states up to a firing.
 
         One more is fired: runs end there, so that no state depends on where that is.
@@ -73,6 +77,7 @@ class States:
     branch: IntArray
     memory: FloatArray
     status: str
+    current: FloatArray | None = None
 
     def distances(self, train: Train) -> FloatArray:
         """Return how far the states are from repeating, see `printhammer.chaos.strobe.verdict.repeats`."""
@@ -81,8 +86,9 @@ class States:
 
     @property
     def points(self) -> FloatArray:
-        """Displacement, velocity and memory, a row for each firing."""
-        return np.column_stack([self.x, self.v, self.memory])
+        """Displacement, velocity and memory, under a voltage current, a row for each firing."""
+        current = [] if self.current is None else [self.current]
+        return np.column_stack([self.x, self.v, self.memory, *current])
 
     def scaled(self, train: Train) -> FloatArray:
         """Return the points in half-widths of the window."""
@@ -98,7 +104,8 @@ class States:
 
 def _scales(train: Train) -> FloatArray:
     width, speed = window_of(train.hammer, train.drive).half_widths
-    return np.array([width, speed, width])
+    current = [current_scale(train.hammer, train.drive)] if train.regime.fired.quantity == "voltage" else []
+    return np.array([width, speed, width, *current])
 
 
 def run_trains(
@@ -126,18 +133,22 @@ def run_trains(
     after = np.array([max(int(chosen.max(initial=1)), int(firings.max(initial=1))) + 1])
     ends = [float(train.times(after)[0]) for train in trains]
     tell = shifted(progress, 0, total if judged is None else 2 * total)
+    current: FloatArray | None = None
     if all(forgets(train.regime) for train in trains):
         x, v, branch, memory, names, reached = _in_stretches(trains, every, tolerance, threads, tell)
     else:
         result = _ensemble(trains, ends, tolerance).run(strobes=every, threads=threads, progress=tell)
         table, names, reached = result.strobes, result.status_names, result.reached
         assert table is not None
-        x, v, branch, memory = table.x, table.v, table.branch, table.memory
+        x, v, branch, memory, current = table.x, table.v, table.branch, table.memory, table.current
 
     def at(i: int, times: FloatArray) -> States:
         rows = np.searchsorted(every[i], times)
         own_x, own_v, own_branch, own_memory = (part[i, rows].copy() for part in (x, v, branch, memory))
-        return States(times, own_x, own_v, own_branch, own_memory, names[i])
+        own_current = None
+        if current is not None and trains[i].regime.fired.quantity == "voltage":
+            own_current = current[i, rows].copy()
+        return States(times, own_x, own_v, own_branch, own_memory, names[i], own_current)
 
     states = [at(i, times) for i, times in enumerate(own)]
     if judged is None:
@@ -149,7 +160,11 @@ def run_trains(
         lambda i: None if stopped[i] else watched[i].settled(trains[i], distances[i]), range(total), threads
     )
     open_cases = [
-        i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
+        i
+        for i in range(total)
+        if not stopped[i]
+        and trains[i].regime.has_derivatives
+        and (every_exponent or period_of(distances[i]) is None)
     ]
     tell = shifted(progress, 2 * total - len(open_cases), 2 * total)
     exponents = exponents_of(
@@ -157,7 +172,16 @@ def run_trains(
     )
     growth = dict(zip(open_cases, exponents, strict=True))
     return states, [
-        verdict(distances[i], judged, tolerance, growth.get(i), stopped[i], ends_at[i]) for i in range(total)
+        verdict(
+            distances[i],
+            judged,
+            tolerance,
+            growth.get(i),
+            stopped[i],
+            ends_at[i],
+            *(() if trains[i].regime.has_derivatives else (UNKNOWN,)),
+        )
+        for i in range(total)
     ]
 
 
@@ -165,8 +189,8 @@ def _ensemble(
     trains: Sequence[Train], ends: Sequence[float], tolerance: float, states: FloatArray | None = None
 ) -> Ensemble:
     """Return the runs of trains up to times, s, from states at time 0, by default their own."""
-    begun = [train.state for train in trains]
-    own = None if None in begun else np.array(begun)
+    begun = [train.state for train in trains if train.state is not None]
+    own = np.array(begun) if len(begun) == len(trains) else None
     return Ensemble(
         [train.hammer for train in trains],
         [train.drive for train in trains],

@@ -29,6 +29,7 @@ from printhammer.parts.backstop._hertz import damping_from_restitution
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.results import Declared, part
 from printhammer.run.simulate import CYCLE, simulate
+from printhammer.run.supply import typical_current
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -293,6 +294,10 @@ def _places(hammer: Hammer, displacements: npt.ArrayLike | None) -> FloatArray:
 
 
 def _currents(hammer: Hammer) -> FloatArray:
+    if hammer.waveform is not None and hammer.waveform.quantity == "voltage":
+        from printhammer.drive.trains import PulseTrain
+
+        return np.linspace(0.0, typical_current(hammer, PulseTrain(hammer.waveform)), CURRENTS)
     if hammer.waveform is None or hammer.waveform.unit != "A":
         raise InputError(f"{hammer.path}: the hammer has no current to fire, expected currents to be given")
     return np.linspace(0.0, HIGHEST_CURRENT * hammer.waveform.peak, CURRENTS)

@@ -27,8 +27,9 @@ class Batch(NamedTuple):
         are counted within the member's set.
     replace : bool
         Whether a firing cuts off the pulses before it.
-    states : float64 array, shape (M, 5)
-        Time, displacement, velocity, mode (negative: as follows from the state), memory at the start.
+    states : float64 array, shape (M, 8)
+        Time, displacement, velocity, mode (negative: as follows from the state), memory, currents in coil
+        and shorted turn [A] and voltage of the reservoir [V] (NaN for a full one) at the start.
     ends : float64 array, shape (M,)
         Ends of the runs [s].
     max_steps : int
@@ -67,7 +68,7 @@ class Kept(NamedTuple):
         Status code (int64), time reached [s], number of steps (int64).
     dots : float64 array, shape (firings, 6)
         See :mod:`printhammer.kernel.single.stretch`; rows as in `Batch.firings`.
-    strobes : float64 array, shape (strobe times, 4)
+    strobes : float64 array, shape (strobe times, 4), with a coil circuit (strobe times, 7)
         See :mod:`printhammer.kernel.single.stretch`.
     x : float32 array, shape (M, T)
         Displacement [m].

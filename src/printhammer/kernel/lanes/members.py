@@ -12,9 +12,11 @@ from printhammer.kernel.compile.compiling import entry
 from printhammer.kernel.lanes.batch import control_of, train_of
 from printhammer.kernel.model.modes import BACKSTOP, PAUSED
 from printhammer.kernel.single import carry as C
+from printhammer.kernel.single.stretch import ELECTRIC_WIDTH
 
 if TYPE_CHECKING:
     from printhammer.kernel.lanes.batch import Batch, Kept
+    from printhammer.kernel.model.laws import HAS_CIRCUIT
     from printhammer.kernel.single.run import run
     from printhammer.kernel.single.stretch import blank_states, clear_dots, note_dots, note_states
 
@@ -75,6 +77,10 @@ def members(
         if states[m, 3] >= 0.0:
             carry[C.STATE] = C.ON_BRANCH
             carry[C.MODE], carry[C.PEAK] = states[m, 3], states[m, 4]
+        if HAS_CIRCUIT:
+            carry[C.WITH_CURRENT] = 1.0
+            for j in range(ELECTRIC_WIDTH):
+                carry[C.ELECTRIC + j] = states[m, 5 + j]
         code, count = PAUSED, 0
         while code == PAUSED:
             code, used, touched, count = run(

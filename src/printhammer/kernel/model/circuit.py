@@ -213,6 +213,30 @@ def electric_at_rest(x: float, hammer: Hammer) -> tuple[float, float, float]:
 
 
 @compiled
+def electric_with(
+    x: float, current: float, turn: float, reservoir: float, hammer: Hammer
+) -> tuple[float, float, float]:
+    """Return the electric state of currents in coil and shorted turn [A] and a voltage of the reservoir [V].
+
+    A reservoir of NaN is full.
+    """
+    charge = hammer[CHARGED] if math.isnan(reservoir) else reservoir
+    if hammer[TURN_RESISTANCE] > 0.0:
+        main = linkage_at(x, current + turn, hammer)
+        return main + hammer[LEAKAGE] * current, main, charge
+    linkage = linkage_at(x, current, hammer)
+    return linkage, linkage, charge
+
+
+@compiled
+def turn_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
+    """Return the current in the shorted turn [A], 0 without one."""
+    if hammer[TURN_RESISTANCE] > 0.0:
+        return current_at(x, electric[1], hammer) - coil_current(x, electric, hammer, live)
+    return 0.0
+
+
+@compiled
 def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float, float, float]:
     """Return the electric state next to `electric` in which no current flows in the coil."""
     if hammer[TURN_RESISTANCE] > 0.0:

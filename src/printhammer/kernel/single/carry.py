@@ -4,8 +4,8 @@ A run that pauses fills it; the next call with the same array and drive continue
 if there had been no pause. The caller sets `STATE` to `FRESH` for a run that begins; to `ON_BRANCH` for one
 that begins inside the pack on the branch `MODE` with the latest local maximum at `PEAK` [m];
 `PAUSE_AFTER` to the number of nodes after which to pause outside the pack; and `WITH_CURRENT` to 1 for a run
-with a coil circuit that does not begin without current, but with the three numbers from `ELECTRIC` on and the
-path `PATH` (`printhammer.kernel.model.circuit`).
+with a coil circuit that does not begin without current: the three numbers from `ELECTRIC` on are then the
+currents in the coil and in the shorted turn [A], and the voltage of the reservoir [V], NaN for a full one.
 """
 
 STATE = 0

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         path_of,
         source_of,
         take_path,
+        turn_current,
     )
     from printhammer.kernel.model.forces import Hammer, acceleration, pack_force, value_at
     from printhammer.kernel.model.laws import (
@@ -147,10 +148,11 @@ def resample(
         Ascending, inside the run [s].
     nodes, train, hammer
         As recorded and given in :func:`printhammer.kernel.single.run.run`.
-    out : float64 array, shape (n, 10), with a coil circuit (n, 14)
+    out : float64 array, shape (n, 10), with a coil circuit (n, 15)
         Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
         the backstop, damping force, mode; then coil current, voltage across the coil, flux linkage, voltage
-        of the reservoir. At the time of an impact or a switch: the state after it.
+        of the reservoir, current in the shorted turn. At the time of an impact or a switch: the state after
+        it.
     """
     train = Train(*train)
     first, last, _edge = edges_at(nodes[0, 0], train)
@@ -191,6 +193,7 @@ def resample(
                 out[row, 11] = voltage - series * current
             out[row, 12] = electric[0]
             out[row, 13] = electric[2]
+            out[row, 14] = turn_current(x, electric, hammer, live)
 
 
 @compiled

@@ -9,7 +9,7 @@ from printhammer.kernel.compile.compiling import entry, inlined
 from printhammer.kernel.methods.crossing import STILL
 from printhammer.kernel.methods.landing import FAILED
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.circuit import BLOCKED, UNTIL
+from printhammer.kernel.model.circuit import BLOCKED, SOURCE, UNTIL
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
     FRONT,
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         driven,
         electric_at_rest,
         electric_rates,
+        electric_with,
         enter_piece,
         is_quiet,
         moved,
@@ -81,11 +82,15 @@ def kept_in(mode: int, w: float, peak: float) -> float:
 def electric_at_start(x: float, hammer: Hammer, carry: Any, live: Any) -> Electric:
     """Return the electric state in which a run begins or goes on, the current on its path."""
     if HAS_CIRCUIT:
-        if carry[C.STATE] != C.GOES_ON and carry[C.WITH_CURRENT] == 0.0:
+        if carry[C.STATE] == C.GOES_ON:
+            take_path(live, carry[C.PATH], carry[C.UNTIL])
+            return carry[C.ELECTRIC], carry[C.ELECTRIC + 1], carry[C.ELECTRIC + 2]
+        if carry[C.WITH_CURRENT] == 0.0:
             take_path(live, BLOCKED, math.inf)
             return electric_at_rest(x, hammer)
-        take_path(live, carry[C.PATH], carry[C.UNTIL])
-        return carry[C.ELECTRIC], carry[C.ELECTRIC + 1], carry[C.ELECTRIC + 2]
+        current, turn, reservoir = carry[C.ELECTRIC], carry[C.ELECTRIC + 1], carry[C.ELECTRIC + 2]
+        take_path(live, BLOCKED if current == 0.0 else SOURCE, math.inf)
+        return electric_with(x, current, turn, reservoir, hammer)
     return ()
 
 

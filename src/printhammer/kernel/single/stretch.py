@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled
-from printhammer.kernel.model.layout import ELECTRIC, FRONT, Train
+from printhammer.kernel.model.layout import FRONT, Train
 from printhammer.kernel.model.modes import LOADING, PACK_SURFACE, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
+    from printhammer.kernel.model.circuit import coil_current, turn_current
     from printhammer.kernel.model.forces import Hammer, pack_force
     from printhammer.kernel.model.laws import HAS_CIRCUIT, MEMORY
     from printhammer.kernel.model.pulses import edges_at, pass_edges
     from printhammer.kernel.single.resample import (
         branch_of,
         drive_at,
-        electric_in_step,
+        drive_in_step,
         peaks_of,
         state_in_step,
     )
@@ -30,7 +31,10 @@ DOT_WIDTH = 6
 """Columns of a dot: pack contacts, time and velocity in, time out, depth, peak force."""
 
 STROBE_WIDTH = 4
-"""Columns of a strobe: displacement, velocity, mode, memory; with a coil circuit four more, as of a node."""
+"""Columns of a strobe: displacement, velocity, mode, memory; with a coil circuit `ELECTRIC_WIDTH` more."""
+
+ELECTRIC_WIDTH = 3
+"""Columns of an electric state: currents in coil and shorted turn [A], voltage of the reservoir [V]."""
 
 
 @compiled
@@ -147,10 +151,10 @@ def note_states(
             strobes[strobe, 2] = branch
             strobes[strobe, 3] = kept if branch in (UNLOADING, RELOADING) else 0.0
             if HAS_CIRCUIT:
-                electric = electric_in_step(due, nodes[i], hammer, drive)
-                for j in range(3):
-                    strobes[strobe, STROBE_WIDTH + j] = electric[j]
-                strobes[strobe, STROBE_WIDTH + 3] = nodes[i, ELECTRIC + 3]
+                live, electric = drive_in_step(due, nodes[i], hammer, drive)
+                strobes[strobe, STROBE_WIDTH] = coil_current(displacement, electric, hammer, live)
+                strobes[strobe, STROBE_WIDTH + 1] = turn_current(displacement, electric, hammer, live)
+                strobes[strobe, STROBE_WIDTH + 2] = electric[2]
             strobe += 1
 
 

@@ -173,7 +173,7 @@ def damping_study(
         raise InputError(f"{hammer.path}: the hammer has no backstop, expected one of some material")
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":
-        raise InputError(f"{hammer.path}: the waveform is a force, expected a current")
+        raise InputError(f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current")
     single = nominal(hammer, tolerance=tolerance)
     tried = tuple(materials(hammer, single) if others is None else others)
     if not tried:

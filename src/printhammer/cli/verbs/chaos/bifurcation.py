@@ -206,7 +206,7 @@ def why_undecided(result: Bifurcation) -> list[str]:
     """Return why trains that came to their end are undecided, a sentence for each reason."""
     import numpy as np
 
-    from printhammer.chaos.strobe.verdict import SIGNIFICANT
+    from printhammer.chaos.strobe.verdict import SIGNIFICANT, UNKNOWN
 
     exponents, errors = result.exponents, result.standard_errors
     undecided = (result.verdicts == "undecided") & (result.status == "ok")
@@ -218,7 +218,12 @@ def why_undecided(result: Bifurcation) -> list[str]:
             "neighbouring motions approach each other: they still settle, more --firings show the period",
         ),
         (known & ~settling, "the exponent lies within three standard errors of zero"),
-        (undecided & ~known, "no exponent was computed: --exponents does so, except where a touch grazes"),
+        (
+            undecided & ~known,
+            "no exponent was computed: --exponents does so, except where a touch grazes"
+            if result.regime.has_derivatives
+            else UNKNOWN,
+        ),
     )
     every = int(undecided.sum())
     return [f"{int(some.sum())} of {every} undecided trains: {why}." for some, why in reasons if some.any()]
