@@ -70,7 +70,9 @@ def test_a_sequence_has_one_supply() -> None:
 
 def test_a_voltage_without_derivatives_says_so() -> None:
     hammer = ph.load("hendriks-1983").replace(
-        {"coil": {"resistance": "2 ohm", "inductance": "2 mH"}, "waveform": EACH[0]}
+        {"coil": {"resistance": "2 ohm", "inductance": "3 mH"}, "waveform": EACH[0]}
     )
-    with pytest.raises(ph.InputError, match="do not go through the circuit"):
-        ph.lyapunov(hammer, period="1.2 ms", firings=20)
+    with pytest.raises(ph.InputError, match="constants do not go through the circuit"):
+        ph.sensitivities(hammer, ph.PulseTrain(EACH[0], period=1.2e-3, pulses=1))
+    with pytest.raises(ph.InputError, match="without the current of the coil"):
+        ph.orbits(hammer, period="1.2 ms")

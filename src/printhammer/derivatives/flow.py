@@ -71,36 +71,30 @@ def carry_columns(
         The run, and its record.
     marks : array, shape (m,)
         Ascending times, s.
-    initial : array, shape (3, n)
-        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark.
+    initial : array, shape (3, n), with a circuit (3, n) or (6, n)
+        Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark; of flux
+        linkage of the coil and of its shorted turn, Wb, and voltage of the reservoir, V, by default none.
+        Where no current flows, the linkage goes with the displacement, and its change is not looked at.
     forcing : tuple, optional
         Of constants, see `forcing_of`; without it what changes is the state at the first mark alone.
     nodes : sequence of int, optional
         Ascending numbers of nodes at which to look as well, of a record in one piece.
     renormalise : bool, optional
         Whether to keep the columns orthonormal and to note their growth.
-
-    Raises
-    ------
-    InputError
-        A voltage drives the coil: the equation does not go through its circuit.
     """
-    if problem.laws.circuit:
-        raise InputError(
-            "the drive is a voltage, expected a current or a force: derivatives do not go through the circuit"
-            " of the coil"
-        )
-    forced, count = forcing is not None, initial.shape[1]
-    rows = V.ROWS if forced else V.ENERGY
+    forced, circuit, count = forcing is not None, problem.laws.circuit, initial.shape[1]
+    rows = V.row_count(forced, circuit)
+    if circuit and len(initial) == V.ENERGY:
+        initial = np.vstack([initial, np.zeros((V.ELECTRICS, count))])
     kernel = variational(problem.kernel, forced=forced)
     drive = problem.drive_arrays()
     track = np.zeros(V.GROWN + count)
     track[V.SMOOTH] = 1.0
     carried = V.Carried(
         columns=np.zeros((rows, count)),
-        work=np.zeros((V.WORK_ROWS, V.work_width(count, forced))),
+        work=np.zeros((V.WORK_ROWS, V.work_width(count, forced, circuit))),
         track=track,
-        states=np.full((len(marks), 4), np.nan),
+        states=np.full((len(marks), 8 if circuit else 4), np.nan),
         changes=np.full((len(marks), rows, count), np.nan),
         growth=np.full((len(marks), count), np.nan),
         passed=np.full((len(nodes), 2, rows, count), np.nan),
@@ -127,7 +121,18 @@ def carry_columns(
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
-    """Return what the kernel needs of the changes of "hammer", "firings" and "pieces" with n constants."""
+    """Return what the kernel needs of the changes of "hammer", "firings" and "pieces" with n constants.
+
+    Raises
+    ------
+    InputError
+        A voltage drives the coil: the changes with constants do not go through its circuit.
+    """
+    if problem.laws.circuit:
+        raise InputError(
+            "the drive is a voltage, expected a current or a force: derivatives with respect to constants do"
+            " not go through the circuit of the coil"
+        )
     moves = changes["hammer"]
     count = len(moves)
     away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)

@@ -16,6 +16,7 @@ from printhammer.derivatives.flow import Flow, carry_columns
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.kernel.model.layout import CAPACITANCE, TURN_RESISTANCE
 from printhammer.kernel.model.modes import HELD_UNLOADING, OK, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
@@ -42,11 +43,14 @@ class TangentMap(Declared):
 
     The state is displacement, m, and velocity, m/s; on the unloading branch of a pack with memory also the
     displacement of the latest local maximum, m (0 in `state_at_start` and `state_at_end` where it is not part
-    of the state).
+    of the state). Where a voltage drives the coil, its flux linkage, Wb, follows, that of its shorted turn,
+    Wb, if it has one, and the voltage of the reservoir, V, if there is one. Without a current the linkage is
+    that of the place: its row goes with the displacement, its column is zero.
     """
 
     matrix: FloatArray = part(
-        "derivative d(state at the end) / d(state at the start), shape (2 or 3, 2 or 3)",
+        "derivative d(state at the end) / d(state at the start), shape (2 or 3, 2 or 3), with a circuit up to"
+        " (6, 6)",
         more="NaN if the run ended early",
     )
     start: float = scalar("s", "time at the start")
@@ -93,7 +97,8 @@ class Exponent(Declared):
         "of the value, from the scatter of overlapping batch means; infinite for fewer than eight firings"
     )
     second: float = part(
-        "the other exponent of the plane of displacement and velocity, per firing",
+        "the other exponent of the plane of displacement and velocity, per firing; under a voltage the second"
+        " largest",
         more="a third, that of the memory of the pack, is minus infinity: every contact meets fresh paper",
     )
     period: float = scalar("s", "time between firings")
@@ -105,7 +110,7 @@ class Exponent(Declared):
     )
     states: FloatArray = part(
         "displacement, m, velocity, m/s, mode, and latest local maximum, m, at the firings, shape"
-        " (number of factors + 1, 4)",
+        " (number of factors + 1, 4); under a voltage also electric state and path, (.., 8)",
         more="NaN where the run ended before",
         repr=False,
         default_factory=lambda: np.zeros((0, 4)),
@@ -163,12 +168,13 @@ def tangent_map(
         no state is given.
     """
     problem = problem_between(hammer, drive, start, end, state, tolerance)
-    flow = follow(problem, np.array([start, end]), np.eye(3), renormalise=False)
+    flow = follow(problem, np.array([start, end]), np.eye(problem.state_size), renormalise=False)
     branches = [int(code) if code >= 0.0 else -1 for code in flow.states[:, 2]]
-    columns, rows = (components(branch) for branch in branches)
+    columns, rows = (state_rows(problem, branch) for branch in branches)
     ok = flow.status == OK
+    matrix = flow.columns[np.ix_(rows, columns)] if ok else np.full((2, len(columns)), np.nan)
     return TangentMap(
-        matrix=flow.columns[:rows, :columns].copy() if ok else np.full((2, columns), np.nan),
+        matrix=matrix,
         start=start,
         end=end,
         state_at_start=state_of(flow.states[0]),
@@ -194,9 +200,36 @@ def problem_between(
     return _problem(hammer, drive, state, tolerance)
 
 
+def check_plane(drive: Drive) -> None:
+    """Refuse a voltage where a state is displacement and velocity alone.
+
+    Raises
+    ------
+    InputError
+        As said: the current of the coil belongs to its state.
+    """
+    if drive.quantity == "voltage":
+        raise InputError(
+            "the drive is a voltage, expected a current or a force: the states of a section are displacement"
+            " and velocity, without the current of the coil"
+        )
+
+
 def components(mode: float) -> int:
     """Return how many components the state has in a mode; on the unloading branch it has a memory."""
     return 3 if mode in (UNLOADING, RELOADING, HELD_UNLOADING) else 2
+
+
+def state_rows(problem: Problem, mode: float, electric: int = 3) -> list[int]:
+    """Return the rows of `Flow.changes` of what is the state in a mode; `electric` is the first electric row.
+
+    They are also the places of the components in the initial columns of `carry_columns`.
+    """
+    rows = list(range(components(mode)))
+    if problem.laws.circuit:
+        there = (True, problem.constants[TURN_RESISTANCE] > 0.0, problem.constants[CAPACITANCE] > 0.0)
+        rows += [electric + place for place, has in enumerate(there) if has]
+    return rows
 
 
 def state_of(row: FloatArray) -> tuple[float, float, float]:
@@ -248,7 +281,8 @@ def strobe_exponent(
     problem = _problem(hammer, drive, state, tolerance)
     before = max(first - 1 - _WARM_UP, 0)
     scale, speed = problem.scales
-    initial = np.array([[scale, 0.0], [0.0, speed], [0.0, 0.0]])
+    initial = np.zeros((problem.state_size, 2))
+    initial[0, 0], initial[1, 1] = scale, speed
     followed = follow(problem, times[before:], initial, renormalise=True)
     growth = followed.growth[first - before :]
     factors = growth[:, 0].copy()

@@ -259,6 +259,11 @@ class Problem:
         """Number of columns that `resample` fills."""
         return 15 if self.laws.circuit else 10
 
+    @property
+    def state_size(self) -> int:
+        """Number of components of the state: displacement, velocity, memory; electric state of a circuit."""
+        return 6 if self.laws.circuit else 3
+
     def room(self, count: int) -> FloatArray:
         """Return an array for so many nodes."""
         return np.empty((count, node_width(self.laws)))

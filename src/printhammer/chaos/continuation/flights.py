@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.chaos.continuation.family import rigid_backstop
 from printhammer.chaos.strobe.map import turns
-from printhammer.derivatives.states import follow
+from printhammer.derivatives.states import check_plane, follow
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
@@ -55,6 +55,7 @@ def fly(
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None
     train, _ = regime.train(firings + 1)
+    check_plane(train)
     begin, *_, end = (float(time) for time in regime.moments(train, firings, phase % 1.0))
     close = _CLOSE * regime.period
     state, jacobian, trouble = np.array([place, speed]), np.eye(2), ""
@@ -113,6 +114,7 @@ class NearTouch(Declared):
 def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> list[NearTouch]:
     """Return the turns of an orbit, and its impacts on a rigid backstop, those nearest to a grazing first."""
     train, _ = regime.train(firings + 1)
+    check_plane(train)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     hammer = regime.hammer
     problem = Problem(hammer, train, (float(state[0]), float(state[1])), begin, tolerance)

@@ -336,11 +336,13 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
 def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: float) -> Strobe:
     """Return the states that the tangent flow passed, judged."""
     firing = np.arange(first, last + 1)
-    x, v, mode, memory = exponent.states.T
+    x, v, mode, memory = exponent.states.T[:4]
     branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)
     states = States(train.times(firing), x, v, branch, memory, exponent.status)
     stopped = "" if exponent.ok else exponent.status
     distances = states.distances(train)
-    ends_at = None if stopped else states.settled(train, distances)
+    # Under a voltage a section has no derivative of its own: the states alone decide.
+    alone = stopped or train.drive.quantity == "voltage"
+    ends_at = None if alone else states.settled(train, distances)
     judged = verdict(distances, (first, last), tolerance, exponent, stopped, ends_at)
     return strobe_of(train, firing, states, tolerance, judged)

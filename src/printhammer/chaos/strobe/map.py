@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.derivatives.states import follow
+from printhammer.derivatives.states import check_plane, follow
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
@@ -247,6 +247,7 @@ def image_of(
 ) -> Image:
     """Do as `strobe_map` with arguments that are known to be right."""
     train, _ = regime.train(firings)
+    check_plane(train)
     moments = regime.moments(train, firings)
     start = float(state[0]), float(state[1])
     if not possible(regime.hammer, *start):

@@ -267,8 +267,12 @@ def exponents_onward(
     Over so many points, after a hundred firings.
     """
     window = _BEFORE + 1, _BEFORE + points
+    from printhammer.derivatives.states import check_plane
+
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
     trains = [Train(regime, regime.pulses(window[1] + 2), state) for regime, state in begun]
+    for train in trains:
+        check_plane(train.drive)
     return exponents_of(trains, window, tolerance, threads=threads, progress=progress)
 
 

@@ -10,9 +10,9 @@ import functools
 import hashlib
 
 from printhammer.kernel.compile.specialise import Kernel, execute_all, one_at_a_time, source_file
-from printhammer.kernel.variational.layout import changing
+from printhammer.kernel.variational.layout import changing, electric_row
 
-TEMPLATES = ("slopes", "forcing", "columns", "steps", "switches", "flow")
+TEMPLATES = ("slopes", "circuit", "forcing", "columns", "steps", "switches", "flow")
 
 
 def variational(plain: Kernel, *, forced: bool) -> Kernel:
@@ -31,7 +31,8 @@ def _built(plain: Kernel, forced: bool) -> Kernel:
     namespace = {
         **plain.namespace,
         "FORCED": forced,
-        "CHANGING": changing(forced, plain.namespace["HAS_DAMPING"]),
+        "CHANGING": changing(forced, plain.namespace["HAS_DAMPING"], plain.namespace["HAS_CIRCUIT"]),
+        "ELECTRIC_ROW": electric_row(forced),
     }
     label = f"{plain.label}, by {'constants' if forced else 'states'}"
     return execute_all([f"variational.{name}" for name in TEMPLATES], namespace, sources, label)

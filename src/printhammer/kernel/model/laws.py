@@ -68,9 +68,11 @@ FORCE_DRIVE: bool
 PACK_PULLS: bool
 BACKSTOP_PULLS: bool
 RELOAD_ALONG_UNLOADING: bool
-# In variational equations only: whether constants force them, and what of a column changes between switches.
+# In variational equations only: whether constants force them, what of a column changes between switches, and
+# the row at which a circuit's part of it begins.
 FORCED: bool
 CHANGING: int
+ELECTRIC_ROW: int
 # In lanes only: what the drive consists of.
 EXPONENTIALS: int
 CUBIC: bool

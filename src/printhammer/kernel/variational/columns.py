@@ -24,19 +24,24 @@ from printhammer.kernel.methods.dop853_tableau import FULL_A as A
 from printhammer.kernel.methods.dop853_tableau import FULL_B as B
 from printhammer.kernel.methods.dop853_tableau import STAGES
 from printhammer.kernel.model.layout import INVERSE_MASS, POSITION
-from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
+from printhammer.kernel.model.modes import BACKSTOP, HELD_UNLOADING, LOADING, RELOADING, RESTING, UNLOADING
 from printhammer.kernel.variational import layout as V
 
 if TYPE_CHECKING:
+    from printhammer.kernel.model.circuit import driven
     from printhammer.kernel.model.forces import acceleration, backstop_acceleration
-    from printhammer.kernel.model.laws import CHANGING, FORCED, HAS_BACKSTOP, HAS_PACK, MEMORY
-    from printhammer.kernel.model.pulses import drive_value
+    from printhammer.kernel.model.laws import CHANGING, FORCED, HAS_BACKSTOP, HAS_CIRCUIT, HAS_PACK, MEMORY
+    from printhammer.kernel.variational.circuit import (
+        add_circuit,
+        circuit_pace,
+        electric_in,
+        whole_field_slope,
+    )
     from printhammer.kernel.variational.forcing import add_forcing
     from printhammer.kernel.variational.layout import Setting
     from printhammer.kernel.variational.slopes import (
         contact_slopes,
         damping_slope,
-        field_slope,
         memory_slope,
         pack_slopes,
     )
@@ -56,18 +61,18 @@ def force_slopes(
     Returns
     -------
     tuple of float
-        Of magnet and spring force with displacement; of the push of the contact that is closed with
-        displacement, velocity and latest local maximum; of what of it is lost for good, with displacement and
-        velocity. In the backstop those with displacement are times 2 w, but for the first.
+        Of magnet and spring force with displacement, at a fixed flux linkage if there is one; of the push of
+        the contact that is closed with displacement, velocity and latest local maximum; of what of it is lost
+        for good, with displacement and velocity. In the backstop those with displacement are times 2 w, but
+        for the first.
     """
-    scales, bounds, hammer, drive, _forcing = setting
-    value = drive_value(y[V.TIME], drive)
+    scales, hammer = setting.scales, setting.hammer
     if HAS_BACKSTOP and mode == BACKSTOP:
         w = y[0]
         with_w, with_v, lost_w, lost_v = contact_slopes(w, y[1], scales, hammer)
-        field = field_slope(hammer[POSITION] - w * w, value, scales, bounds, hammer)
+        field = whole_field_slope(hammer[POSITION] - w * w, y, setting)
         return field, -with_w, with_v, 0.0, -lost_w, lost_v
-    field = field_slope(y[0], value, scales, bounds, hammer)
+    field = whole_field_slope(y[0], y, setting)
     push_x, push_v, push_peak = 0.0, 0.0, 0.0
     if HAS_PACK and mode in (LOADING, UNLOADING, RELOADING):
         push_x, push_v = pack_slopes(y[0], y[1], mode, memory, peak, scales, hammer)
@@ -81,8 +86,13 @@ def column_rates(
     rates: Any, y: Any, columns: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> None:
     """Fill `rates` with those of displacement or w, velocity, time and columns at `y`."""
-    hammer, drive, scales = setting.hammer, setting.drive, setting.scales
+    hammer, drive, scales = setting.hammer, driven(setting.drive, electric_in(y)), setting.scales
     v = y[1]
+    if HAS_CIRCUIT and RESTING <= mode <= HELD_UNLOADING:
+        rates[:] = 0.0
+        rates[V.TIME] = 1.0
+        add_circuit(rates, y, columns.shape[1], y[0], False, setting)
+        return
     if HAS_BACKSTOP and mode == BACKSTOP:
         pace = 2.0 * y[0]
         rates[0] = -v
@@ -100,6 +110,9 @@ def column_rates(
         j = V.FIRST_COLUMN + CHANGING * k
         rates[j] = pace * y[j + 1]
         rates[j + 1] = by_x * y[j] + by_v * y[j + 1] + by_peak * columns[V.PEAK, k]
+    if HAS_CIRCUIT:
+        x = hammer[POSITION] - y[0] * y[0] if mode == BACKSTOP else y[0]
+        add_circuit(rates, y, columns.shape[1], x, True, setting)
     if FORCED:
         add_forcing(rates, y, columns, mode, memory, slopes, setting)
 
@@ -110,12 +123,19 @@ def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Sett
 
     The run's own steps follow the state: near rest, where that hardly moves, they are longer.
     """
+    if HAS_CIRCUIT and RESTING <= mode <= HELD_UNLOADING:
+        rate = circuit_pace(work[V.START, 0], work[V.START], setting)
+        return LONGEST_PHASE / rate if rate > 0.0 else math.inf
     slopes = force_slopes(work[V.START], mode, memory, peak, work[V.MEMORIES], setting)
     pace = 2.0 * work[V.START, 0] if mode == BACKSTOP else 1.0
     by_x = (pace * slopes[0] + slopes[1]) * setting.hammer[INVERSE_MASS]
     by_v = slopes[2] + damping_slope(work[V.START, 1], setting.scales, setting.hammer)
     by_v *= pace * setting.hammer[INVERSE_MASS]
     rate = max(math.sqrt(abs(pace * by_x)), abs(by_v))
+    if HAS_CIRCUIT:
+        place = work[V.START, 0]
+        x = setting.hammer[POSITION] - place * place if mode == BACKSTOP else place
+        rate = max(rate, pace * circuit_pace(x, work[V.START], setting))
     return LONGEST_PHASE / rate if rate > 0.0 else math.inf
 
 
@@ -125,6 +145,8 @@ def column_step(
 ) -> None:
     """Take one step of `length` (s, or of the variable s in the backstop) from row START of `work`."""
     count = V.FIRST_COLUMN + CHANGING * columns.shape[1]
+    if HAS_CIRCUIT:
+        count = work.shape[1]
     start, y, peaks = work[V.START], work[V.STAGE], work[V.MEMORIES]
     for stage in range(STAGES):
         for i in range(count):

@@ -9,15 +9,36 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry
-from printhammer.kernel.model.layout import POSITION, Train
+from printhammer.kernel.model.layout import (
+    CHARGED,
+    CURRENT_SCALE,
+    ELECTRIC,
+    LINKAGE_SCALE,
+    POSITION,
+    RESISTANCE,
+    Train,
+)
 from printhammer.kernel.model.modes import BACKSTOP, RELOADING, UNLOADING
-from printhammer.kernel.variational.layout import DUE, GROWN, PEAK, SMOOTH, START, STATE, Forcing, Setting
+from printhammer.kernel.variational.layout import (
+    DUE,
+    ELECTRICS,
+    ENERGY,
+    GROWN,
+    PEAK,
+    SMOOTH,
+    START,
+    STATE,
+    Forcing,
+    Setting,
+)
 
 if TYPE_CHECKING:
+    from printhammer.kernel.model.circuit import take_path
     from printhammer.kernel.model.forces import Hammer
-    from printhammer.kernel.model.laws import FORCED, HAS_PACK, MEMORY
+    from printhammer.kernel.model.laws import ELECTRIC_ROW, FORCED, HAS_CIRCUIT, HAS_PACK, MEMORY
     from printhammer.kernel.model.pulses import edges_at, pass_edges
     from printhammer.kernel.single.resample import branch_of
+    from printhammer.kernel.variational.circuit import hold_linkage, pass_edge_of_driver, pass_path
     from printhammer.kernel.variational.forcing import set_live_moves
     from printhammer.kernel.variational.layout import Carried
     from printhammer.kernel.variational.steps import begin_step, carry
@@ -30,6 +51,45 @@ def copy_columns(columns: Any, out: Any) -> None:
     for i in range(columns.shape[0]):
         for k in range(columns.shape[1]):
             out[i, k] = columns[i, k]
+
+
+@compiled
+def unit_of(row: int, scales: Any, hammer: Hammer) -> float:
+    """Return the unit of a component of the state, by its row in a column without forcing."""
+    if row < ENERGY:
+        return float(scales[1] if row == 1 else scales[0])
+    if row < ELECTRIC_ROW + 2:
+        return float(hammer[LINKAGE_SCALE])
+    if row == ELECTRIC_ROW + 2:
+        return float(max(hammer[CHARGED], hammer[RESISTANCE] * hammer[CURRENT_SCALE]))
+    return float(scales[0] / scales[1])
+
+
+@compiled
+def orthonormalise_with_circuit(columns: Any, scales: Any, hammer: Hammer, grown: Any) -> None:
+    """Do as `orthonormalise` with all components of the state."""
+    count = columns.shape[0]
+    for k in range(columns.shape[1]):
+        for i in range(count):
+            columns[i, k] /= unit_of(i, scales, hammer)
+        for j in range(k):
+            shared = 0.0
+            for i in range(count):
+                shared += columns[i, j] * columns[i, k]
+            for i in range(count):
+                columns[i, k] -= shared * columns[i, j]
+        square = 0.0
+        for i in range(count):
+            square += columns[i, k] * columns[i, k]
+        grown[k] = grown[k] + 0.5 * math.log(square) if square > 0.0 else -math.inf
+        for i in range(count):
+            columns[i, k] = columns[i, k] / math.sqrt(square) if square > 0.0 else 0.0
+        if square == 0.0:
+            columns[0, k] = -columns[1, k - 1] if k > 0 else 1.0
+            columns[1, k] = columns[0, k - 1] if k > 0 else 0.0
+    for k in range(columns.shape[1]):
+        for i in range(count):
+            columns[i, k] *= unit_of(i, scales, hammer)
 
 
 @compiled
@@ -66,9 +126,10 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 
 @compiled
-def note_mark(node: Any, initial: Any, hammer: Hammer, carried: Carried) -> None:
+def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> None:
     """Enter state, columns and their growth at a mark; at the first mark the columns begin."""
     columns, work, track, states, changes, growth, _passed = carried
+    hammer = setting.hammer
     mode = int(node[3])
     row = int(track[DUE])
     remembers = HAS_PACK and MEMORY and branch_of(mode) in (UNLOADING, RELOADING)
@@ -76,27 +137,39 @@ def note_mark(node: Any, initial: Any, hammer: Hammer, carried: Carried) -> None
     states[row, 0] = hammer[POSITION] - place * place if mode == BACKSTOP else place
     states[row, 1], states[row, 2] = work[START, 1], mode
     states[row, 3] = node[4] if remembers else 0.0
+    if HAS_CIRCUIT:
+        for i in range(ELECTRICS):
+            states[row, STATE + 2 + i] = work[START, work.shape[1] - ELECTRICS + i]
+        states[row, STATE + 2 + ELECTRICS] = node[ELECTRIC + 3]
     for k in range(columns.shape[1]):
         if row == 0:
             for i in range(columns.shape[0]):
                 columns[i, k] = initial[i, k] if i < STATE or (i == PEAK and remembers) else 0.0
+            if HAS_CIRCUIT:
+                for i in range(ELECTRICS):
+                    columns[ELECTRIC_ROW + i, k] = initial[ENERGY + i, k]
             track[GROWN + k] = 0.0
         growth[row, k] = track[GROWN + k]
         track[GROWN + k] = 0.0
+    if HAS_CIRCUIT and row == 0:
+        hold_linkage(states[row, 0], columns, node[ELECTRIC + 3], setting)
     copy_columns(columns, changes[row])
     track[DUE] += 1.0
 
 
 @compiled
-def scale_or_note(factor: float, renormalise: bool, columns: Any, scales: Any, grown: Any) -> None:
+def scale_or_note(factor: float, renormalise: bool, columns: Any, setting: Setting, grown: Any) -> None:
     """Put a factor, given by its logarithm, back into the columns, or note it with their growth."""
     if renormalise:
         for k in range(columns.shape[1]):
             grown[k] += factor
-        orthonormalise(columns, scales, grown)
+        if HAS_CIRCUIT:
+            orthonormalise_with_circuit(columns, setting.scales, setting.hammer, grown)
+        else:
+            orthonormalise(columns, setting.scales, grown)
     elif factor != 0.0:
         for k in range(columns.shape[1]):
-            for i in range(3):
+            for i in range(columns.shape[0] if HAS_CIRCUIT else 3):
                 columns[i, k] *= math.exp(factor)
 
 
@@ -135,8 +208,8 @@ def flow(
         Whether to make the columns orthonormal at every node and to note their growth instead.
     ended : bool
         Whether the run ends with the stretch; otherwise a mark at its end belongs to the next one.
-    initial : float64 array, shape (3, n)
-        Changes of displacement, velocity and latest local maximum at the first mark.
+    initial : float64 array, shape (3, n), with a circuit (6, n)
+        Changes of displacement, velocity and latest local maximum at the first mark; of the electric state.
     carried : Carried
         The columns, and what is noted of them.
     """
@@ -163,15 +236,17 @@ def flow(
         t_end = after[0]
         if FORCED and due > 0:
             pass_moving_edges(node, train, first, last, columns, setting)
-        first, last, _edge = pass_edges(node[0], train, first, last)
+        first, last, edge = pass_edges(node[0], train, first, last)
+        if HAS_CIRCUIT:
+            take_path(train.live, node[ELECTRIC + 3], math.inf)
         if FORCED:
             set_live_moves(first, last, train, forcing)
         begin_step(node, work)
         # A mark at the time of several nodes belongs to the last of them.
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):
             factor = carry(marks[due], node, after, columns, work, setting)
-            scale_or_note(factor, renormalise, columns, scales, grown)
-            note_mark(node, initial, hammer, carried)
+            scale_or_note(factor, renormalise, columns, setting, grown)
+            note_mark(node, initial, setting, carried)
             due += 1
         if due in (0, marks.size) or final:
             continue
@@ -181,7 +256,13 @@ def flow(
             copy_columns(columns, passed[asked, 0])
         if not pass_node(node, after, columns, setting):
             track[SMOOTH] = 0.0
+        # At its end a run puts the current on the path with which another begins.
+        if HAS_CIRCUIT and not (ended and i + 2 == count):
+            if t_end >= edge:
+                pass_edge_of_driver(after, columns, setting)
+            elif not pass_path(node, after, columns, setting):
+                track[SMOOTH] = 0.0
         if asked_now:
             copy_columns(columns, passed[asked, 1])
             asked += 1
-        scale_or_note(factor, renormalise, columns, scales, grown)
+        scale_or_note(factor, renormalise, columns, setting, grown)

@@ -3,7 +3,9 @@
 A column is the change of the motion, all at one time, per unit of an initial change or of a constant: of the
 `STATE` components of the state, displacement [m] and velocity [m/s]; of the latest local maximum in the pack
 [m], which changes at switches only; and, where constants force the equation, of the energies [J] that coil
-and drive force have given and pack, backstop and damping have taken.
+and drive force have given and pack, backstop and damping have taken. Where a voltage drives the coil, four
+more rows come last: of the electric state, flux linkage of the coil and of the shorted turn [Wb] and voltage
+of the reservoir [V], and of the time [s] at which a fixed off-time of a chopper ends.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +19,9 @@ ENERGY = STATE + 1
 COIL, DRIVE, PACK_LOSS, BACKSTOP_LOSS, DAMPING_LOSS = range(ENERGY, ENERGY + 5)
 ENERGIES = 5
 ROWS = ENERGY + ENERGIES
-"""Rows of a column; without forcing the first three."""
+"""Rows of a column without a circuit; without forcing the first three."""
+ELECTRICS = 3
+"""Components of the electric state; the end of an off-time is one row more."""
 
 START, STAGE, MEMORIES = STAGES, STAGES + 1, STAGES + 2
 WORK_ROWS = STAGES + 3
@@ -78,7 +82,7 @@ class Forcing(NamedTuple):
 class Carried(NamedTuple):
     """Columns on their way along a run, and what is noted of them at marks and wanted nodes.
 
-    Without forcing a column has r = 3 rows, with it 8.
+    Without forcing a column has r = 3 rows, with it 8; with a circuit four more.
 
     Attributes
     ----------
@@ -89,8 +93,8 @@ class Carried(NamedTuple):
     track : float64 array, shape (2 + n,)
         Zeros, but one at place 1, before the first stretch; what is needed to go on afterwards, at place 1
         whether the motion is differentiable so far.
-    states : float64 array, shape (m, 4)
-        Displacement, velocity, mode and latest local maximum at the marks.
+    states : float64 array, shape (m, 4), with a circuit (m, 8)
+        Displacement, velocity, mode and latest local maximum at the marks; electric state and path.
     changes, growth : float64 array, shapes (m, r, n) and (m, n)
         The columns at the marks, and the logarithms of their growth since the mark before.
     passed : float64 array, shape (q, 2, r, n)
@@ -116,11 +120,30 @@ class Setting(NamedTuple):
     forcing: Any
 
 
-def changing(forced: bool, damped: bool = True) -> int:
-    """Return the number of rows of a column that change between switches; the last is that of damping."""
-    return STATE + (ENERGIES - (not damped) if forced else 0)
+def electric_row(forced: bool) -> int:
+    """Return the first of the rows of a column that a circuit has."""
+    return ROWS if forced else ENERGY
 
 
-def work_width(columns: int, forced: bool) -> int:
-    """Return the length of the rows of the working space; `MEMORIES` needs five places."""
-    return max(FIRST_COLUMN + changing(forced) * columns, 5)
+def row_count(forced: bool, circuit: bool) -> int:
+    """Return the number of rows of a column."""
+    return electric_row(forced) + (ELECTRICS + 1 if circuit else 0)
+
+
+def changing(forced: bool, damped: bool = True, circuit: bool = False) -> int:
+    """Return the number of rows of a column that change between switches.
+
+    The last of the energies is that of damping; with a circuit it is always there, and the electric state
+    comes after it.
+    """
+    energies = ENERGIES - (not (damped or circuit)) if forced else 0
+    return STATE + energies + (ELECTRICS if circuit else 0)
+
+
+def work_width(columns: int, forced: bool, circuit: bool = False) -> int:
+    """Return the length of the rows of the working space; `MEMORIES` needs five places.
+
+    The electric state is in the last places.
+    """
+    width = max(FIRST_COLUMN + changing(forced, circuit=circuit) * columns, 5)
+    return width + (ELECTRICS if circuit else 0)

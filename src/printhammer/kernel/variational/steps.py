@@ -7,17 +7,39 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import FRONT, INVERSE_MASS, POSITION
-from printhammer.kernel.variational.layout import BACKSTOP_LOSS, MEMORIES, PEAK, START, TIME
+from printhammer.kernel.model.layout import (
+    CAPACITANCE,
+    CHARGING,
+    ELECTRIC,
+    FRONT,
+    INVERSE_MASS,
+    POSITION,
+)
+from printhammer.kernel.variational.layout import BACKSTOP_LOSS, ELECTRICS, MEMORIES, PEAK, START, TIME
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate, length_of
     from printhammer.kernel.methods.dop853 import contact_step
+    from printhammer.kernel.model.circuit import driven, path_of
     from printhammer.kernel.model.forces import Hammer, acceleration
-    from printhammer.kernel.model.laws import FORCED, HAS_BACKSTOP, HAS_PACK, MEMORY
+    from printhammer.kernel.model.laws import (
+        ELECTRIC_ROW,
+        FORCED,
+        HAS_BACKSTOP,
+        HAS_CIRCUIT,
+        HAS_PACK,
+        MEMORY,
+    )
     from printhammer.kernel.model.pulses import Drive, drive_value
     from printhammer.kernel.single.resample import memory_of
-    from printhammer.kernel.variational.columns import bring_back, column_step, longest_step, take_in
+    from printhammer.kernel.variational.circuit import couples, electric_in, hold_linkage
+    from printhammer.kernel.variational.columns import (
+        bring_back,
+        column_rates,
+        column_step,
+        longest_step,
+        take_in,
+    )
     from printhammer.kernel.variational.forcing import (
         contact_changes,
         field_changes,
@@ -45,6 +67,9 @@ def begin_step(node: Any, work: Any) -> None:
     work[START, 0] = node[4] if int(node[3]) == M.BACKSTOP else node[1]
     work[START, 1] = node[2]
     work[START, TIME] = node[0]
+    if HAS_CIRCUIT:
+        for i in range(ELECTRICS):
+            work[START, work.shape[1] - ELECTRICS + i] = node[ELECTRIC + i]
 
 
 @compiled
@@ -148,10 +173,55 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
 
 
 @compiled
-def set_in(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> None:
+def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: Setting) -> float:
+    """Carry the columns through a rest from `t` to `t_to` [s] while the circuit goes on.
+
+    An armature held in the backstop still moves about its place; anywhere else it stays there. Returns the
+    logarithm of a factor taken out of the columns.
+    """
+    hammer, live = setting.hammer, setting.drive
+    mode, grown = int(node[3]), 0.0
+    if mode == M.HELD and not couples(hammer, live) and not FORCED:
+        grown = settle(t_to - t, node, columns, setting)
+        if hammer[CAPACITANCE] == 0.0:
+            return grown
+        # A reservoir is charged meanwhile, at a pace of its own.
+        fall = math.exp(-(t_to - t) / (hammer[CHARGING] * hammer[CAPACITANCE]))
+        for k in range(columns.shape[1]):
+            columns[0, k] *= math.exp(grown)
+            columns[1, k] *= math.exp(grown)
+            columns[ELECTRIC_ROW + 2, k] *= fall
+        return 0.0
+    if mode != M.HELD:
+        grown = rest(t, t_to, node, columns, setting)
+    law, pace = mode, 1.0
+    if mode == M.HELD:
+        law, pace = M.BACKSTOP, 1.0 / (2.0 * node[4])
+        work[START, 0] = node[4]
+    take_in(work, columns)
+    length = (t_to - t) * pace
+    count = 1 + int(length / longest_step(law, 0.0, 0.0, work, setting))
+    for _ in range(count):
+        column_step(length / count, columns, work, law, 0.0, 0.0, setting)
+    bring_back(work, columns)
+    work[START, 0], work[START, 1] = node[1], node[2]
+    return grown
+
+
+@compiled
+def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: Setting) -> None:
     """Carry the columns through the step that only gets the regularised equations going."""
     hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
     x, pause = node[1], t_to - t
+    if HAS_CIRCUIT:
+        work[START, 0], work[START, TIME] = x, t
+        take_in(work, columns)
+        column_rates(work[0], work[START], columns, M.FREE, 0.0, 0.0, work[MEMORIES], setting)
+        for i in range(work.shape[1]):
+            work[START, i] += pause * work[0, i]
+        bring_back(work, columns)
+        work[START, 0], work[START, 1], work[START, TIME] = 0.0, 0.0, t_to
+        return
     for k in range(columns.shape[1]):
         columns[0, k] += pause * columns[1, k]
         if FORCED:
@@ -176,17 +246,32 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
 
     Returns the logarithm of a factor taken out of the columns.
     """
-    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
+    grown = carry_state(t_to, node, after, columns, work, setting)
+    if HAS_CIRCUIT:
+        place = work[START, 0]
+        x = setting.hammer[POSITION] - place * place if int(node[3]) == M.BACKSTOP else place
+        hold_linkage(x, columns, path_of(setting.drive), setting)
+    return grown
+
+
+@compiled
+def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
+    """Do as `carry`, but for a linkage that goes with the displacement."""
+    hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_in(work[START])), setting.forcing
     t = work[START, TIME]
     if t_to <= t:
         return 0.0
     mode, kept = int(node[3]), node[4]
     if mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING):
+        if HAS_CIRCUIT:
+            grown = rest_with_current(t, t_to, node, columns, work, setting)
+            work[START, TIME] = t_to
+            return grown
         work[START, TIME] = t_to
         return rest(t, t_to, node, columns, setting)
     if HAS_BACKSTOP and mode == M.BACKSTOP and work[START, 0] == 0.0 and work[START, 1] == 0.0:
         work[START, TIME] = t_to
-        set_in(t, t_to, node, columns, setting)
+        set_in(t, t_to, node, columns, work, setting)
         return 0.0
     # What a backstop that has let go still stores is lost as it creeps back.
     if FORCED and HAS_BACKSTOP and mode == M.BACKSTOP_RELEASED:

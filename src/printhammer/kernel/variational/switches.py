@@ -16,6 +16,7 @@ from printhammer.kernel.variational.layout import BACKSTOP_LOSS, COIL, DRIVE, EN
 
 if TYPE_CHECKING:
     from printhammer.kernel.methods.quadrature import powers
+    from printhammer.kernel.model.circuit import driven
     from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
     from printhammer.kernel.model.laws import (
         FORCE_DRIVE,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     )
     from printhammer.kernel.model.pulses import Drive, drive_value, piece_value
     from printhammer.kernel.single.resample import branch_of, memory_of
+    from printhammer.kernel.variational.circuit import electric_at_node
     from printhammer.kernel.variational.forcing import rebound_change
     from printhammer.kernel.variational.layout import Setting
     from printhammer.kernel.variational.slopes import field_at
@@ -67,7 +69,7 @@ def is_rebound(node: Any, after: Any) -> bool:
 @compiled
 def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
     """Carry the columns through an impact on a rigid backstop."""
-    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
+    hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
     c = hammer[BACKSTOP_PART:MAGNET]
     v_in, v_out = node[2], after[2]
     spacing = -SPEED_SPACING * v_in
@@ -106,7 +108,7 @@ def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any
 
     The velocity is zero, and so are all powers.
     """
-    hammer, drive = setting.hammer, setting.drive
+    hammer, drive = setting.hammer, driven(setting.drive, electric_at_node(after))
     before = acceleration_at(after, mode, node[4], 0.0, hammer, drive)
     behind = acceleration_at(after, following, after[4], 0.0, hammer, drive)
     # Along the unloading curve: the old maximum is met without velocity.
@@ -127,7 +129,7 @@ def pass_level(
     node: Any, after: Any, mode: int, following: int, jump: int, columns: Any, setting: Setting
 ) -> bool:
     """Carry the columns through a touch, a leaving or the old maximum; tell whether differentiable."""
-    hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
+    hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
     v = after[2]
     if v == 0.0:
         return False

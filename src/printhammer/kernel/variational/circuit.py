@@ -1,0 +1,254 @@
+"""The coil circuit in the variational equations: slopes of its current and rates, and its switches.
+
+At a fixed flux linkage the current goes with the displacement, as di/dx = -emf / L and di/d lambda = 1 / L,
+L the differential inductance, and with it the force. While no current flows in a coil without a shorted turn
+its linkage is that of the magnet, and no component of the state. The derivation is in docs/tangent.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.model.circuit import BLOCKED, CHOPPED, SOURCE
+from printhammer.kernel.model.layout import (
+    CAPACITANCE,
+    CHARGING,
+    COILS,
+    COUPLED,
+    CURRENT_SCALE,
+    ELECTRIC,
+    INDUCTANCE,
+    INVERSE_MASS,
+    LEAKAGE,
+    MAGNET,
+    RESERVOIR_PIECE,
+    RESISTANCE,
+    SWITCHED_PIECE,
+    TURN_RESISTANCE,
+)
+from printhammer.kernel.variational import layout as V
+from printhammer.kernel.variational.slopes import CENTRAL, OFFSETS, POINTS, WEIGHTS
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.circuit import (
+        Electric,
+        current_at,
+        driven,
+        electric_rates,
+        fastest_rate,
+        kind_of,
+        path_of,
+        source_of,
+        take_path,
+    )
+    from printhammer.kernel.model.forces import Hammer, value_at
+    from printhammer.kernel.model.laws import (
+        CHANGING,
+        ELECTRIC_ROW,
+        HAS_CIRCUIT,
+        magnet_emf,
+        magnet_force,
+        magnet_inductance,
+    )
+    from printhammer.kernel.variational.layout import Setting
+    from printhammer.kernel.variational.slopes import field_slope
+
+CURRENT_SPACING = 1e-3
+"""Of the scale of the current."""
+
+
+@inlined
+def electric_in(y: Any) -> Electric:
+    """Return the electric state in a row of the working space."""
+    if HAS_CIRCUIT:
+        i = y.size - V.ELECTRICS
+        return y[i], y[i + 1], y[i + 2]
+    return ()
+
+
+@inlined
+def electric_at_node(node: Any) -> Electric:
+    """Return the electric state at a node."""
+    if HAS_CIRCUIT:
+        return node[ELECTRIC], node[ELECTRIC + 1], node[ELECTRIC + 2]
+    return ()
+
+
+@inlined
+def main_linkage(electric: Electric, hammer: Hammer) -> float:
+    """Return the flux linkage [Wb] that the magnet sees."""
+    return float(electric[1] if hammer[TURN_RESISTANCE] > 0.0 else electric[0])
+
+
+@inlined
+def couples(hammer: Hammer, live: Any) -> bool:
+    """Tell whether a current that the flux linkage makes can flow."""
+    return path_of(live) != BLOCKED or hammer[TURN_RESISTANCE] > 0.0
+
+
+@compiled
+def force_with_current(x: float, current: float, hammer: Hammer) -> float:
+    """Return the slope of the magnet's force with the current [N/A]."""
+    if hammer[COUPLED] != 0.0:
+        return float(magnet_emf(hammer[MAGNET:], x, current))
+    # A law whose flux is not linked need not know its own slope; one-sided where a table ends.
+    spacing = CURRENT_SPACING * hammer[CURRENT_SCALE]
+    for turn in range(3):
+        side = (CENTRAL + turn) % 3
+        total = 0.0
+        for i in range(POINTS[side]):
+            total += WEIGHTS[side, i] * magnet_force(hammer[MAGNET:], x, current + OFFSETS[side, i] * spacing)
+        if not math.isnan(total):
+            return float(total / spacing)
+    return math.nan
+
+
+@compiled
+def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float, float]:
+    """Return the slopes of the magnetising current with displacement [A/m] and main linkage [A/Wb].
+
+    And that of the force with the current [N/A].
+    """
+    if not couples(hammer, live):
+        return 0.0, 0.0, 0.0
+    current = current_at(x, main_linkage(electric, hammer), hammer)
+    inductance, emf = hammer[INDUCTANCE], 0.0
+    if hammer[COUPLED] != 0.0:
+        inductance += magnet_inductance(hammer[MAGNET:], x, current)
+        emf = magnet_emf(hammer[MAGNET:], x, current)
+    return -emf / inductance, 1.0 / inductance, force_with_current(x, current, hammer)
+
+
+@inlined
+def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
+    """Return the slope [N/m] of magnet and spring force, the current going with a fixed flux linkage."""
+    scales, bounds, hammer, live, _forcing = setting
+    value = value_at(y[V.TIME], x, hammer, driven(live, electric_in(y)))
+    field = field_slope(x, value, scales, bounds, hammer)
+    if HAS_CIRCUIT:
+        with_x, _with_linkage, force = current_slopes(x, electric_in(y), hammer, live)
+        return field + force * with_x
+    return field
+
+
+@inlined
+def coil_change(dx: float, linkage: float, turn: float, slopes: Any, hammer: Hammer, live: Any) -> float:
+    """Return the change of the current in the coil with changes of displacement and flux linkages."""
+    if path_of(live) == BLOCKED:
+        return 0.0
+    if hammer[TURN_RESISTANCE] > 0.0:
+        return float((linkage - turn) / hammer[LEAKAGE])
+    return float(slopes[0] * dx + slopes[1] * linkage)
+
+
+@compiled
+def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: Setting) -> None:
+    """Fill in the `rates` of the electric state and its changes at `y`; add to those of the velocities.
+
+    Where the armature is held, nothing `moves` it.
+    """
+    hammer, live = setting.hammer, setting.drive
+    electric, pace, t = electric_in(y), rates[V.TIME], y[V.TIME]
+    now = electric_rates(t, x, y[1], electric, hammer, live)
+    for i in range(V.ELECTRICS):
+        rates[y.size - V.ELECTRICS + i] = pace * now[i]
+    slopes = current_slopes(x, electric, hammer, live)
+    has_turn = hammer[TURN_RESISTANCE] > 0.0
+    blocked, reservoir = path_of(live) == BLOCKED, kind_of(live) == RESERVOIR_PIECE
+    resistance = hammer[RESISTANCE] + source_of(t, electric, hammer, live)[1]
+    for k in range(count):
+        j = V.FIRST_COLUMN + CHANGING * k
+        e = j + CHANGING - V.ELECTRICS
+        dx, linkage, turn, voltage = y[j], y[e], y[e + 1], y[e + 2]
+        main = turn if has_turn else linkage
+        coil = coil_change(dx, linkage, turn, slopes, hammer, live)
+        turn_rate = 0.0
+        if has_turn:
+            turn_rate = -hammer[TURN_RESISTANCE] * (slopes[0] * dx + slopes[1] * main - coil)
+        rate = turn_rate if blocked else -resistance * coil
+        if reservoir and not blocked:
+            rate += voltage
+        voltage_rate = 0.0
+        if hammer[CAPACITANCE] > 0.0:
+            voltage_rate = -voltage / hammer[CHARGING] - (hammer[COILS] * coil if reservoir else 0.0)
+            voltage_rate /= hammer[CAPACITANCE]
+        if moves:
+            rates[j + 1] += pace * slopes[2] * slopes[1] * main * hammer[INVERSE_MASS]
+        rates[e], rates[e + 1], rates[e + 2] = pace * rate, pace * turn_rate, pace * voltage_rate
+
+
+@compiled
+def circuit_pace(x: float, y: Any, setting: Setting) -> float:
+    """Return the fastest rate of the circuit [1/s] about a row of the working space."""
+    hammer, live, electric = setting.hammer, setting.drive, electric_in(y)
+    rate = fastest_rate(x, electric, hammer, live)
+    if hammer[CAPACITANCE] > 0.0:
+        softness = current_slopes(x, electric, hammer, live)[1]
+        rate = max(rate, math.sqrt(hammer[COILS] * softness / hammer[CAPACITANCE]))
+        rate = max(rate, 1.0 / (hammer[CHARGING] * hammer[CAPACITANCE]))
+    return float(rate)
+
+
+@compiled
+def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
+    """Let the linkage go with the displacement where no current flows; clear what the circuit has not."""
+    hammer = setting.hammer
+    has_turn = hammer[TURN_RESISTANCE] > 0.0
+    for k in range(columns.shape[1]):
+        if not has_turn:
+            columns[ELECTRIC_ROW + 1, k] = 0.0
+        if hammer[CAPACITANCE] == 0.0:
+            columns[ELECTRIC_ROW + 2, k] = 0.0
+        if path == BLOCKED and has_turn:
+            columns[ELECTRIC_ROW, k] = columns[ELECTRIC_ROW + 1, k]
+        elif path == BLOCKED:
+            emf = magnet_emf(hammer[MAGNET:], x, 0.0) if hammer[COUPLED] != 0.0 else 0.0
+            columns[ELECTRIC_ROW, k] = emf * columns[0, k]
+
+
+@compiled
+def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
+    """Carry the columns through a change of the current's path between edges; tell whether differentiable.
+
+    The current is continuous there, and so are all forces; only the rate of the coil's linkage jumps.
+    """
+    hammer, live = setting.hammer, setting.drive
+    before, behind = node[ELECTRIC + 3], after[ELECTRIC + 3]
+    if before == behind:
+        return True
+    t, x, v = after[0], after[1], after[2]
+    electric = electric_at_node(after)
+    rates = electric_rates(t, x, v, electric, hammer, live)
+    off_time = kind_of(live) == SWITCHED_PIECE and live[7] < 0.0
+    ends = off_time and behind == SOURCE
+    slopes = current_slopes(x, electric, hammer, live)
+    current_rate = coil_change(v, rates[0], rates[1], slopes, hammer, live)
+    if before != BLOCKED and not ends and current_rate == 0.0:
+        return False
+    take_path(live, behind, math.inf)
+    others = electric_rates(t, x, v, electric, hammer, live)
+    take_path(live, before, math.inf)
+    until = ELECTRIC_ROW + V.ELECTRICS
+    for k in range(columns.shape[1]):
+        later = 0.0
+        if ends:
+            later, columns[until, k] = columns[until, k], 0.0
+        elif before != BLOCKED:
+            linkage, turn = columns[ELECTRIC_ROW, k], columns[ELECTRIC_ROW + 1, k]
+            later = -coil_change(columns[0, k], linkage, turn, slopes, hammer, live) / current_rate
+            if off_time and behind == CHOPPED:
+                columns[until, k] = later
+        for i in range(V.ELECTRICS):
+            columns[ELECTRIC_ROW + i, k] += (rates[i] - others[i]) * later
+    hold_linkage(x, columns, behind, setting)
+    return True
+
+
+@compiled
+def pass_edge_of_driver(after: Any, columns: Any, setting: Setting) -> None:
+    """Carry the columns through an edge of the drive, which is at a fixed time."""
+    for k in range(columns.shape[1]):
+        columns[ELECTRIC_ROW + V.ELECTRICS, k] = 0.0
+    hold_linkage(after[1], columns, after[ELECTRIC + 3], setting)

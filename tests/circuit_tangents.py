@@ -1,0 +1,107 @@
+"""The tangent flow through the circuit of a coil by differences of neighbouring runs; for tests."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from tests.tangents import SHARP, SMALLEST
+
+from printhammer.derivatives.states import follow, state_rows
+from printhammer.kernel.model.layout import CHARGED, CURRENT_SCALE, LINKAGE_SCALE, RESISTANCE
+from printhammer.kernel.model.modes import RELOADING, UNLOADING
+from printhammer.kernel.single import carry
+from printhammer.run.problem import Problem, fresh_carry
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    import printhammer as ph
+    from printhammer.derivatives.flow import Flow
+
+
+def problem_of(hammer: ph.Hammer, drive: Any, state: tuple[float, float] | None = None) -> Problem:
+    """The run of a hammer, whose differences can be taken."""
+    return Problem(hammer, drive, initial_state(hammer, state), 0.0, SHARP)
+
+
+def units_of(problem: Problem) -> np.ndarray:
+    """Typical sizes of displacement, velocity, memory and electric state."""
+    way, speed = problem.scales
+    linkage = problem.constants[LINKAGE_SCALE]
+    voltage = max(
+        problem.constants[CHARGED], problem.constants[RESISTANCE] * problem.constants[CURRENT_SCALE]
+    )
+    return np.array([way, speed, way, linkage, linkage, voltage])
+
+
+def arrive(problem: Problem, state: Any, branch: int, path: float, start: float, end: float) -> np.ndarray:
+    """State at `end` of a run with a current from `start` on: as `state`, six numbers."""
+    begin = fresh_carry()
+    if branch in (UNLOADING, RELOADING):
+        begin[carry.STATE], begin[carry.MODE], begin[carry.PEAK] = carry.ON_BRANCH, branch, state[2]
+    begin[carry.WITH_CURRENT], begin[carry.PATH], begin[carry.UNTIL] = 1.0, path, np.inf
+    begin[carry.ELECTRIC : carry.ELECTRIC + 3] = state[3:]
+    nodes = np.empty((20_000, 9))
+    status, used, _touched, _steps = problem.kernel.run(
+        problem.drive_arrays(),
+        problem.constants,
+        start,
+        float(state[0]),
+        float(state[1]),
+        end,
+        problem.control,
+        problem.bounds,
+        100_000,
+        nodes,
+        np.empty((500, 7)),
+        begin,
+    )
+    assert status == 0
+    assert used <= len(nodes)
+    _t, x, v, mode, kept = nodes[used - 1, :5]
+    memory = kept if int(mode) in (UNLOADING, RELOADING) else 0.0
+    return np.array([x, v, memory, *nodes[used - 1, 5:8]])
+
+
+def settled(difference: Any, size: float, levels: int, units: np.ndarray) -> np.ndarray:
+    """Extrapolate central differences of halved steps to zero; of all extrapolates the most settled one."""
+    rows: list[list[np.ndarray]] = []
+    best, found = np.inf, np.zeros(len(units))
+    for k in range(levels):
+        row = [difference(size / 2**k)]
+        for i in range(k):
+            row.append(row[i] + (row[i] - rows[-1][i]) / (4.0 ** (i + 1) - 1.0))
+            change = float(np.abs((row[i + 1] - rows[-1][i]) / units).max())
+            if change < best:
+                best, found = change, row[i + 1]
+        rows.append(row)
+    return found
+
+
+def deviation(
+    hammer: ph.Hammer, drive: Any, start: float, end: float, size: float = 4e-6, levels: int = 5
+) -> float:
+    """Difference between flow and differences of runs over the norm of the latter, in typical sizes."""
+    problem = problem_of(hammer, drive)
+    flow: Flow = follow(problem, np.array([start, end]), np.eye(6), renormalise=False)
+    assert flow.status_name == "ok"
+    assert flow.smooth
+    units = units_of(problem)
+    first = flow.states[0, [0, 1, 3, 4, 5, 6]]
+    branch, path = int(flow.states[0, 2]), float(flow.states[0, 7])
+    begun = Problem(hammer, drive, (float(first[0]), float(first[1])), start, SHARP)
+    begun.scales, begun.control = problem.scales, problem.control
+    columns, rows = (state_rows(problem, code) for code in flow.states[:, 2])
+
+    def difference(j: int, step: float) -> np.ndarray:
+        move = np.zeros(6)
+        move[j] = step * units[j]
+        ahead, behind = (arrive(begun, first + sign * move, branch, path, start, end) for sign in (1.0, -1.0))
+        return np.asarray((ahead - behind) / (2.0 * step))
+
+    def column(j: int) -> np.ndarray:
+        return settled(lambda step: difference(j, step), size, levels, units)
+
+    truth = np.array([column(j) for j in columns]).T[rows] / units[rows, np.newaxis]
+    own = flow.columns[np.ix_(rows, columns)] * units[columns] / units[rows, np.newaxis]
+    return float(np.linalg.norm(own - truth)) / max(float(np.linalg.norm(truth)), SMALLEST)
