@@ -14,6 +14,7 @@ one unit prints while it learns, ``--curves FILE`` how many units print all dots
 
 import argparse
 import time
+from dataclasses import replace
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
@@ -96,12 +97,14 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[lis
     for driver, sensors in (("own", SENSORS), ("switch", SENSORS)):
         for name, sensor in sensors.items():
             law, _base = law_for(hammer, rate, driver=driver, sensor=sensor)
-            stages = calibrate(law, units, sensor)[1]
-            first = stages[0].cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
-            for stage in stages:
-                if stage.dots in AFTER:
-                    good = stage.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
-                    add(f"learned from {name}, {driver}, {stage.dots} dots", good, first)
+            for doubt, after in ((0.0, AFTER), (0.1, AFTER[-1:])):
+                stages = calibrate(replace(law, doubt=doubt), units, sensor)[1]
+                first = stages[0].cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+                said = f", doubt {doubt:g}" if doubt else ""
+                for stage in stages:
+                    if stage.dots in after:
+                        good = stage.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+                        add(f"learned from {name}, {driver}, {stage.dots} dots{said}", good, first)
     return rows
 
 
