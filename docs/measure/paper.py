@@ -1,15 +1,17 @@
 """Measure what each way to drive prints on paper that is not the same everywhere.
 
 Run it with ``.venv/bin/python docs/measure/paper.py``. It draws hammers from the variability of a production,
-has each print the de Bruijn cycle of order 8 on even paper, on paper that varies, and on paper that varies twice
-as much, and counts the dots within limits: in an open loop, by a table, by one that was learned from times of
-impact and forces, and with feedback. It takes some twenty minutes on one core, nearly all of them feedback.
+has each print the de Bruijn cycle of order 8 on even paper, on paper that varies, and on paper that varies
+twice as much, and counts the dots within limits: in an open loop, by a table, by one that was learned from
+times of impact and forces, and with feedback. It takes some twenty minutes on one core.
 
 ``--units N`` draws another number.
 """
 
 import argparse
 import math
+import time
+from dataclasses import replace
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
@@ -18,13 +20,12 @@ import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.driver import driver_of
-from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.control.learning.calibrate import calibrate
-from printhammer.control.learning.learn import learned_table
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.table.drive import COLUMNS
 from printhammer.control.table.drivers import driven_by, with_pulse
-from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import OpenLoop, Strategy
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
@@ -55,6 +56,29 @@ def sensor_on(paper: ph.Paper | None) -> ImpactSensor:
     return ImpactSensor(noise=time, force=force)
 
 
+def good(
+    ways: list[Strategy], units: list[ph.Hammer], rate: float, by: Nominal, paper: ph.Paper | None
+) -> list[float]:
+    """Return the share of dots within limits, for each unit, each on paper of its own."""
+    shares = []
+    for number, (unit, way) in enumerate(zip(units, ways, strict=True)):
+        own = None if paper is None else ph.Paper(paper.stiffness, paper.front, paper.length, number)
+        printed = ph.quality(unit, rate, strategy=way, nominal=by, paper=own, tolerance=DISPLAY_TOLERANCE)
+        shares.append(float((printed.fault < 0).mean()))
+    return shares
+
+
+def learned(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, paper: ph.Paper | None) -> list[Strategy]:
+    """Return the table that each unit learns from times of impact and forces on the paper."""
+    sensor = sensor_on(paper)
+    law, base = law_for(hammer, rate, sensor=sensor, members=400)
+    tables = []
+    for learner in calibrate(law, units, sensor)[0]:
+        entries = {key: row[np.newaxis] for key, row in zip(COLUMNS, learner.printed, strict=True)}
+        tables.append(replace(base, **entries).fired_by("switch", hammer))
+    return [table.strategy(hammer) for table in tables]
+
+
 def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:
     """Return a row for each paper and way at a rate."""
     rate, single, rows = share * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
@@ -62,33 +86,20 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[lis
     fired = [with_pulse(unit, switched.waveform) for unit in units]
     quick = nominal(switched, tolerance=DISPLAY_TOLERANCE)
     controller = Controller(hammer, driver_of(hammer))
-    table = ph.tune(hammer, rate=rate, driver="switch", variability=Variability())
+    table = ph.tune(hammer, rate=rate, driver="switch", variability=Variability()).strategy(hammer)
+    count = len(units)
     for name, paper in PAPERS.items():
-
-        def add(way: str, ways: list[Strategy], driven: list[ph.Hammer], by: object) -> None:
-            """Count; each unit has paper of its own."""
-            good = []
-            for number, (unit, strategy) in enumerate(zip(driven, ways, strict=True)):
-                own = None if paper is None else ph.Paper(paper.stiffness, paper.front, paper.length, number)
-                printed = ph.quality(
-                    unit, rate, strategy=strategy, nominal=by, paper=own, tolerance=DISPLAY_TOLERANCE
-                )
-                good.append(float((printed.fault < 0).mean()))
-            rows.append([share, name, way, 100.0 * float(np.mean(good)), sum(each == 1.0 for each in good)])
-            print(*rows[-1], flush=True)
-
-        count = len(units)
-        add("open loop, own pulse", [OpenLoop()] * count, units, single)
-        add("open loop, switch", [OpenLoop()] * count, fired, quick)
-        add("robust table, switch", [table.strategy(hammer)] * count, units, single)
-        sensor = sensor_on(paper)
-        law, base = law_for(hammer, rate, sensor=sensor)
-        learners = calibrate(law, units, sensor)[0]
-        tables = [learned_table(base, learner.printed) for learner in learners]
-        learned = [own.fired_by("switch", hammer).strategy(hammer) for own in tables]
-        add("learned from time and force, switch", learned, units, single)
-        way = FeedbackStrategy(controller, PositionSensor(noise=0.01))
-        add("feedback", [way] * count, units, controller.single)
+        ways = {
+            "open loop, own pulse": ([OpenLoop()] * count, units, single),
+            "open loop, switch": ([OpenLoop()] * count, fired, quick),
+            "robust table, switch": ([table] * count, units, single),
+            "learned from time and force, switch": (learned(hammer, units, rate, paper), units, single),
+            "feedback": ([FeedbackStrategy(controller)] * count, units, controller.single),
+        }
+        for way, (drives, driven, by) in ways.items():
+            shares = good(drives, driven, rate, by, paper)
+            rows.append([share, name, way, 100.0 * float(np.mean(shares)), shares.count(1.0)])
+            print(*rows[-1], time.strftime("%H:%M:%S"), flush=True)
     return rows
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, SupportsIndex
+from typing import TYPE_CHECKING, SupportsIndex
 
 import numpy as np
 
@@ -20,10 +20,8 @@ from printhammer.printing.rates.variability import Variability
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.limits import Limits
-    from printhammer.support.arrays import FloatArray
 
 
 def learn(
@@ -126,7 +124,9 @@ def learn(
     )
     driven = spread.draw(hammer, 1, seed + 1)[0] if unit is None else unit
     learners, stages = calibrate(law, [driven], shown)
-    table = learned_table(base, learners[0].printed)
+    entries = dict(zip(COLUMNS, learners[0].printed, strict=True))
+    unknown = np.full_like(base.deviation, np.nan)
+    table = replace(base, **{name: values[np.newaxis] for name, values in entries.items()}, deviation=unknown)
     judged = [stage.cycle for stage in stages]
     return Learning(
         hammer=hammer,
@@ -146,11 +146,3 @@ def learn(
         contraction=np.array([stage.contraction for stage in law.stages]),
         seed=seed,
     )
-
-
-def learned_table(base: CompensationTable, settings: FloatArray) -> CompensationTable:
-    """Return the table that learning started from with the settings (4, entries) of a learner."""
-    entries: dict[str, Any] = {
-        name: values[np.newaxis] for name, values in zip(COLUMNS, settings, strict=True)
-    }
-    return replace(base, **entries, deviation=np.full_like(base.deviation, np.nan))
