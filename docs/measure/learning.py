@@ -9,11 +9,13 @@ fast switch, and what is learned after some dots from times of impact with 5 us 
 ``--units N`` draws another number, ``--feedback N`` lets feedback print a cycle of order 6 on as many of
 them. ``--sensors`` tries other sensors instead, ``--tolerance`` other variabilities, ``--drivers`` other
 drivers at 1.5 times, and ``--family`` units of two others of the family. ``--picture FILE`` only draws what
-one unit prints while it learns, ``--curves FILE`` how many units print all dots.
+one unit prints while it learns, ``--curves FILE`` how many units print all dots, ``--tolerance-curves FILE``
+which dots are within limits as the production is spread less and more.
 """
 
 import argparse
 import time
+from dataclasses import replace
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
@@ -54,6 +56,9 @@ SHOWN = 2
 FAMILY = {"02": 880.0, "06": 965.0}
 """Two of the family, and their open-loop safe rates, Hz."""
 AFTER = (50, 200, 1000)
+FEEDBACK = 10
+"""Number of units on which feedback prints beside many others, of a shorter cycle."""
+FEW = f"feedback, {FEEDBACK} of them"
 ROOMS = (*MOTION, "control/learning", "control/table", "control/widths", "printing/dots", "printing/rates")
 CYCLE = slots_of(cycle_with_lead_in())
 
@@ -96,12 +101,14 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[lis
     for driver, sensors in (("own", SENSORS), ("switch", SENSORS)):
         for name, sensor in sensors.items():
             law, _base = law_for(hammer, rate, driver=driver, sensor=sensor)
-            stages = calibrate(law, units, sensor)[1]
-            first = stages[0].cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
-            for stage in stages:
-                if stage.dots in AFTER:
-                    good = stage.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
-                    add(f"learned from {name}, {driver}, {stage.dots} dots", good, first)
+            for doubt, after in ((0.0, AFTER), (0.1, AFTER[-1:])):
+                stages = calibrate(replace(law, doubt=doubt), units, sensor)[1]
+                first = stages[0].cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+                said = f", doubt {doubt:g}" if doubt else ""
+                for stage in stages:
+                    if stage.dots in after:
+                        good = stage.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
+                        add(f"learned from {name}, {driver}, {stage.dots} dots{said}", good, first)
     return rows
 
 
@@ -172,12 +179,55 @@ def family(count: int, seed: int) -> list[list[Cell]]:
         table = ph.tune(hammer, rate=rate, driver="switch", variability=Variability()).strategy(hammer)
         rows.append([number, "robust table, switch", *cells(shares(units, single, rate, table))[:2]])
         for name, sensor in SENSORS.items():
-            law, _base = law_for(hammer, rate, sensor=sensor)
+            law, _base = law_for(hammer, rate, sensor=sensor, members=400)
             last = calibrate(law, units, sensor)[1][-1]
             good = last.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(axis=1)
             rows.append([number, f"learned from {name}, switch, 1000 dots", *cells(good)[:2]])
             print(*rows[-1], flush=True)
     return rows
+
+
+def looped(controller: Controller, units: list[ph.Hammer], rate: float) -> np.ndarray:
+    """Return the share of dots within limits with feedback, for each unit, of a cycle of order 6."""
+    trial = attempt(
+        [Case(unit, controller.single, rate) for unit in units],
+        [slots_of(cycle_with_lead_in(6, 0))],
+        FeedbackStrategy(controller),
+        limits=Limits(),
+        tolerance=DISPLAY_TOLERANCE,
+    )
+    return trial.judgement.good.mean(axis=1)
+
+
+def tolerance_curves(path: Path) -> None:
+    """Draw which share of the dots is within limits, by the spread of the production, as measured."""
+    style = import_module("printhammer.figures.elements.style")
+    looks = {
+        "open loop, own": (style.MUTED, "-", "o"),
+        "open loop, switch": (style.MUTED, "--", "o"),
+        "table, switch": (style.YELLOW, "-", "s"),
+        "robust table, switch": (style.ORANGE, "--", "^"),
+        "learned from time, switch": (style.BLUE, "--", "D"),
+        "learned from time and force, switch": (style.BLUE, "-", "D"),
+        FEW: (style.GREEN, "-", "v"),
+    }
+    table = read("learning-tolerance")
+    with style.in_style():
+        figure = style.new_figure(3.4)
+        ax = figure.subplots()
+        for way, (colour, line, mark) in looks.items():
+            points = [(row[0], row[2]) for row in table.rows if row[1] == way]
+            ax.plot(
+                *zip(*points, strict=True), color=colour, linestyle=line, marker=mark, markersize=4, label=way
+            )
+        ax.set_ylim(-3.0, 103.0)
+        ax.set_xlabel("Standard deviations of the production, in parts of those stated")
+        ax.set_ylabel("Dots within limits  [%]")
+        ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        style.foot(figure, f"hendriks-1983 · 1,275 Hz · {table.settings['units']} units")
+        drawn = BytesIO()
+        figure.savefig(drawn, dpi=110)
+    path.write_bytes(drawn.getvalue())
 
 
 def curves(path: Path) -> None:
@@ -224,21 +274,27 @@ def tolerance(hammer: ph.Hammer, count: int, seed: int) -> list[list[Cell]]:
     """Return what is printed at 1.5 times the safe rate by units that are spread less and more."""
     rows, rate, single = [], 1.5 * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     table = ph.tune(hammer, rate=rate, driver="switch")
-    for factor in (0.5, 1.0, 1.5):
+    switched = driven_by(hammer, "switch", 2.0)
+    quick, controller = nominal(switched, tolerance=DISPLAY_TOLERANCE), Controller(hammer, driver_of(hammer))
+    for factor in (0.25, 0.5, 1.0, 1.5):
         spread = Variability().times(factor)
         units = spread.draw(hammer, count, seed)
         robust = ph.tune(hammer, rate=rate, driver="switch", variability=spread)
         ways = {
             "open loop, own": shares(units, single, rate, open_loop),
+            "open loop, switch": shares(
+                [with_pulse(unit, switched.waveform) for unit in units], quick, rate, open_loop
+            ),
             "table, switch": shares(units, single, rate, table.strategy(hammer)),
             "robust table, switch": shares(units, single, rate, robust.strategy(hammer)),
         }
         for name, sensor in SENSORS.items():
-            law, _base = law_for(hammer, rate, sensor=sensor, variability=spread)
+            law, _base = law_for(hammer, rate, sensor=sensor, variability=spread, members=400)
             last = calibrate(law, units, sensor)[1][-1]
             ways[f"learned from {name}, switch"] = last.cycle.good[:, np.asarray(CYCLE) >= LEAD_IN].mean(
                 axis=1
             )
+        ways[FEW] = looped(controller, units[:FEEDBACK], rate)
         for name, good in ways.items():
             rows.append([factor, name, *cells(good)[:2]])
             print(*rows[-1], flush=True)
@@ -257,10 +313,14 @@ def main() -> None:
     parser.add_argument("--family", action="store_true")
     parser.add_argument("--picture", type=Path)
     parser.add_argument("--curves", type=Path)
+    parser.add_argument("--tolerance-curves", type=Path)
     asked = parser.parse_args()
     hammer = ph.load("hendriks-1983")
     if asked.curves is not None:
         curves(asked.curves)
+        return
+    if asked.tolerance_curves is not None:
+        tolerance_curves(asked.tolerance_curves)
         return
     if asked.picture is not None:
         drawn = BytesIO()
@@ -296,7 +356,7 @@ def main() -> None:
             [*heads, *good],
             tolerance(hammer, asked.units, asked.seed),
             settings,
-            ROOMS,
+            (*ROOMS, "control/feedback"),
         )
     elif asked.feedback:
         settings["units"] = asked.feedback

@@ -48,6 +48,7 @@ from .identify.bench.laboratory import measure as measure
 from .identify.fitting import fit as fit
 from .maps.frequency import frequency_map as frequency_map
 from .printing.dots.limits import Limits as Limits
+from .printing.dots.paper import Paper as Paper
 from .printing.page.page import print_page as print_page
 from .printing.page.pattern import Pattern as Pattern
 from .printing.rates.damping import damping_study as damping_study

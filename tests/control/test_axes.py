@@ -1,6 +1,8 @@
 """Tables along the gap: dots are those of the design, between two values as well; the header compiles."""
 
 import subprocess
+from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +10,8 @@ import pytest
 
 import printhammer as ph
 from printhammer.control.axes import AxisTables, tune_along
+from printhammer.control.table.compensation import JUMP
+from printhammer.control.table.drive import COLUMNS
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 
@@ -71,6 +75,73 @@ int main(void) {{
         for j in range(entries)
     ]
     assert rows == wanted
+
+
+def ticks_between(tables: AxisTables, tick: float, value: int) -> list[list[int]]:
+    """Return the times of all histories at a value, nm, in ticks, by fractions of whole numbers."""
+    places = [round(place * 1e9) for place in tables.values]
+    after = next((k for k, place in enumerate(places) if k and value <= place), len(places) - 1)
+    share = Fraction(
+        min(max(value, places[0]), places[-1]) - places[after - 1], places[after] - places[after - 1]
+    )
+    rows = []
+    for low, high in zip(
+        *(np.array([getattr(tables.tables[k], name)[0] for name in COLUMNS]).T for k in (after - 1, after)),
+        strict=True,
+    ):
+        first, second = ([round(time / tick) for time in each] for each in (low, high))
+        apart = abs(first[0] - second[0]) * tick > JUMP + 1e-12 or first[2:] != second[2:]
+        part = Fraction(int(share > Fraction(1, 2))) if apart else share
+        sums = [(1 - part) * a + part * b for a, b in zip(first, second, strict=True)]
+        rows.append([int(abs(each) + Fraction(1, 2)) * (1 if each >= 0 else -1) for each in sums])
+    return rows
+
+
+@pytest.mark.parametrize("tick", ["1 ns", "1 us", "5 us"])
+def test_firmware_interpolates_to_the_tick(tables: AxisTables, tmp_path: Path, tick: str) -> None:
+    unit = {"1 ns": 1e-9, "1 us": 1e-6, "5 us": 5e-6}[tick]
+    # One history is fired in another way at the last value, and has another brake in another.
+    last = tables.tables[-1]
+    advance, brake, delay = last.advance.copy(), last.brake_width.copy(), last.brake_delay.copy()
+    advance[0, 1] += 30e-6
+    brake[0, 2], delay[0, 2] = 20e-6, 600e-6
+    odd = replace(
+        tables,
+        tables=(*tables.tables[:-1], replace(last, advance=advance, brake_width=brake, brake_delay=delay)),
+    )
+    (tmp_path / "t.h").write_text(odd.to_header(tick))
+    entries, values = (
+        last.advance.shape[1],
+        [-12000, -10000, -7001, -1, 0, 1, 3333, 4999, 5001, 7777, 10000, 11000],
+    )
+    name = "printhammer_hendriks_1983_gap_times"
+    (tmp_path / "main.c").write_text(f"""
+#include "t.h"
+#include <stdio.h>
+int main(void) {{
+  static const int32_t value[] = {{{", ".join(map(str, values))}}};
+  for (unsigned i = 0; i < {len(values)}u; i++) for (unsigned j = 0; j < {entries}u; j++) {{
+    unsigned gaps[1] = {{j}};
+    int32_t t[4];
+    {name}(value[i], 0u, printhammer_hendriks_1983_history(gaps), t);
+    printf("%ld %ld %ld %ld\\n", (long)t[0], (long)t[1], (long)t[2], (long)t[3]);
+  }}
+  return (int)(printhammer_hendriks_1983_rate[0] != 1275000u);
+}}
+""")
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    subprocess.run(["cc", *flags, "-o", "main", "main.c"], cwd=tmp_path, check=True)
+    said = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout
+    rows = np.array([[int(word) for word in line.split()] for line in said.splitlines()])
+    fired = rows.reshape(len(values), entries, 4)
+    held = odd.quantised(tick)
+    for place, value in enumerate(values):
+        assert fired[place].tolist() == ticks_between(held, unit, value)
+        if abs(value) <= 10000:
+            at = held.at(value * 1e-9)
+            exact = np.array([getattr(at, column)[0] for column in COLUMNS]).T / unit
+            # To the tick: what Python fires at this value, rounded.
+            assert abs(fired[place] - exact).max() <= 0.5 + 1e-6
 
 
 def test_bad_axes_are_refused(tables: AxisTables) -> None:

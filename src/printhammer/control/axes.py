@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.control.interpolation import with_interpolation
 from printhammer.control.table.compensation import CompensationTable, checked_tick, mixed
 from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, Settings
 from printhammer.control.table.drivers import driven_by, of_force
@@ -21,6 +22,7 @@ from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.results import save_dataset
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.support.c_code import identifier
 from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:
@@ -87,7 +89,8 @@ class AxisTables:
     def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
         """Return the text of the C header, arrays `[value][rate][history]`, as `CompensationTable` does.
 
-        Values of a gap are in nanometres, those of other axes in millionths.
+        Values of a gap are in nanometres, those of other axes in millionths. A function of the header
+        interpolates between them.
         """
         unit, first = checked_tick(tick), self.tables[0]
         times = {name: np.stack([getattr(table, name) for table in self.tables]) for name in COLUMNS}
@@ -99,7 +102,12 @@ class AxisTables:
         scale = NANOSECOND if AXES[self.axis].unit == "m" else _MILLIONTH
         head = {name: getattr(first, name) for name in HEAD}
         along = self.axis, np.rint(np.array(self.values) / scale)
-        return header_text(head, first.rates, times, unit, along)
+        text = header_text(head, first.rates, times, unit, along)
+        return with_interpolation(text, identifier(first.hammer), self.axis, len(self.values), unit)
+
+    def quantised(self, tick: float | str) -> AxisTables:
+        """Return the tables as a timer with a tick, s or text, holds them."""
+        return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
 
     def size(self, tick: float | str = NANOSECOND) -> int:
         """Return how many bytes the arrays of the C header take with a tick, s, or text with a unit."""

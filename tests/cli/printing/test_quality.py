@@ -36,6 +36,28 @@ def test_limits_by_name_and_by_number(cli: Callable, tmp_path: Path) -> None:
     assert "force within 20 %, arrival within 15.0 µs" in done.out
 
 
+def test_paper_that_varies(cli: Callable, tmp_path: Path) -> None:
+    paper, out = tmp_path / "paper.toml", tmp_path / "dots.json"
+    paper.write_text('stiffness = "10 %"\nfront = "5 um"\nseed = 2\n')
+    words = ("quality", CRUDE, "--rate", "900Hz", "--pattern", "1101")
+    done = cli(*words, "--paper", paper, "--out", out)
+    assert done.status == 0
+    assert "stiffness 10 %, front 5 µm, correlated over 2 mm" in done.out
+    found = ph.quality(ph.load(CRUDE), 900.0, "1101", paper=ph.Paper.load(paper))
+    kept = json.loads(out.read_text())
+    assert (
+        kept["force_mean_N"]
+        == found.force_spread.mean
+        != ph.quality(ph.load(CRUDE), 900.0, "1101").force.mean()
+    )
+    assert (kept["paper"], kept["paper_seed"]) == (found.paper and found.paper.text, 2)
+    refused = cli("quality", CRUDE, "--safe-rate", *GRID, "--paper", paper)
+    assert refused.status == 2
+    assert "--paper is given, which belongs to the report, not to --safe-rate" in refused.err
+    paper.write_text("front = 3 um")
+    assert cli(*words, "--paper", paper).status == 2
+
+
 def test_the_safe_rate(cli: Callable, tmp_path: Path) -> None:
     out = tmp_path / "rates.json"
     done = cli("quality", CRUDE, "--safe-rate", *GRID, "--out", out, "--out", tmp_path / "rates.svg")

@@ -243,3 +243,20 @@ def test_hammers_that_cannot_be_driven_are_refused() -> None:
 def test_bad_gaps_are_refused(gaps: list[float]) -> None:
     with pytest.raises(ph.InputError, match="gaps"):
         ph.feedback(hammers.crude(), 1e3, gaps=gaps)
+
+
+@pytest.mark.slow
+def test_paper_that_varies_is_met_and_seen(controller: Controller) -> None:
+    hammer, slots = controller.hammer, (0, 1, 2, 4, 5, 6)
+    own = FeedbackStrategy(controller, PositionSensor())
+    plain = own(hammer, [slots], RATE)[0]
+    same = own.along((hammer,) * 7)(hammer, [slots], RATE)[0]
+    assert (same.times == plain.times).all()
+    assert same.waveforms == plain.waveforms
+    report = ph.quality(
+        hammer, RATE, "1110111", strategy=own, nominal=controller.single, paper=ph.Paper(front=1e-5)
+    )
+    # What has been seen of the front is of the slot before; the first dot is fired before any is seen.
+    assert report.drive.times[0] == plain.times[0]
+    assert (np.asarray(report.drive.times)[2:] != plain.times[2:]).all()
+    assert not report.lost.any()

@@ -6,6 +6,7 @@ shown so far, and nothing else of the hammer that is driven. What comes out is a
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
@@ -37,6 +38,13 @@ class FeedbackStrategy(Declared):
     sensor: PositionSensor = part("what it sees of the hammer that is driven", default=PositionSensor())
     tolerance: float = part("error allowed in one step of the closed loop", default=DISPLAY_TOLERANCE)
     threads: int | None = part("None for as many as there are cores; nothing depends on it", default=None)
+    places: tuple[Hammer, ...] | None = part(
+        "the hammer that is driven as it is at each slot; None where it is the same at all", default=None
+    )
+
+    def along(self, places: tuple[Hammer, ...]) -> FeedbackStrategy:
+        """Return the same for a hammer that is another one at each slot, see `places`."""
+        return replace(self, places=places)
 
     def __call__(
         self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
@@ -68,36 +76,44 @@ class FeedbackStrategy(Declared):
                 rested = [(loop, dot) for loop, dot in moving if loop.rests]
                 thrown = [(loop, dot) for loop, dot in moving if loop.printed is not None]
                 if rested or thrown:
-                    self._see_contacts(hammer, [loop for loop, _dot in (*rested, *thrown)])
+                    self._see_contacts(hammer, (*rested, *thrown))
                 for loop, dot in rested:
                     controller.launch(loop, dot)
                 if thrown:
                     controller.decide_again(thrown, policy)
-                self._see_flights(hammer, [loop for loop, _dot in moving])
+                self._see_flights(hammer, moving)
             if now:
                 controller.decide(now, policy)
         return loops
 
-    def _see_contacts(self, hammer: Hammer, loops: list[Loop]) -> None:
+    def _driven(self, hammer: Hammer, loop: Loop, dot: int) -> Hammer:
+        """Return the hammer as it is from the touch of the dot before on."""
+        return hammer if self.places is None else self.places[loop.slots[max(dot - 1, 0)]]
+
+    def _see_contacts(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
         """Carry some runs until their latest contacts are over, and learn from these."""
+        loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
         ends = np.maximum(np.array(over) + self.sensor.delay, starts + _SOON)
-        contacts, _flights = self._carry(hammer, loops, ends, ends)
+        hammers = [self._driven(hammer, loop, dot) for loop, dot in now]
+        contacts, _flights = self._carry(hammers, loops, ends, ends)
         self.controller.learn(loops, contacts)
 
-    def _see_flights(self, hammer: Hammer, loops: list[Loop]) -> None:
+    def _see_flights(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
         """Carry some runs to their next decisions, and estimate the coming touches."""
+        loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         touches = np.array([loop.touch - LEADS[loop.kind] for loop in loops])
         ends = np.maximum(touches, starts + _SOON)
         since = np.maximum([loop.since for loop in loops], starts)
-        contacts, flights = self._carry(hammer, loops, since, ends)
+        hammers = [self._driven(hammer, loop, dot) for loop, dot in now]
+        contacts, flights = self._carry(hammers, loops, since, ends)
         self.controller.learn(loops, contacts)
         self.controller.estimate(loops, flights)
 
     def _carry(
-        self, hammer: Hammer, loops: list[Loop], since: FloatArray, ends: FloatArray
+        self, hammers: list[Hammer], loops: list[Loop], since: FloatArray, ends: FloatArray
     ) -> tuple[Samples, Samples]:
         """Carry runs to an end; return what is shown of contacts and, since a time, of flights."""
         controller, sensor = self.controller, self.sensor
@@ -123,7 +139,7 @@ class FeedbackStrategy(Declared):
             strobes = [np.append(np.unique(times[k][used[k]]), ends[k]) for k in group]
             width = 4 if inside[group[0]] else 2
             result = Ensemble(
-                hammer,
+                [hammers[k] for k in group],
                 [loop.recent(controller.plant.driver) for loop in own],
                 ends[group],
                 states=np.array([loop.state[:width] for loop in own]),

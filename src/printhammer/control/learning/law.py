@@ -65,6 +65,9 @@ class LearningLaw:
     entries: Adjustable
     force: bool
     forgetting: float
+    # Share of the simulated hammers most like the unit that may print fewer dots with the table than in an
+    # open loop
+    doubt: float
     ladder: tuple[FloatArray, FloatArray]  # Flight times, s, and forces that are expected, (widths,)
     stages: tuple[Stage, ...]
 
@@ -103,6 +106,7 @@ def design(
     sensor: ImpactSensor,
     *,
     forgetting: float,
+    doubt: float,
     seed: int,
     report: Callable[[], None],
 ) -> LearningLaw:
@@ -155,7 +159,7 @@ def design(
         edge = _good(press, now).mean(axis=1) - plain.mean(axis=1)
         stages.append(Stage(runs, gain, contraction, estimate, evidence @ estimate.T, edge))
         report()
-    return LearningLaw(entries, measured == 2, forgetting, (expected[0], expected[1]), tuple(stages))
+    return LearningLaw(entries, measured == 2, forgetting, doubt, (expected[0], expected[1]), tuple(stages))
 
 
 def _contracting(

@@ -9,7 +9,7 @@ import numpy as np
 
 from printhammer.control.learning.calibrate import calibrate
 from printhammer.control.learning.law import PRINTED, RUNS
-from printhammer.control.learning.preparation import FORGETTING, MEMBERS, law_for
+from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
 from printhammer.control.learning.result import Learning
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT
@@ -38,6 +38,7 @@ def learn(
     largest_current: float | str = LARGEST_CURRENT,
     members: SupportsIndex = MEMBERS,
     forgetting: float = FORGETTING,
+    doubt: float = DOUBT,
     serial: str = "unit",
     seed: int = 1983,
     threads: int | None = None,
@@ -69,6 +70,9 @@ def learn(
     forgetting : float, optional
         By which part the corrections of the stages before are taken back at each stage, above 0: where the
         sensor shows nothing of them, it is what keeps them from growing.
+    doubt : float, optional
+        Which share of the twenty simulated hammers most like the unit may print fewer dots within limits with
+        the table than in an open loop, for the table to be handed out; 0, none, by default.
     serial : str, optional
         Serial number of the unit; the table is refused for another one.
     seed : int, optional
@@ -113,6 +117,7 @@ def learn(
         largest_current=largest,
         members=count,
         forgetting=forgetting,
+        doubt=doubt,
         seed=seed,
         threads=threads,
         report=report,

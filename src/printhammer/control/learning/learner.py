@@ -17,16 +17,15 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 _ALIKE: Final = 20  # Number of simulated hammers that look like the unit, by which the table is weighed
-_DOUBT: Final = (
-    0.1  # Share of these that may print fewer dots within limits with the table than in an open loop
-)
+_GAIN: Final = 0.02  # Least share of the dots that the table gains in the mean over these
 
 
 class Learner:
     """Calibrates the table of one unit from run to run, by a law.
 
-    Before the first stage is over, and wherever more than a tenth of the simulated hammers that look most
-    like the unit would print fewer dots within limits with the table, what is handed out is the open loop.
+    What is handed out is the open loop before the first stage is over, and wherever the simulated hammers
+    that look most like the unit speak against the table: more of them than the doubt that is allowed would
+    print fewer dots within limits with it, or there is next to nothing to gain.
 
     Parameters
     ----------
@@ -38,7 +37,7 @@ class Learner:
         self.law = law
         self.stage = 0
         self.corrections = np.zeros(law.entries.inputs.shape[1])
-        self._edge = 0.0
+        self._gains = False
         self._ladders: list[FloatArray] = []
         self._line: list[FloatArray] = []
         self._lines: list[FloatArray] = []
@@ -57,7 +56,7 @@ class Learner:
     @property
     def learned(self) -> bool:
         """Whether what is handed out for printing is the table that is learned, and not the open loop."""
-        return self.stage > 0 and self._edge >= 0.0
+        return self._gains
 
     @property
     def printed(self) -> FloatArray:
@@ -91,7 +90,8 @@ class Learner:
         self.corrections = law.entries.limited(kept, stage.gain @ evidence)
         apart = ((stage.seen - stage.estimate @ evidence) ** 2).sum(axis=1)
         alike = np.argsort(apart, kind="stable")[:_ALIKE]
-        self._edge = float(np.quantile(stage.edge[alike], _DOUBT))
+        edge = stage.edge[alike]
+        self._gains = bool(np.quantile(edge, self.law.doubt) >= 0.0 and edge.mean() >= _GAIN)
         self.stage += 1
 
 

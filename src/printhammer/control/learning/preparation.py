@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 FORGETTING: Final = 0.02  # By default
-MEMBERS: Final = 400
+DOUBT: Final = 0.0  # By default
+MEMBERS: Final = 800
 """Number of simulated hammers on which a law is designed."""
 
 
@@ -43,6 +44,7 @@ def law_for(
     largest_current: float = LARGEST_CURRENT,
     members: int = MEMBERS,
     forgetting: float = FORGETTING,
+    doubt: float = DOUBT,
     seed: int = 1983,
     threads: int | None = None,
     report: Callable[[], None] = lambda: None,
@@ -53,6 +55,8 @@ def law_for(
     """
     if not 0.0 < forgetting < 1.0:
         raise InputError(f"forgetting = {forgetting!r}, expected a number above 0 and below 1")
+    if not 0.0 <= doubt <= 1.0:
+        raise InputError(f"doubt = {doubt!r}, expected a number from 0 to 1")
     spread = Variability() if variability is None else variability
     bounds = Limits() if limits is None else limits
     driven = driven_by(hammer, driver, largest_current)
@@ -85,6 +89,7 @@ def law_for(
         entries,
         ImpactSensor() if sensor is None else sensor,
         forgetting=forgetting,
+        doubt=doubt,
         seed=seed,
         report=report,
     )

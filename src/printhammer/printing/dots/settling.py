@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Contact
     from printhammer.run.motion import Motion
+    from printhammer.run.pieces import PiecewiseMotion
     from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
@@ -109,12 +110,12 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
     )
 
 
-def touches(motion: Motion) -> list[Contact]:
+def touches(motion: Motion | PiecewiseMotion) -> list[Contact]:
     """List the touches of the backstop, the rest at the start excluded."""
     return [contact for contact in motion.contacts if contact.surface == "backstop" and not contact.initial]
 
 
-def wear_of(motion: Motion) -> Wear:
+def wear_of(motion: Motion | PiecewiseMotion) -> Wear:
     """Return what the backstop bears in a motion."""
     mass, contacts = motion.hammer.mass, touches(motion)
     forces = [contact.peak_force for contact in contacts if contact.peak_force is not None]

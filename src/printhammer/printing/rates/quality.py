@@ -19,6 +19,7 @@ from printhammer.printing.dots.strategy import Strategy, checked_drives, name_of
 from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.run.energy.coil_work import squared_current
 from printhammer.run.ensemble import DotTable
+from printhammer.run.pieces import simulate_pieces
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
 
@@ -29,8 +30,11 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.paper import Paper
     from printhammer.run.contacts import Dot
     from printhammer.run.energy.ledger import Ledger
+    from printhammer.run.motion import Motion
+    from printhammer.run.pieces import PiecewiseMotion
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 PITCH: Final = 25.4e-3 / 60.0  # Distance of neighbouring slots on the paper by default, m: sixty to the inch
@@ -91,6 +95,7 @@ class Quality(Result):
     )
     fired: int = part("number of firings in the whole run")
     pitch: float = scalar("m", "distance of neighbouring slots on the paper", name="pitch_m")
+    paper: Paper | None = part("how the pack varies along the line", more="None where it does not")
     status: str = part("how the run ended")
     tolerance: float = part("error allowed in one step of the integration")
 
@@ -109,6 +114,7 @@ class Quality(Result):
         return {
             "pattern": "".join("1" if dot else "0" for dot in self.wanted),
             "limits": self.limits.text,
+            **({} if self.paper is None else {"paper": self.paper.text, "paper_seed": self.paper.seed}),
             "dots": len(self.slot),
             "within_limits": int((self.fault < 0).sum()),
             "extra_contacts": int(self.extra_contacts.sum()),
@@ -221,6 +227,7 @@ def quality(
     limits: Limits | None = None,
     nominal: Nominal | None = None,
     pitch: float | str = PITCH,
+    paper: Paper | None = None,
     tolerance: float = TOLERANCE,
 ) -> Quality:
     """Print a pattern from rest, and report how well.
@@ -239,6 +246,9 @@ def quality(
         As for `printhammer.safe_rate`.
     pitch : float or str, optional
         Distance of neighbouring slots on the paper, m, or text with a unit.
+    paper : Paper, optional
+        How stiffness and front of the pack vary along the line; by default they do not. From the firing of a
+        dot on the pack is that of its slot. A strategy knows nothing of it but what its sensor shows.
 
     Returns
     -------
@@ -249,7 +259,7 @@ def quality(
     ------
     InputError
         An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy whose
-        drives do not fit.
+        drives do not fit; paper that varies under a voltage, or without a pack.
     """
     slot_rate = read_positive(rate, "Hz", "rate")
     slot_pitch = read_positive(pitch, "m", "pitch")
@@ -258,10 +268,19 @@ def quality(
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=tolerance) if nominal is None else nominal
     slots = slots_of(wanted)
-    drive = checked_drives(strategy, hammer, [slots], slot_rate)[0]
+    places = None if paper is None else paper.hammers(hammer, len(wanted), slot_pitch)
+    # A closed loop meets the paper while it drives.
+    along = None if places is None else getattr(strategy, "along", None)
+    way = strategy if along is None else along(places)
+    drive = checked_drives(way, hammer, [slots], slot_rate)[0]
     due = slot_times(slots, slot_rate)
     end = max(float(due[-1]), float(drive.times[-1])) + WAIT
-    motion = simulate(hammer, drive, duration=end, points=2, tolerance=tolerance)
+    if places is None:
+        motion: Motion | PiecewiseMotion = simulate(
+            hammer, drive, duration=end, points=2, tolerance=tolerance
+        )
+    else:
+        motion = simulate_pieces([places[slot] for slot in slots], drive, end, tolerance)
     dots = dot_table(motion.dots, drive.times)
     judged = np.asarray(slots) >= judged_from
     judgement = judge(dots, judged[np.newaxis], due[np.newaxis], single, bounds, np.array([motion.ok]))
@@ -294,6 +313,7 @@ def quality(
         heat=heat,
         fired=len(motion.dots),
         pitch=slot_pitch,
+        paper=paper,
         status=motion.status,
         tolerance=tolerance,
     )

@@ -37,6 +37,7 @@ def quality(
     pattern: str | None = _report("SLOTS", "Slots such as 10110111 (the de Bruijn cycle of order 8)."),
     pulses: int | None = opt.whole("Dots without a gap, instead of a pattern.", panel="Report"),
     pitch: str | None = _report("LENGTH", "Distance of neighbouring slots (1/60 in)."),
+    paper: Path | None = opt.source("How the paper varies along the line (.toml).", panel="Report"),
     table: Path | None = TABLE,
     serial: str | None = SERIAL,
     feedback: bool = FEEDBACK,
@@ -77,7 +78,7 @@ def quality(
     if len(tasks) > 1:
         raise InputError(f"--{tasks[0]} and --{tasks[1]}: expected one of them")
     task = tasks[0]
-    of_report = opt.given(rate=rate, pattern=pattern, pulses=pulses, pitch=pitch)
+    of_report = opt.given(rate=rate, pattern=pattern, pulses=pulses, pitch=pitch, paper=paper)
     of_drive = opt.given(table=table, serial=serial, feedback=feedback or None)
     of_grid = opt.given(first=first, last=last, step=step)
     of_draw = opt.given(spread=spread, judged_by=judged_by, seed=seed)
@@ -96,11 +97,13 @@ def quality(
         many = {"first": float(loaded_table.rates[0]), "last": float(loaded_table.rates[-1]), **many}
     result: Any
     if task == "report":
+        from printhammer.printing.dots.paper import Paper
         from printhammer.printing.rates.quality import quality as report
 
         with job.telling("printing"):
             slots = pattern if pulses is None else pulses
-            result = report(hammer, rate or 0.0, slots, **common, **opt.given(pitch=pitch))
+            varied = None if paper is None else Paper.load(paper)
+            result = report(hammer, rate or 0.0, slots, **common, **opt.given(pitch=pitch, paper=varied))
         bad = [] if result.ok else [f"the run ended early: {result.status}"]
         lines = quality_report.report(result, units)
     elif task == "safe-rate":
@@ -134,7 +137,7 @@ def quality(
 
 
 _TAKES: Final = {
-    "report": {"rate", "pattern", "pulses", "pitch", "table", "serial", "feedback"},
+    "report": {"rate", "pattern", "pulses", "pitch", "paper", "table", "serial", "feedback"},
     "safe-rate": {"table", "serial", "feedback", "first", "last", "step", "threads"},
     "yield": {"table", "serial", "rate", "spread", "judged_by", "seed", "first", "last", "step", "threads"},
     "damping": {"current", "first", "last", "step", "threads"},

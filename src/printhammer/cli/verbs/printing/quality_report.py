@@ -37,6 +37,7 @@ def report(result: Quality, units: Units) -> Table:
         [
             ("pattern", f"{what}, {judged} dots judged, {result.rate:g} Hz, {escape(result.strategy)}"),
             ("limits", _limits(result.limits, units)),
+            ("paper", None if result.paper is None else escape(result.paper.text)),
             (
                 "dots",
                 (

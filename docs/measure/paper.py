@@ -1,0 +1,126 @@
+"""Measure what each way to drive prints on paper that is not the same everywhere.
+
+Run it with ``.venv/bin/python docs/measure/paper.py``. It draws hammers from the variability of a production,
+has each print the de Bruijn cycle of order 8 on even paper, on paper that varies, and on paper that varies
+twice as much, and counts the dots within limits: in an open loop, by a table, by one that was learned from
+times of impact and forces, and with feedback. It takes some twenty minutes on one core.
+
+``--units N`` draws another number.
+"""
+
+import argparse
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+from measured import MOTION, Cell, Column, write
+
+import printhammer as ph
+from printhammer.control.feedback.closed_loop import FeedbackStrategy
+from printhammer.control.feedback.controller import Controller
+from printhammer.control.feedback.driver import driver_of
+from printhammer.control.learning.calibrate import calibrate
+from printhammer.control.learning.preparation import law_for
+from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.table.drive import COLUMNS
+from printhammer.control.table.drivers import driven_by, with_pulse
+from printhammer.printing.dots.nominal import Nominal, nominal
+from printhammer.printing.dots.strategy import OpenLoop, Strategy
+from printhammer.printing.rates.variability import Variability
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+
+SAFE = 850.0
+"""Open-loop safe rate of the shipped hammer, Hz."""
+PAPERS = {
+    "even": None,
+    "stiffness 5 %, front 3 µm": ph.Paper(),
+    "stiffness 10 %, front 6 µm": ph.Paper(stiffness=0.1, front=6e-6),
+}
+ROOMS = (
+    *MOTION,
+    *("control/feedback", "control/learning", "control/table", "control/widths"),
+    *("printing/dots", "printing/rates"),
+)
+SPEED = 1.0
+"""Speed of a touch, m/s, by which the front shifts times of impact."""
+FORCE = 1.0 / 3.7
+"""By which power of its stiffness the force of a power-law pack grows at the same energy."""
+
+
+def sensor_on(paper: ph.Paper | None) -> ImpactSensor:
+    """Return a sensor of times and forces, in whose noise what the paper adds is contained."""
+    if paper is None:
+        return ImpactSensor(force=0.03)
+    time, force = math.hypot(5e-6, paper.front / SPEED), math.hypot(0.03, FORCE * paper.stiffness)
+    return ImpactSensor(noise=time, force=force)
+
+
+def good(
+    ways: list[Strategy], units: list[ph.Hammer], rate: float, by: Nominal, paper: ph.Paper | None
+) -> list[float]:
+    """Return the share of dots within limits, for each unit, each on paper of its own."""
+    shares = []
+    for number, (unit, way) in enumerate(zip(units, ways, strict=True)):
+        own = None if paper is None else ph.Paper(paper.stiffness, paper.front, paper.length, number)
+        printed = ph.quality(unit, rate, strategy=way, nominal=by, paper=own, tolerance=DISPLAY_TOLERANCE)
+        shares.append(float((printed.fault < 0).mean()))
+    return shares
+
+
+def learned(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, paper: ph.Paper | None) -> list[Strategy]:
+    """Return the table that each unit learns from times of impact and forces on the paper."""
+    sensor = sensor_on(paper)
+    law, base = law_for(hammer, rate, sensor=sensor, members=400)
+    tables = []
+    for learner in calibrate(law, units, sensor)[0]:
+        entries = {key: row[np.newaxis] for key, row in zip(COLUMNS, learner.printed, strict=True)}
+        tables.append(replace(base, **entries).fired_by("switch", hammer))
+    return [table.strategy(hammer) for table in tables]
+
+
+def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:
+    """Return a row for each paper and way at a rate."""
+    rate, single, rows = share * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
+    switched = driven_by(hammer, "switch", 2.0)
+    fired = [with_pulse(unit, switched.waveform) for unit in units]
+    quick = nominal(switched, tolerance=DISPLAY_TOLERANCE)
+    controller = Controller(hammer, driver_of(hammer))
+    table = ph.tune(hammer, rate=rate, driver="switch", variability=Variability()).strategy(hammer)
+    count = len(units)
+    for name, paper in PAPERS.items():
+        ways = {
+            "open loop, own pulse": ([OpenLoop()] * count, units, single),
+            "open loop, switch": ([OpenLoop()] * count, fired, quick),
+            "robust table, switch": ([table] * count, units, single),
+            "learned from time and force, switch": (learned(hammer, units, rate, paper), units, single),
+            "feedback": ([FeedbackStrategy(controller)] * count, units, controller.single),
+        }
+        for way, (drives, driven, by) in ways.items():
+            shares = good(drives, driven, rate, by, paper)
+            rows.append([share, name, way, 100.0 * float(np.mean(shares)), shares.count(1.0)])
+            print(*rows[-1], time.strftime("%H:%M:%S"), flush=True)
+    return rows
+
+
+def main() -> None:
+    """Measure what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--units", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    hammer = ph.load("hendriks-1983")
+    units = Variability().draw(hammer, asked.units, asked.seed)
+    rows = [row for share in (1.0, 1.5) for row in measure(hammer, units, share)]
+    heads = [
+        Column(name="rate, in open-loop safe rates", format="g"),
+        Column(name="paper"),
+        Column(name="drive"),
+        Column(name="dots within limits", unit="%", format=".1f"),
+        Column(name="units that print all"),
+    ]
+    write("paper", heads, rows, {"units": asked.units, "seed": asked.seed}, ROOMS)
+
+
+if __name__ == "__main__":
+    main()

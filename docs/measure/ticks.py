@@ -1,0 +1,128 @@
+"""Measure what it costs that firmware fires in whole ticks of a timer.
+
+Run it with ``.venv/bin/python docs/measure/ticks.py``. For the shipped hammer it tunes a table over all rates
+and finds its safe rate as the ticks get longer; and tables at 1.5 times the open-loop safe rate, whose worst
+dot on the nominal hammer, and whose dots within limits on hammers drawn from the variability of a production,
+it counts. It takes some ten minutes on one core.
+
+``--units N`` draws another number; ``--curves FILE`` only draws the measured table.
+"""
+
+import argparse
+from importlib import import_module
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from measured import MOTION, Cell, Column, read, write
+
+import printhammer as ph
+from printhammer.control.table.compensation import CompensationTable
+from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.trial import Case, Trial, attempt
+from printhammer.printing.rates.variability import Variability
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+
+SAFE = 850.0
+"""Open-loop safe rate of the shipped hammer, Hz."""
+TICKS = (None, "1 us", "2 us", "5 us", "10 us", "20 us")
+ROOMS = (*MOTION, "control/table", "control/widths", "printing/dots", "printing/rates")
+
+
+def printed(units: list[ph.Hammer], hammer: ph.Hammer, table: CompensationTable, rate: float) -> Trial:
+    """Return what hammers print of the cycle with a table."""
+    single = nominal(hammer, tolerance=DISPLAY_TOLERANCE)
+    return attempt(
+        [Case(unit, single, rate) for unit in units],
+        [slots_of(cycle_with_lead_in())],
+        table.strategy(hammer),
+        limits=Limits(),
+        tolerance=DISPLAY_TOLERANCE,
+        judged_from=LEAD_IN,
+    )
+
+
+def worst(trial: Trial) -> float:
+    """Return how far the worst dot is off, in parts of the limits."""
+    judgement, limits = trial.judgement, Limits()
+    force = np.abs(judgement.force_deviation[judgement.wanted]) / limits.force
+    arrival = np.abs(judgement.arrival_deviation[judgement.wanted]) / limits.arrival
+    return float(np.fmax(force, arrival).max())
+
+
+def measure(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
+    """Return a row a tick."""
+    whole, rate, rows = ph.tune(hammer, history=1), 1.5 * SAFE, []
+    tables = {driver: ph.tune(hammer, rate=rate, driver=driver) for driver in ("own", "switch")}
+    for tick in TICKS:
+        ticked = {name: table if tick is None else table.quantised(tick) for name, table in tables.items()}
+        fired = whole if tick is None else whole.quantised(tick)
+        safe = ph.safe_rate(
+            hammer, fired.strategy(hammer), last=float(whole.rates[-1]), tolerance=DISPLAY_TOLERANCE
+        )
+        row: list[Cell] = ["exact" if tick is None else tick, float(safe.rate)]
+        row.append(whole.size() if tick is None else whole.size(tick))
+        for table in ticked.values():
+            good = printed(units, hammer, table, rate).judgement
+            share = good.good.sum() / good.wanted.sum()
+            row += [worst(printed([hammer], hammer, table, rate)), 100.0 * float(share)]
+        rows.append(row)
+        print(*row, flush=True)
+    return rows
+
+
+def curves(path: Path) -> None:
+    """Draw safe rate and worst dot by tick."""
+    style = import_module("printhammer.figures.elements.style")
+    rows = read("ticks").rows
+    ticks = [0.0 if row[0] == "exact" else float(str(row[0]).split()[0]) for row in rows]
+    with style.in_style():
+        figure = style.new_figure(3.2)
+        left, right = figure.subplots(1, 2)
+        left.plot(ticks, [row[1] for row in rows], color=style.BLUE, marker="o")
+        left.axhline(SAFE, color=style.MUTED, linestyle="--")
+        left.annotate("open loop", (ticks[-1], SAFE), ha="right", va="bottom", fontsize=style.SMALL)
+        left.set_ylim(0.0, None)
+        left.set_ylabel("Safe rate of a table over all rates  [Hz]")
+        for column, name, colour in ((3, "own pulse", style.ORANGE), (5, "fast switch", style.BLUE)):
+            right.plot(ticks, [row[column] for row in rows], color=colour, marker="o", label=name)
+        right.axhline(1.0, color=style.MUTED, linestyle="--")
+        right.set_ylim(0.0, None)
+        right.set_ylabel("Worst dot at 1,275 Hz  [limits]")
+        right.legend(fontsize=style.SMALL, frameon=False)
+        for ax in (left, right):
+            ax.set_xlabel("Tick of the timer  [µs]")
+        style.foot(figure, "hendriks-1983")
+        drawn = BytesIO()
+        figure.savefig(drawn, dpi=110)
+    path.write_bytes(drawn.getvalue())
+
+
+def main() -> None:
+    """Measure what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--units", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--curves", type=Path)
+    asked = parser.parse_args()
+    if asked.curves is not None:
+        curves(asked.curves)
+        return
+    hammer = ph.load("hendriks-1983")
+    rows = measure(hammer, Variability().draw(hammer, asked.units, asked.seed))
+    heads = [
+        Column(name="tick"),
+        Column(name="safe rate", unit="Hz", format="g"),
+        Column(name="table over all rates", unit="bytes"),
+        Column(name="1,275 Hz, own pulse: worst dot, in parts of the limits", format=".2f"),
+        Column(name="its units' dots within limits", unit="%", format=".1f"),
+        Column(name="1,275 Hz, fast switch: worst dot, in parts of the limits", format=".2f"),
+        Column(name="its units' dots within limits, switch", unit="%", format=".1f"),
+    ]
+    write("ticks", heads, rows, {"units": asked.units, "seed": asked.seed}, ROOMS)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,150 @@
+"""A run in which the hammer is another one from firing to firing, as where the paper is not the same.
+
+It is integrated piece by piece. A piece ends at the next firing; or, where the armature is then inside the
+pack of this piece or of the next one, as soon afterwards as it is inside neither: a contact meets one pack.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.run.energy.ledger import Ledger
+from printhammer.run.motion import Motion
+from printhammer.run.problem import Problem
+from printhammer.run.start import initial_state
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.contacts import Contact, Dot
+
+_LATER: Final = 5e-6  # By how much the end of a piece is put off while the armature is inside a pack, s
+
+
+class PiecewiseMotion:
+    """What became of such a run: contacts, dots and energy, as `printhammer.run.motion.Motion` has them."""
+
+    def __init__(self, hammer: Hammer, drive: Drive, pieces: Sequence[Motion]) -> None:
+        self.hammer = hammer
+        self.drive = drive
+        self._pieces = pieces
+
+    @property
+    def status(self) -> str:
+        """How the run ended."""
+        return self._pieces[-1].status
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached its end."""
+        return self._pieces[-1].ok
+
+    @property
+    def end(self) -> float:
+        """Time of the last state, s."""
+        return self._pieces[-1].end
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """All contacts in order of touch; one that is open where pieces meet is one contact."""
+        contacts: list[Contact] = []
+        for motion in self._pieces:
+            for contact in motion.contacts:
+                before = contacts[-1] if contacts else None
+                if contact.initial and before is not None and before.t_out is None:
+                    contacts[-1] = _joined(before, contact)
+                else:
+                    contacts.append(contact)
+        return contacts
+
+    @property
+    def dots(self) -> list[Dot]:
+        """What each firing up to the end of the run did."""
+        dots: dict[int, Dot] = {}
+        for motion in self._pieces:
+            for dot in motion.dots:
+                known = dots.setdefault(dot.index, dot)
+                if known is not dot and dot.struck:
+                    more = 1 + dot.extra_contacts
+                    dots[dot.index] = (
+                        replace(known, extra_contacts=known.extra_contacts + more) if known.struck else dot
+                    )
+        return list(dots.values())
+
+    @property
+    def energy(self) -> Ledger:
+        """The energy ledger of the whole run: the sums over its pieces."""
+        ledgers = [motion.energy for motion in self._pieces]
+        names = [field.name for field in fields(Ledger)]
+        return Ledger(**{name: sum(getattr(ledger, name) for ledger in ledgers) for name in names})
+
+
+def simulate_pieces(
+    hammers: Sequence[Hammer], drive: Drive, duration: float, tolerance: float
+) -> PiecewiseMotion:
+    """Run a drive on a hammer that is another one from each firing on, from the rest of the first one.
+
+    Parameters
+    ----------
+    hammers : sequence of Hammer
+        One for each firing, which differ in their packs only.
+    drive : Drive
+        A current or a force.
+    duration : float
+        End of the run, s, after the last firing.
+    tolerance : float
+        Error allowed in one step.
+
+    Raises
+    ------
+    InputError
+        Not one hammer for each firing; a voltage, under which a run cannot be taken up again.
+    """
+    times = drive.times
+    if len(hammers) != len(times):
+        raise InputError(f"{len(hammers)} hammers, expected one for each of {len(times)} firings")
+    if drive.quantity == "voltage":
+        raise InputError(
+            f"{hammers[0].path}: a voltage drives the coil, expected a current or a force where paper varies"
+        )
+    fronts = [np.inf if hammer.front is None else hammer.front for hammer in hammers]
+    ends = [*times[1:].tolist(), duration]
+    state, start = initial_state(hammers[0], None), 0.0
+    pieces: list[Motion] = []
+    for number, hammer in enumerate(hammers):
+        end = ends[number]
+        if end <= start:
+            continue
+        problem = Problem(hammer, drive, state, start, tolerance)
+        nearest = min(fronts[number : number + 2])
+        while True:
+            record = problem.run(end)
+            x, v = (float(value) for value in record.nodes[-1, 1:3])
+            if record.status or x <= nearest or end >= duration:
+                break
+            end = min(end + _LATER, duration)
+        pieces.append(Motion(problem, record, end, np.array([start, end]), "default"))
+        if record.status:
+            break
+        state, start = (x, v), end
+    return PiecewiseMotion(hammers[0], drive, pieces)
+
+
+def _joined(first: Contact, then: Contact) -> Contact:
+    """Return a contact of two parts."""
+    higher = then if then.depth > first.depth else first
+    return replace(
+        first,
+        t_out=then.t_out,
+        v_out=then.v_out,
+        t_peak=higher.t_peak,
+        depth=higher.depth,
+        peak_force=higher.peak_force,
+        loss=first.loss + then.loss,
+    )
