@@ -57,7 +57,7 @@ def test_the_verdict_is_that_of_the_library() -> None:
 
 def test_a_section_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     check_strobe(of())
-    monkeypatch.setattr(bounds, "MOST_MAP_STEPS", 100)
+    monkeypatch.setattr(bounds, "MOST_SECTION_STEPS", 100)
     with pytest.raises(InputError, match="the first 25 strobe points would take more than 100 steps"):
         check_strobe(of())
 

@@ -148,6 +148,11 @@ class Motion(Result, fields=False):
         """Return the current in the coil, A, or the force of the drive, N, at any times of the run, s."""
         return self._resampled(t)[:, 10] if self._problem.laws.circuit else self.drive.value(t)
 
+    def voltage_at(self, t: npt.ArrayLike) -> FloatArray:
+        """Return the voltage across the coil, V, at any times of the run, s; zero where none drives it."""
+        table = self._resampled(t)
+        return table[:, 11] if self._problem.laws.circuit else np.zeros(len(table))
+
     @cached_property
     def switchings(self) -> tuple[FloatArray, tuple[str, ...]]:
         """Times at which the current of the coil took another path, s, and the paths: see `PATHS`."""

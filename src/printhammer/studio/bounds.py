@@ -22,13 +22,16 @@ MOST_PULSES: Final = 64
 RATES: Final = (10.0, 20e3)
 """Firing rates, Hz."""
 
-LONGEST_TIME: Final = 20e-3
+LONGEST_TIME: Final = 0.5
 """Longest width, rise, decay or fall of a pulse, s."""
 
 LARGEST_CURRENT: Final = 100.0
 """Largest amplitude, A or N."""
 
-LARGEST: Final = {"V": 1e4, "ohm": 1e6}
+LARGEST_VOLTAGE: Final = 1e4
+"""Largest amplitude, V."""
+
+LARGEST: Final = {"V": LARGEST_VOLTAGE, "ohm": 1e6}
 """Largest constants of a driver, by their units."""
 
 SPAN: Final = 10.0
@@ -39,6 +42,9 @@ MOST_STEPS: Final = 50_000
 
 MOST_MAP_STEPS: Final = 20_000
 """Steps of one run, for a view that takes many runs or long ones."""
+
+MOST_SECTION_STEPS: Final = 60_000
+"""Steps of the run to the first points of a strobe section."""
 
 MOST_WORK: Final = 20_000_000
 """Steps of all runs of a printed line."""

@@ -95,7 +95,12 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
         if kind == "hammer":
             name, text = content
             hammer = dropped_hammer(text) if text else shelf.hammer(name or shelf.names[0])
-            heading = {"offered": shelf.names, "asked": name or shelf.names[0], "text": text, **vocabulary()}
+            heading = {
+                "offered": shelf.names,
+                "asked": name or shelf.names[0],
+                "text": text,
+                **vocabulary(hammer),
+            }
             return frame("hammer", serial, hammer=describe(hammer), **heading)
         if kind == "open":
             # A page without a state of its own opens with that of the studio.

@@ -13,6 +13,7 @@ from printhammer.errors import InputError
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.studio import bounds, compiling
 from printhammer.studio.pictures.engine import limited_run
+from printhammer.studio.states.coil import open_constants
 from printhammer.studio.states.controls import fields_of
 
 if TYPE_CHECKING:
@@ -82,15 +83,17 @@ def try_out(
     tolerance: float = DISPLAY_TOLERANCE,
     *,
     through: bool = False,
+    most: int = 0,
 ) -> Motion:
-    """Run a drive once; where it takes more than `bounds.MOST_MAP_STEPS`, refuse what needs many such runs.
+    """Run a drive once; where it takes more than `most` steps (by default `bounds.MOST_MAP_STEPS`),
+    refuse what needs many such runs.
 
     Raises
     ------
     InputError
         It does, or is to go `through` and does not come to its end.
     """
-    most = bounds.MOST_MAP_STEPS
+    most = most or bounds.MOST_MAP_STEPS
     motion = limited_run(state.changed, drive, end, most, tolerance)
     if motion.status == STEP_LIMIT:
         raise InputError(f"{what} would take more than {most} steps for this hammer, expected fewer")
@@ -104,15 +107,16 @@ def alike(one: State, other: State) -> bool:
     keys = ("hammer", "text", "pulses", "pattern", "overlap", "low", "high")
     if any(getattr(one, key) != getattr(other, key) for key in keys):
         return False
-    base = one.base.constants
     mine, theirs = dict(one.constants), dict(other.constants)
-    pairs = [(mine.get(key, base[key].si), theirs.get(key, base[key].si)) for key in {*mine, *theirs}]
+    own = {key: constant.si for key, (constant, _) in open_constants(one.base).items()}
+    own |= {key: constant.si for key, constant in one.base.constants.items()}
+    pairs = [(mine.get(key, own[key]), theirs.get(key, own[key])) for key in {*mine, *theirs}]
     if one.waveform != other.waveform:
         waves = fields_of(one.fired), fields_of(other.fired)
         if waves[0].keys() != waves[1].keys():
             return False
         for name, value in waves[0].items():
-            if isinstance(value, float):
+            if isinstance(value, float) and isinstance(waves[1][name], float):
                 pairs.append((value, waves[1][name]))
             elif value != waves[1][name]:
                 return False

@@ -21,6 +21,11 @@ WAIT: Final = 4e-3
 """Time after the last firing of a run, s, within which its dot and extra contacts are waited for."""
 
 
+def wait_of(waveform: Waveform) -> float:
+    """Return how long a run goes on after its last firing, s: under a driver also while that is on."""
+    return WAIT + (waveform.support if waveform.replaces else 0.0)
+
+
 class SinglePulse(Declared):
     """The dot of one pulse from rest, as far as dots are judged by it."""
 
@@ -48,7 +53,7 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     pulse = pulse_of(hammer, waveform)
     if hammer.front is None:
         raise InputError(f"{hammer.path}: the hammer has no pack, expected one that a dot is made on")
-    motion = simulate(hammer, PulseTrain(pulse), duration=WAIT, points=2, tolerance=tolerance)
+    motion = simulate(hammer, PulseTrain(pulse), duration=wait_of(pulse), points=2, tolerance=tolerance)
     if not motion.ok:
         raise InputError(f"{hammer.path}: the run of a single pulse ends early: {motion.message}")
     dot = motion.dots[0]
@@ -80,7 +85,8 @@ def single_pulses(
         return []
     pulses = [pulse_of(hammer) for hammer in hammers] if waveforms is None else waveforms
     drives = [PulseTrain(pulse) for pulse in pulses]
-    result = Ensemble(list(hammers), drives, WAIT, tolerance=tolerance).run(dots=True, threads=threads)
+    wait = max(wait_of(pulse) for pulse in pulses)
+    result = Ensemble(list(hammers), drives, wait, tolerance=tolerance).run(dots=True, threads=threads)
     dots = result.dots
     assert dots is not None
     good = result.ok & dots.struck[:, 0]

@@ -11,7 +11,7 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.judging import FAULTS, judge
 from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
-from printhammer.printing.dots.nominal import WAIT, Nominal
+from printhammer.printing.dots.nominal import Nominal, wait_of
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.settling import Wear, wear_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
@@ -274,7 +274,7 @@ def quality(
     way = strategy if along is None else along(places)
     drive = checked_drives(way, hammer, [slots], slot_rate)[0]
     due = slot_times(slots, slot_rate)
-    end = max(float(due[-1]), float(drive.times[-1])) + WAIT
+    end = max(float(due[-1]), float(drive.times[-1])) + wait_of(drive.waveform)
     if places is None:
         motion: Motion | PiecewiseMotion = simulate(
             hammer, drive, duration=end, points=2, tolerance=tolerance

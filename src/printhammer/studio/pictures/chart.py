@@ -10,6 +10,7 @@ import numpy as np
 from printhammer.drive.batch import PulseTrains
 from printhammer.errors import InputError
 from printhammer.maps.frequency import TAIL
+from printhammer.printing.dots.nominal import wait_of
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.start import initial_state
 from printhammer.studio import bounds
@@ -123,7 +124,9 @@ def map_frame(
 
 
 def _end(state: State) -> float:
-    return (len(state.slots) - 1) / state.low + TAIL
+    # A driver's device may be slow: what its last firing does is to be seen.
+    tail = wait_of(state.fired) if state.fired.replaces else TAIL
+    return (len(state.slots) - 1) / state.low + tail
 
 
 @lru_cache(maxsize=64)

@@ -55,12 +55,14 @@ def motion_frame(
     times = points_of(motion.step_times)
     places, speeds = motion.at(times)
     force, values = motion.forces_at(times), motion.driven_at(times)
+    voltage = {"u": np.float32(motion.voltage_at(times))} if drive.quantity == "voltage" else {}
     fired, x, v = motion.strobe
     arrays: dict[str, Any] = {
         "t": times,
         "x": np.float32(places),
         "v": np.float32(speeds),
         "drive": np.float32(values),
+        **voltage,
         **{f"F {name}": np.float32(values) for name, values in force.items()},
         "strobe t": fired,
         "strobe x": np.float32(x),
@@ -82,6 +84,8 @@ def motion_frame(
         "pulse": pulse_of(state.fired),
         "outdated": outdated or {},
     }
+    if voltage:
+        heading["supply"] = float(state.fired.peak)
     return frame("motion", serial, arrays, **heading), motion
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, get_args
 
+from printhammer.drive.waveforms.drivers import DRIVERS, Rail
 from printhammer.drive.waveforms.shapes import SHAPES, Waveform
-from printhammer.hammer.names import range_of
 from printhammer.studio import bounds
+from printhammer.studio.states.coil import by_voltage, open_constants, rail_of, span_of
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
+    from printhammer.hammer.names import Range
+    from printhammer.support.constants import Constant
 
 SHOWN: Final = {
     "m": ("um", "mil"),
@@ -23,14 +26,26 @@ SHOWN: Final = {
     "Hz": ("Hz", "Hz"),
     "N/m": ("N/mm", "lbf/in"),
     "Pa": ("GPa", "ksi"),
+    "m^2": ("mm^2", "mil^2"),
+    "H": ("mH", "mH"),
+    "Wb": ("mWb", "mWb"),
+    "F": ("uF", "uF"),
+    "degC": ("degC", "degC"),
 }
 """Units in which a quantity is shown, by its SI unit: metric, inch-pound; else the SI unit itself."""
+
+_SLOW: Final = 2e-3
+"""Width of a pulse from which on times are shown in ms, s."""
+
+_WIDE: Final = 3e-3
+"""Stroke from which on lengths are shown in mm, m."""
 
 EQUATIONS: Final = {
     "mass": "m x'' = Fm + Fs + Fp + Fb + Fe",
     "magnet.inverse-root": "Fm = F0 - (Am - Bm I)² / √x   (3)",
     "spring.linear": "Fs = Bs - (Bs/As)(x - b)   (4)",
     "pack.power": "Fp = -(AiEp) r^2.7, unloading -(AiEp) rmax^-8.3 r^11, r = (x - xp)/d   (5)",
+    "coil.winding": "dλ/dt = u - R i, R = R20 (1 + 0.00393 (T - 20 °C))",
     "backstop.hertz": "Fb = k δ^1.5 (6), Fe = -l v δ^1.5 (7), δ = b - x",
 }
 """Equations of the laws of the paper; the others are told in the first line of their part."""
@@ -78,42 +93,46 @@ def describe(hammer: Hammer) -> dict[str, Any]:
     Returns
     -------
     dict
-        `name`, `title`, `note`, `constants` (a list), `combined` (controls that move several constants),
+        `name`, `title`, `note`, `constants` (a list), `open` (those of the coil that the file leaves open),
+        `rail` (what it is first driven by, or None), `combined` (controls that move several constants),
         `waveform` (shape and constants, or None), `start` (what to fire a hammer with that has none, else
         empty), `places`.
     """
     constants = []
     for key, constant in hammer.constants.items():
-        if key.startswith("waveform."):
-            continue
-        span = range_of(hammer, key, bounds.SPAN)
-        section = key.partition(".")[0]
-        part = hammer.parts.get(section)
-        constants.append(
-            {
-                "key": key,
-                "section": section if part is not None else "armature",
-                "symbol": constant.symbol,
-                "meaning": constant.meaning,
-                "value": constant.si,
-                "unit": constant.si_unit,
-                "low": span.low,
-                "high": span.high,
-                "log": span.logarithmic,
-                "status": constant.status,
-                "source": constant.source,
-                "equation": equation_of(section, getattr(part, "law", "")),
-            }
-        )
+        if (span := span_of(hammer, key, bounds.SPAN)) is not None:
+            constants.append(_control(hammer, constant, span))
     return {
         "name": hammer.name,
         "title": hammer.title,
         "note": hammer.note,
         "constants": constants,
+        "open": [_control(hammer, constant, span) for constant, span in open_constants(hammer).values()],
+        "rail": rail_of(hammer),
         "combined": combined_of(hammer),
         "waveform": None if hammer.waveform is None else fields_of(hammer.waveform),
         "start": opening_of(hammer),
         "places": {"backstop": hammer.position, "front": hammer.front, "platen": hammer.platen},
+    }
+
+
+def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
+    section = constant.key.partition(".")[0]
+    part = hammer.parts.get(section)
+    law = getattr(part, "law", "winding" if section == "coil" else "")
+    return {
+        "key": constant.key,
+        "section": section if part is not None or law else "armature",
+        "symbol": constant.symbol,
+        "meaning": constant.meaning,
+        "value": constant.si,
+        "unit": constant.si_unit,
+        "low": span.low,
+        "high": span.high,
+        "log": span.logarithmic,
+        "status": constant.status,
+        "source": constant.source,
+        "equation": equation_of(section, law),
     }
 
 
@@ -180,17 +199,26 @@ def fields_of(waveform: Waveform) -> dict[str, Any]:
     return {"shape": waveform.shape, **waveform.model_dump()}
 
 
-def vocabulary() -> dict[str, Any]:
-    """Return what does not depend on the hammer: units with factors, shapes with their constants, bounds."""
+def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
+    """Return units with factors, as fit a hammer, shapes of pulses with their constants, and bounds."""
     from printhammer.support.constants import quantities
 
+    named = SHOWN if hammer is None else {**SHOWN, **_large(hammer)}
     units = {
         si: [{"name": _signed(name), "factor": from_si(1.0, si, name)} for name in names]
-        for si, names in SHOWN.items()
+        for si, names in named.items()
     }
     shapes = {
         name: [
-            {"name": field, "unit": note.si, "meaning": note.meaning, "positive": note.gt is not None}
+            {
+                "name": field,
+                "unit": note.si,
+                "meaning": note.meaning,
+                "positive": note.gt is not None,
+                "least": note.gt if note.ge is None else note.ge,
+                "start": None if note.required else shape.model_fields[field].default,
+                "optional": not note.required and shape.model_fields[field].default is None,
+            }
             for field, note in quantities(shape).items()
         ]
         for name, shape in SHAPES.items()
@@ -201,8 +229,24 @@ def vocabulary() -> dict[str, Any]:
         "file": bounds.LARGEST_FILE,
         "line": bounds.LONGEST_TEXT,
     }
-    return {"units": units, "shapes": shapes, "limits": limits}
+    drivers = [shape.shape for shape in DRIVERS]
+    decays = list(get_args(Rail.model_fields["decay"].annotation))
+    return {"units": units, "shapes": shapes, "drivers": drivers, "decays": decays, "limits": limits}
+
+
+def _large(hammer: Hammer) -> dict[str, tuple[str, str]]:
+    """Return larger units of time and length for devices that are slower and larger than printers."""
+    places = [place for place in (hammer.position, hammer.front) if place is not None]
+    units: dict[str, tuple[str, str]] = {}
+    if by_voltage(hammer.waveform) and getattr(hammer.waveform, "width", 0.0) > _SLOW:
+        units["s"] = ("ms", "ms")
+    if places and by_voltage(hammer.waveform) and max(places) - min(places) > _WIDE:
+        units["m"] = ("mm", "in")
+    return units
 
 
 def _signed(unit: str) -> str:
-    return unit.replace("us", "µs").replace("um", "µm").replace("in lbf", "in·lbf")
+    signs = {"us": "µs", "um": "µm", "uF": "µF", "in lbf": "in·lbf", "degC": "°C", "^2": "²"}
+    for plain, sign in signs.items():
+        unit = unit.replace(plain, sign)
+    return unit

@@ -1,4 +1,4 @@
-"""Measured curves as oscilloscopes and spreadsheets write them: time, and displacement, current or force.
+"""Measured curves as oscilloscopes and spreadsheets write them: time, and displacement, current, force or voltage.
 
 Columns are parted by tabs, semicolons or commas, numbers may have a decimal comma, lines above the heading
 are passed over, and units stand in the heading, as "time [us]" or "time (us)", or in a row below it. What a
@@ -13,11 +13,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from printhammer.errors import InputError, located
-from printhammer.studio.bounds import LARGEST_CURRENT, LONGEST_TIME, MOST_SAMPLES
+from printhammer.studio.bounds import LARGEST_CURRENT, LARGEST_VOLTAGE, LONGEST_TIME, MOST_SAMPLES
 from printhammer.support.sheets import sheet_of, split_heading
 from printhammer.units import parse, to_si
 
-QUANTITIES: Final = {"time": "s", "displacement": "m", "current": "A", "force": "N"}
+QUANTITIES: Final = {"time": "s", "displacement": "m", "current": "A", "force": "N", "voltage": "V"}
 """What a column may hold, with its SI unit."""
 
 EXPECTED: Final = "'time [us],displacement [um]', 'time [us],current [A]' or 'time [us],force [N]'"
@@ -30,6 +30,7 @@ _NAMES: Final = {
     "displacement": ("displacement", "position", "x", "weg"),
     "current": ("current", "i", "strom"),
     "force": ("force", "f", "kraft"),
+    "voltage": ("voltage", "u", "spannung", "tension"),
 }
 _NUMBER: Final = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
 _WHOLE: Final = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
@@ -89,7 +90,9 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
         if known.count(quantity) > 1:
             raise InputError(f"{where}: {known.count(quantity)} columns of {quantity}, expected one")
     if "time" not in known or not set(known) - {"time", ""}:
-        raise InputError(f"{where}: expected a column of time and one of displacement, current or force")
+        raise InputError(
+            f"{where}: expected a column of time and one of displacement, current, force or voltage"
+        )
     curves = {}
     for place, column in enumerate(columns):
         if column.quantity:
@@ -107,15 +110,14 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
 
 def _checked(record: Record, where: str) -> Record:
     """Return a record whose drive, where it has one, can be fired."""
-    for name in {"current", "force"} & set(record.curves):
+    for name in {"current", "force", "voltage"} & set(record.curves):
         last, peak = float(record.times[-1]), float(np.abs(record.curves[name]).max())
         if last > LONGEST_TIME:
             raise InputError(f"{where}: a {name} of {last:g} s, expected at most {LONGEST_TIME:g} s")
-        if peak > LARGEST_CURRENT:
+        most = LARGEST_VOLTAGE if name == "voltage" else LARGEST_CURRENT
+        if peak > most:
             unit = QUANTITIES[name]
-            raise InputError(
-                f"{where}: a {name} of {peak:g} {unit}, expected at most {LARGEST_CURRENT:g} {unit}"
-            )
+            raise InputError(f"{where}: a {name} of {peak:g} {unit}, expected at most {most:g} {unit}")
     return record
 
 
@@ -183,7 +185,7 @@ def _measures(cell: str) -> bool:
         except InputError:
             continue
         return True
-    return cell.strip().lower() in ("v", "volt", "volts")
+    return cell.strip().lower() in ("volt", "volts")
 
 
 def _factor(unit: str, si: str) -> float:

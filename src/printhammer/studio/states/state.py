@@ -16,9 +16,9 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import SHAPES, Sampled, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.hammer.names import range_of
 from printhammer.results import Declared, part, scalar
 from printhammer.studio import bounds
+from printhammer.studio.states.coil import by_voltage, open_constants, span_of
 from printhammer.studio.states.shelf import Shelf
 from printhammer.support.constants import quantities
 
@@ -74,7 +74,20 @@ class State(Declared):
         base = self.base
         for key, value in self.constants:
             check_constant(base, key, value)
-        return base.replace(dict(self.constants), source="set in the studio") if self.constants else base
+        return base.replace(self.settings, source="set in the studio") if self.settings else base
+
+    @cached_property
+    def settings(self) -> dict[str, float]:
+        """The constants that the hammer has otherwise than its file, by dotted key.
+
+        Those of the coil that the file leaves open are among them where a voltage drives it, and only there.
+        """
+        driven = by_voltage(self.base.waveform if self.waveform is None else self._set_waveform)
+        further = open_constants(self.base)
+        kept = {key: value for key, value in self.constants if driven or key not in further}
+        if driven and "coil.resistance" in further:
+            kept = {key: constant.si for key, (constant, _) in further.items()} | kept
+        return kept
 
     @cached_property
     def fired(self) -> Waveform:
@@ -91,7 +104,11 @@ class State(Declared):
                     f"the hammer {self.base.name!r} has no [waveform], expected one set in the editor"
                 )
             return self.changed.waveform
-        fields = dict(self.waveform)
+        return self._set_waveform
+
+    @cached_property
+    def _set_waveform(self) -> Waveform:
+        fields = dict(self.waveform or ())
         shape = fields.pop("shape")
         if shape == Sampled.shape:
             return Sampled.from_samples(fields["times"], fields["values"], quantity=fields["quantity"])
@@ -119,15 +136,14 @@ def check_constant(base: Hammer, key: str, value: float) -> None:
     InputError
         It is one of these.
     """
-    constant = base.constants.get(key)
-    if constant is None or key.startswith("waveform."):
-        known = ", ".join(name for name in base.constants if not name.startswith("waveform."))
+    span = span_of(base, key, bounds.SPAN)
+    if span is None:
+        named = (*base.constants, *open_constants(base))
+        known = ", ".join(name for name in named if not name.startswith("waveform."))
         raise InputError(f"constants.{key} is not known, expected one of {known}")
-    span = range_of(base, key, bounds.SPAN)
     if not span.low <= value <= span.high:
-        raise InputError(
-            f"{key} = {value:.9g} {constant.si_unit}, expected {span.low:.6g} to {span.high:.6g}"
-        )
+        unit = (base.constants.get(key) or open_constants(base)[key][0]).si_unit
+        raise InputError(f"{key} = {value:.9g} {unit}, expected {span.low:.6g} to {span.high:.6g}")
 
 
 @lru_cache(maxsize=8)
@@ -250,8 +266,10 @@ def _waveform(content: Any) -> tuple[tuple[str, Any], ...] | None:
     shape = content["shape"]
     if shape == Sampled.shape:
         table = _table(content, "waveform", {"shape", "times", "values", "quantity"})
-        columns = {name: _samples(table.get(name), f"waveform.{name}") for name in ("times", "values")}
         quantity = _choice(table.get("quantity"), "waveform.quantity", ("current", "force", "voltage"))
+        highest = bounds.LARGEST_VOLTAGE if quantity == "voltage" else bounds.LARGEST_CURRENT
+        ends = {"times": bounds.LONGEST_TIME, "values": highest}
+        columns = {name: _samples(table.get(name), f"waveform.{name}", ends[name]) for name in ends}
         return (("shape", shape), *columns.items(), ("quantity", quantity))
     fields = quantities(SHAPES[shape])
     made = SHAPES[shape].model_fields
@@ -263,7 +281,8 @@ def _waveform(content: Any) -> tuple[tuple[str, Any], ...] | None:
         if table[name] is None and made[name].default is None:
             pairs.append((name, None))
             continue
-        most = bounds.LONGEST_TIME if note.si == "s" else bounds.LARGEST.get(note.si, bounds.LARGEST_CURRENT)
+        unit = "V" if note.also and table.get("quantity") == "voltage" else note.si
+        most = bounds.LONGEST_TIME if unit == "s" else bounds.LARGEST.get(unit, bounds.LARGEST_CURRENT)
         pairs.append((name, _number(table[name], f"waveform.{name}", -most, most)))
     if "decay" in made and "decay" not in fields:
         pairs.append(("decay", _choice(table.get("decay"), "waveform.decay", ("diode", "zener", "rail"))))
@@ -274,10 +293,9 @@ def _waveform(content: Any) -> tuple[tuple[str, Any], ...] | None:
     return tuple(pairs)
 
 
-def _samples(content: Any, where: str) -> tuple[float, ...]:
+def _samples(content: Any, where: str, most: float) -> tuple[float, ...]:
     if not isinstance(content, list) or len(content) > bounds.MOST_SAMPLES:
         raise ProtocolError(f"{where} is expected to be a list of at most {bounds.MOST_SAMPLES} numbers")
-    most = bounds.LARGEST_CURRENT if where.endswith("values") else bounds.LONGEST_TIME
     return tuple(_number(value, where, -most, most) for value in content)
 
 

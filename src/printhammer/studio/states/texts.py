@@ -42,8 +42,8 @@ def python_of(state: State) -> str:
         lines.append(f"hammer = ph.load({name!r})")
     else:
         lines.append(f"hammer = ph.Hammer.from_toml({state.base.to_toml()!r})")
-    if state.constants:
-        changes = [f"        {key!r}: {value!r}," for key, value in state.constants]
+    if state.settings:
+        changes = [f"        {key!r}: {value!r}," for key, value in state.settings.items()]
         lines += ["hammer = hammer.replace(", "    {", *changes, "    }", ")"]
     waveform = "hammer.waveform"
     if state.waveform is not None:
@@ -76,7 +76,7 @@ def python_of(state: State) -> str:
 
 def command_of(state: State) -> str:
     """Return the command for the same run; what is changed is read from the files that the studio saves."""
-    hammer = (not state.constants and _name(state)) or HAMMER_FILE
+    hammer = (not state.settings and _name(state)) or HAMMER_FILE
     if state.waveform is None and not state.pattern:
         overlap = "" if state.overlap == "add" else f" --overlap {state.overlap}"
         return f"printhammer run {hammer} --rate '{state.rate!r} Hz' --pulses {state.pulses}{overlap}"

@@ -18,7 +18,8 @@ export function energyView(body, studio) {
     const of = (name) => digits(energy[name] * unit.factor, 3);
     const most = Math.max(...dots.map((dot) => dot.loading_work ?? 0), 1e-12);
     pen.font = FONT;
-    const words = broken(pen, `coil ${of("coil_work")}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")}${energy.damping_loss ? `, damping ${of("damping_loss")}` : ""} ${unit.name}`, width - 12);
+    const supply = energy.supply_work ? `supply ${of("supply_work")}, copper ${of("copper_loss")}, driver ${of("driver_loss")}${energy.eddy_loss ? `, eddy currents ${of("eddy_loss")}` : ""}, ` : "";
+    const words = broken(pen, `${supply}coil ${of("coil_work")}, pack ${of("pack_loss")}, backstop ${of("backstop_loss")}${energy.damping_loss ? `, damping ${of("damping_loss")}` : ""} ${unit.name}`, width - 12);
     const margin = { left: 46, right: 10, top: 24 + 14 * words.length, bottom: 32 };
     const plane = axes(pen, width, height, { low: 0.5, high: dots.length + 0.5, label: "firing", factor: 1, space: 30, whole: true }, { low: 0, high: 1.08 * most, label: `energy, ${unit.name}`, factor: unit.factor }, margin);
     where = plane;

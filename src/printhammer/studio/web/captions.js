@@ -40,10 +40,11 @@ const TEXTS = {
   motion: ({ motion, dots }) => {
     const { fired } = motion;
     const gap = fired.length > 1 ? `, fired every ${shown(fired[1] - fired[0], "s", 4)}` : "";
-    if (!dots) return `The face of the armature against time${gap}.`;
+    const coil = motion.data.u ? ` The coil takes up to ${shown(motion.peak, "A", 3)} from ${shown(motion.supply, "V", 3)}.` : "";
+    if (!dots) return `The face of the armature against time${gap}.${coil}`;
     const { quality } = dots;
     const flight = quality.struck ? ` From firing to paper ${range(quality.flight_low, quality.flight_high, "s")}.` : "";
-    return `${burstText(dots)}${gap}.${flight}`;
+    return `${burstText(dots)}${gap}.${flight}${coil}`;
   },
   line: ({ dots, line }, studio) => {
     if (!dots) return "";
@@ -67,6 +68,7 @@ const TEXTS = {
   strobe: ({ strobe }) => {
     if (!strobe || strobe.reason) return strobe?.reason ?? "";
     const { verdict } = strobe;
+    if (!verdict && strobe.unjudged && strobe.status === "ok") return `The state at each firing of an endless train, without a verdict: ${strobe.unjudged}.`;
     if (!verdict) return strobe.status === "ok" ? "The state at each firing of an endless train; the verdict on it follows." : `An endless train cannot be followed at this rate: ${strobe.status}.`;
     const period = /^period-(\d+)$/.exec(verdict.verdict)?.[1];
     if (period) return period === "1" ? "One point in the end: the train repeats itself with every firing." : `${large(NUMBERS[period] ?? period)} points in the end: the train repeats itself after as many firings.`;

@@ -1,6 +1,7 @@
 // The controls: one row for each constant, with unit, range, hint and reset, in groups that can be searched.
 import { element } from "./dom.js";
 import { choiceRow, sliderRow, textRow } from "./rows.js";
+import { START } from "./state.js";
 import { waveformEditor } from "./waveform.js";
 
 const TITLES = { armature: "Armature and geometry", magnet: "Magnet", spring: "Spring", pack: "Pack", backstop: "Backstop", coil: "Coil" };
@@ -11,6 +12,7 @@ export function buildControls(holder, studio) {
   const search = element("input", { type: "search", placeholder: "search the controls", "aria-label": "search the controls", class: "search" });
   holder.replaceChildren(search);
   const { described } = studio;
+  const start = { ...START, ...described.start };
   const add = (group, options) => {
     const row = sliderRow(options, studio);
     group.append(row.element);
@@ -19,12 +21,12 @@ export function buildControls(holder, studio) {
 
   const drive = group(holder, "Drive", true);
   add(drive, {
-    id: "rate", name: "rate", hint: "Firings per second; a time between them is written 1/660us.", unit: "Hz", low: 50, high: 5000, log: true,
-    get: (state) => state.rate, set: (value) => ({ rate: value }), reset: () => ({ rate: 1200 }),
+    id: "rate", name: "rate", hint: "Firings per second; a time between them is written 1/660us.", unit: "Hz", low: Math.min(50, start.low), high: 5000, log: true,
+    get: (state) => state.rate, set: (value) => ({ rate: value }), reset: () => ({ rate: start.rate }),
   });
   add(drive, {
     id: "pulses", name: "pulses", hint: "Number of firings.", unit: "1", low: 1, high: studio.limits.pulses, whole: true,
-    get: (state) => state.pulses, set: (value) => ({ pulses: value }), reset: () => ({ pulses: 9 }),
+    get: (state) => state.pulses, set: (value) => ({ pulses: value }), reset: () => ({ pulses: start.pulses }),
   });
   const most = studio.limits.pulses;
   const pattern = textRow({
@@ -52,10 +54,14 @@ export function buildControls(holder, studio) {
   rows.push(waveformEditor(pulse, studio, sliderRow));
 
   const sections = new Map();
-  for (const constant of described.constants) {
-    if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, false));
+  const open = described.open ?? [];
+  // What a voltage drives is looked at first.
+  const driven = described.waveform?.quantity === "voltage";
+  const listed = driven ? [...described.constants, ...open].sort((one, other) => (other.section === "coil") - (one.section === "coil")) : [...described.constants, ...open];
+  for (const constant of listed) {
+    if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, driven && constant.section === "coil"));
     add(sections.get(constant.section), {
-      ...constant, id: constant.key, name: constant.symbol, title: constant.meaning,
+      ...constant, id: constant.key, name: constant.unit === "degC" ? "temperature" : constant.symbol, title: constant.meaning,
       hint: `${constant.key}: ${constant.meaning}${constant.unit === "1" ? "" : `, ${constant.unit}`}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
       get: (state) => state.constants[constant.key] ?? constant.value,
       set: (value) => ({ constants: { ...studio.store.state.constants, [constant.key]: value } }),
@@ -66,10 +72,10 @@ export function buildControls(holder, studio) {
     });
   }
   const limits = group(holder, "Map", false);
-  for (const [end, start] of [["low", 500], ["high", 2000]]) {
+  for (const end of ["low", "high"]) {
     add(limits, {
-      id: end, name: `${end === "low" ? "lowest" : "highest"} rate`, hint: "End of the map's axis of firing rates.", unit: "Hz", low: 50, high: 10000, log: true,
-      get: (state) => state[end], set: (value) => ({ [end]: value }), reset: () => ({ [end]: start }),
+      id: end, name: `${end === "low" ? "lowest" : "highest"} rate`, hint: "End of the map's axis of firing rates.", unit: "Hz", low: Math.min(50, start.low), high: 10000, log: true,
+      get: (state) => state[end], set: (value) => ({ [end]: value }), reset: () => ({ [end]: start[end] }),
     });
   }
   searched(holder, search);

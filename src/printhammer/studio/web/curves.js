@@ -15,9 +15,10 @@ export function motionView(body, studio) {
     label: "Displacement and drive against time",
     series: () => [
       { name: "displacement", si: "m", scale: "x", colour: colours().x, values: (f) => f.data.x },
+      ...(studio.frames.motion?.data.u ? [{ name: "voltage", si: "V", scale: "volts", colour: colours().volts, values: (f) => f.data.u, thin: true }] : []),
       { name: quantity(studio), si: studio.frames.motion?.quantity === "force" ? "N" : "A", scale: "drive", colour: colours().drive, values: (f) => f.data.drive, dash: [5, 3] },
     ],
-    scales: (frame) => ({ x: placesRange(frame), drive: driveRange(frame) }),
+    scales: (frame) => ({ x: placesRange(frame), ...driveRanges(frame) }),
     under: (pen, plane, box) => {
       places(pen, plane, box, studio.frames.motion);
       ghosts(pen, plane, studio);
@@ -35,6 +36,7 @@ export function forcesView(body, studio) {
   });
 }
 
+const widthOf = ({ name, thin }) => (thin || name === "total" ? 0.8 : 1.3);
 const forcesOf = (frame) => (frame && `F ${DRAG}` in frame.data ? [...FORCES, DRAG] : FORCES);
 
 function quantity(studio) { return studio.frames.motion?.quantity === "force" ? "force" : "current"; }
@@ -45,11 +47,21 @@ function placesRange(frame) {
   return widened(...ends, 0.06);
 }
 
-function driveRange(frame) {
-  const [low, high] = extent(frame.data.drive, 0, 0);
-  // Below the motion, in the lowest third.
-  const most = Math.max(Math.abs(low), Math.abs(high)) || 1;
-  return [Math.min(low, 0) - 0.05 * most, 3.2 * most];
+/** The ends of the right axes: what drives lies below the motion, in the lowest third, current and voltage on one line at zero. */
+function driveRanges(frame) {
+  const { drive, u } = frame.data;
+  const ends = (u ? [drive, u] : [drive]).map((values) => extent(values, 0, 0));
+  const most = ends.map(([low, high]) => Math.max(Math.abs(low), Math.abs(high)) || 1);
+  const below = Math.max(...ends.map(([low], k) => -low / most[k]));
+  const [current, volts] = most.map((size) => [-(below + 0.05) * size, (3.2 * (below + 1) - below) * size]);
+  return volts ? { drive: current, volts } : { drive: current };
+}
+
+const RIGHT = ["drive", "volts"]; // scales of the axes on the right
+/** Whether a number on a right axis is one that is met. */
+function within(frame, scale, value) {
+  const [low, high] = extent(scale === "volts" ? frame.data.u : frame.data.drive, 0, 0);
+  return value >= 1.01 * low - 1e-9 && value <= 1.01 * high;
 }
 
 function places(pen, plane, box, frame) {
@@ -136,23 +148,24 @@ function curveView(body, studio, kind) {
   function build() {
     const c = colours();
     const series = kind.series();
-    const right = series.find((entry) => entry.scale === "drive");
-    const axis = (scale, si, label, side) => ({
-      scale, side, font: FONT, labelFont: FONT, stroke: right && side !== 2 ? (side === 3 ? c.x : c.drive) : c.muted, labelSize: 16, labelGap: 0, gap: 3,
+    const rights = series.filter((entry) => RIGHT.includes(entry.scale)).reverse();
+    const right = rights.length > 0;
+    const axis = (scale, si, label, side, colour = c.muted) => ({
+      scale, side, font: FONT, labelFont: FONT, stroke: right && side === 3 ? c.x : colour, labelSize: 16, labelGap: 0, gap: 3,
       size: side === 2 ? 18 : 36, label, space: SPACE[side],
       grid: { stroke: c.faint, width: 1, show: side !== 1 }, ticks: { show: false },
       values: (u, ticks) => ticks.map((tick) => (tick === null ? "" : digits(Number((tick * shownIn(u, si).factor).toPrecision(6))))),
       splits: (u, _axis, low, high) => splitsOf(low, high, (side === 2 ? u.bbox.width : u.bbox.height) / uPlot.pxRatio, SPACE[side], shownIn(u, si).factor),
-      ...(side === 1 ? { filter: (u, splits) => splits.map((value) => (value <= 1.01 * (studio.frames.motion?.peak ?? 0) ? value : null)) } : {}),
+      ...(side === 1 ? { filter: (u, splits) => splits.map((value) => (studio.frames.motion && within(studio.frames.motion, scale, value) ? value : null)) } : {}),
     });
     const main = series[0];
     plot?.destroy();
     plot = new uPlot({
       width: size[0], height: size[1], pxAlign: 0, legend: { show: false }, padding: [8, right ? 0 : 8, 0, 0],
       cursor: { sync: { key: "time", setSeries: false, scales: ["t", null] }, drag: { x: true, y: false, setScale: true }, points: { show: false }, bind: { dblclick: () => () => { studio.zoom(null); return null; } } },
-      scales: { t: { time: false, auto: false }, x: { auto: false }, drive: { auto: false } },
-      axes: [axis("t", "s", (u) => `time, ${shownIn(u, "s").name}`, 2), axis("x", main.si, `${kind.series().length > 2 ? "force" : main.name}, ${unitOf(main.si).name}`, 3), ...(right ? [axis("drive", right.si, `${right.name}, ${unitOf(right.si).name}`, 1)] : [])],
-      series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: entry.name === "total" ? 0.8 : 1.3, dash: entry.dash, points: { show: false } }))],
+      scales: { t: { time: false, auto: false }, x: { auto: false }, drive: { auto: false }, volts: { auto: false } },
+      axes: [axis("t", "s", (u) => `time, ${shownIn(u, "s").name}`, 2), axis("x", main.si, `${right ? main.name : "force"}, ${unitOf(main.si).name}`, 3), ...rights.map((entry) => axis(entry.scale, entry.si, `${entry.name}, ${unitOf(entry.si).name}`, 1, entry.colour))],
+      series: [{ scale: "t" }, ...series.map((entry) => ({ scale: entry.scale, stroke: entry.colour, width: widthOf(entry), dash: entry.dash, points: { show: false } }))],
       hooks: {
         drawAxes: [(u) => { if (studio.frames.motion) scaled(u, kind.under); }],
         draw: [(u) => { if (studio.frames.motion) scaled(u, (pen, plane, box) => { if (!right) key(pen, box, series); }); }],
@@ -162,7 +175,7 @@ function curveView(body, studio, kind) {
     }, [[0, 1], ...series.map(() => [0, 0])], holder);
     made = style();
   }
-  const style = () => JSON.stringify([unitOf("s"), unitOf("m"), unitOf("N"), quantity(studio), kind.series().map((entry) => entry.name), colours()]);
+  const style = () => JSON.stringify([unitOf("s"), unitOf("m"), unitOf("N"), unitOf("A"), quantity(studio), kind.series().map((entry) => entry.name), colours()]);
 
   function draw() {
     const frame = studio.frames.motion;
@@ -196,20 +209,20 @@ function curveView(body, studio, kind) {
     const [low, high] = studio.window ?? [t[0], t[t.length - 1]];
     const series = kind.series();
     const scales = kind.scales(frame);
+    const driven = series.filter((entry) => RIGHT.includes(entry.scale)).reverse();
     const time = timeUnit(high - low);
     const main = unitOf(series[0].si);
     const x = { low, high, label: `time, ${time.name}`, factor: time.factor };
-    const y = { low: scales.x[0], high: scales.x[1], label: `${series.length > 2 ? "force" : series[0].name}, ${main.name}`, factor: main.factor };
-    const driven = series.find((entry) => entry.scale === "drive");
-    const plane = axes(pen, width, height, x, y, driven ? { ...MARGIN, right: 44 } : MARGIN);
-    if (driven) rightAxis(pen, plane.box, scales.drive, frame.peak, driven);
+    const y = { low: scales.x[0], high: scales.x[1], label: `${driven.length ? series[0].name : "force"}, ${main.name}`, factor: main.factor };
+    const plane = axes(pen, width, height, x, y, driven.length ? { ...MARGIN, right: 44 * driven.length } : MARGIN);
+    driven.forEach((entry, k) => rightAxis(pen, plane.box, scales[entry.scale], (value) => within(frame, entry.scale, value), entry, 44 * k));
     inside(pen, plane);
     kind.under(pen, plane, plane.box);
     for (const entry of series) {
       const ends = scales[entry.scale];
       const own = { X: plane.X, Y: (value) => plane.box.y + plane.box.h * (1 - (value - ends[0]) / (ends[1] - ends[0])) };
       pen.strokeStyle = entry.colour;
-      pen.lineWidth = entry.name === "total" ? 0.8 : 1.3;
+      pen.lineWidth = widthOf(entry);
       pen.setLineDash(entry.dash ?? []);
       curve(pen, own, t, entry.values(frame));
     }
@@ -225,8 +238,8 @@ function curveView(body, studio, kind) {
   return { update: (what) => what === "motion" && draw(), draw, cursor, paint, table };
 }
 
-/** Write the scale of the drive on the right, up to its peak. */
-function rightAxis(pen, box, [low, high], peak, { name, si, colour }) {
+/** Write the scale of the drive on the right, as far as it is met. */
+function rightAxis(pen, box, [low, high], met, { name, si, colour }, away) {
   const unit = unitOf(si);
   pen.save();
   pen.font = FONT;
@@ -235,10 +248,10 @@ function rightAxis(pen, box, [low, high], peak, { name, si, colour }) {
   pen.textBaseline = "middle";
   for (const tick of ticks(low * unit.factor, high * unit.factor, box.h, 14)) {
     const value = tick / unit.factor;
-    if (value <= 1.01 * peak) pen.fillText(digits(Number(tick.toPrecision(6))), box.x + box.w + 5, box.y + box.h * (1 - (value - low) / (high - low)));
+    if (met(value)) pen.fillText(digits(Number(tick.toPrecision(6))), box.x + box.w + 5 + away, box.y + box.h * (1 - (value - low) / (high - low)));
   }
   pen.textAlign = "center";
-  pen.translate(box.x + box.w + 36, box.y + box.h / 2);
+  pen.translate(box.x + box.w + 36 + away, box.y + box.h / 2);
   pen.rotate(-Math.PI / 2);
   pen.fillText(`${name}, ${unit.name}`, 0, 0);
   pen.restore();

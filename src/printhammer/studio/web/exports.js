@@ -57,11 +57,11 @@ export async function savePage(studio) {
 }
 
 function kept(studio) {
-  const { described, limits, shapes, unitTable, offered, overlay } = studio;
+  const { described, limits, shapes, drivers, decays, unitTable, offered, overlay } = studio;
   const frames = Object.fromEntries(Object.entries(studio.buffers).map(([kind, buffer]) => [kind, base64(buffer)]));
   const measured = overlay && { ...overlay, data: { t: [...overlay.data.t], values: [...overlay.data.values] } };
   const saved = new Date().toISOString().slice(0, 16).replace("T", " ");
-  return { state: studio.store.state, frames, hammer: described, limits, shapes, units: unitTable, offered, overlay: measured, saved };
+  return { state: studio.store.state, frames, hammer: described, limits, shapes, drivers, decays, units: unitTable, offered, overlay: measured, saved };
 }
 
 function base64(buffer) {

@@ -86,7 +86,10 @@ export function findRow(studio) {
       if (ended()) return null;
       const rate = Number((from + k * step > high ? low + ((from + k * step - high) % (high - low)) : from + k * step).toPrecision(6));
       studio.say(`looking for a strange rate: ${shown(rate, "Hz")}, ${k} of ${GRID}; press again to end it`);
-      const { exponent } = await asked("exponent", { rate });
+      const frame = await asked("exponent", { rate });
+      // What is refused at one rate is so at all.
+      if (frame.kind === "refusal") return { text: `no strange rate is looked for: ${frame.reason}` };
+      const { exponent } = frame;
       if (!exponent || !(exponent.value > SURE * exponent.standard_error)) continue;
       const { verdict } = await asked("verdict", { rate });
       if (verdict?.verdict === "strange") return { rate, text: `an endless train at ${shown(rate, "Hz", 6)} never repeats itself, exponent ${verdict.exponent_per_firing.toPrecision(2)} per firing` };

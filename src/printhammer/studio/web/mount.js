@@ -29,7 +29,7 @@ const QUICK = ["motion", "forces", "phase"];
 export function mount(element, send, address = { read: () => "", write: () => {}, address: () => "" }) {
   const studio = {
     element, store: new Store({ ...START }), frames: {}, buffers: {}, ghosts: [], overlay: null, cursor: 0, cursorFrom: null, window: null,
-    described: null, offered: [], limits: {}, shapes: {}, views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
+    described: null, offered: [], limits: {}, shapes: {}, drivers: [], decays: [], views: {}, serial: Math.floor(Math.random() * 2 ** 40), sentAt: new Map(), busy: false, stale: false,
   };
   let follow = () => {};
   let writing = 0;
@@ -146,7 +146,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
   async function load(state, step = true, fresh = false) {
     const frame = await studio.ask("hammer", { name: state.text ? "" : state.hammer, text: state.text });
     if (frame.kind === "refusal") { studio.say(frame.reason, true); return; }
-    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, unitTable: frame.units });
+    Object.assign(studio, { described: frame.hammer, offered: frame.offered, limits: frame.limits, shapes: frame.shapes, drivers: frame.drivers, decays: frame.decays, unitTable: frame.units });
     setUnits(frame.units);
     // A hammer without a pulse opens with one that shows it; what a link sets stays.
     const start = state.waveform ? {} : Object.fromEntries(Object.entries(frame.hammer.start).filter(([key]) => fresh || state[key] === START[key]));
@@ -206,9 +206,9 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     else if (frame.what === "hammer") load({ ...studio.store.state, hammer: "", text: frame.text, constants: {}, waveform: null });
     else if (frame.what === "curves") lay(frame);
   };
-  /** Show measured curves: a displacement over the motion, a current or force as the pulse that is fired. */
+  /** Show measured curves: a displacement over the motion, a current, force or voltage as the pulse that is fired. */
   function lay({ name, data }) {
-    const quantity = ["current", "force"].find((kind) => kind in data);
+    const quantity = ["current", "force", "voltage"].find((kind) => kind in data);
     const shown = [];
     if (data.displacement) {
       studio.overlay = { what: "displacement", name, data: { t: data.t, values: data.displacement } };

@@ -103,7 +103,8 @@ function evaluate(text) {
  */
 export function readQuantity(text, si, shown) {
   // A comma between digits is a decimal one.
-  const plain = text.trim().replace(/(\d),(\d)/g, "$1.$2");
+  const typed = text.trim().replace(/(\d),(\d)/g, "$1.$2");
+  const plain = si === "degC" ? typed.replace(/\s*(°\s*C|degC)$/, "") : typed;
   if (!plain) return { problem: "it is empty" };
   try {
     const read = evaluate(plain);

@@ -11,8 +11,11 @@ function firingAt(motion, time) {
   return last;
 }
 
+/** The voltage across the coil at a time, behind a sign; nothing where none drives it. */
+export const voltageAt = (motion, time, sign) => (motion.data.u ? `${sign}${shown(small(valueAt(motion, motion.data.u, time), 100), "V", 3)}` : "");
+
 const TEXTS = {
-  motion: ({ motion }, time) => `${shown(time, "s")}: ${shown(displacementAt(motion, time), "m")}, ${shown(valueAt(motion, motion.data.v, time), "m/s", 3)}, ${shown(small(valueAt(motion, motion.data.drive, time), motion.peak || 1), motion.quantity === "force" ? "N" : "A", 3)}`,
+  motion: ({ motion }, time) => `${shown(time, "s")}: ${shown(displacementAt(motion, time), "m")}, ${shown(valueAt(motion, motion.data.v, time), "m/s", 3)}, ${shown(small(valueAt(motion, motion.data.drive, time), motion.peak || 1), motion.quantity === "force" ? "N" : "A", 3)}${voltageAt(motion, time, ", ")}`,
   forces: ({ motion }, time, _studio, wide) => {
     const unit = unitOf("N");
     const number = (force) => Number((force * unit.factor).toPrecision(3));

@@ -2,6 +2,7 @@
 import { line } from "./axes.js";
 import { displacementAt, valueAt } from "./curves.js";
 import { surface } from "./pen.js";
+import { voltageAt } from "./readout.js";
 import { colours, FONT } from "./theme.js";
 import { shown, unitOf } from "./units.js";
 
@@ -114,7 +115,7 @@ export function sketchView(body, studio) {
     ruler(pen, X, low, high, height, c);
     pen.fillStyle = c.ink;
     pen.textAlign = "left";
-    pen.fillText(`${shown(studio.cursor, "s")}   ${shown(x, "m")}   ${shown(current, frame.quantity === "force" ? "N" : "A", 3)}`, 8, 14);
+    pen.fillText(`${shown(studio.cursor, "s")}   ${shown(x, "m")}   ${shown(current, frame.quantity === "force" ? "N" : "A", 3)}${voltageAt(frame, studio.cursor, "   ")}`, 8, 14);
     pen.restore();
   }
 

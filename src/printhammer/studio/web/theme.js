@@ -1,5 +1,5 @@
 // Colours of M. Okabe and K. Ito (2008), which the colour-blind can tell apart, in light and in dark.
-const NAMES = ["ink", "muted", "faint", "paper", "panel", "accent", "x", "drive", "pack", "backstop", "spring", "magnet", "damping", "drag", "total", "ghost", "overlay", "lost"];
+const NAMES = ["ink", "muted", "faint", "paper", "panel", "accent", "x", "drive", "pack", "backstop", "spring", "magnet", "damping", "drag", "total", "ghost", "overlay", "lost", "volts"];
 
 let found = {};
 

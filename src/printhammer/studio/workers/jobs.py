@@ -13,7 +13,14 @@ from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, try_map
 from printhammer.studio.pictures.engine import dots_frame, motion_frame
 from printhammer.studio.pictures.printed import line_frame
 from printhammer.studio.pictures.questions import QUESTIONS
-from printhammer.studio.pictures.section import AT_ONCE, LATER, VERDICT_WORK, check_strobe, strobe_frame
+from printhammer.studio.pictures.section import (
+    AT_ONCE,
+    LATER,
+    VERDICT_WORK,
+    check_strobe,
+    no_exponent,
+    strobe_frame,
+)
 from printhammer.studio.work import GivenUp, Patience
 
 if TYPE_CHECKING:
@@ -90,6 +97,12 @@ def _section(order: Order, desk: Desk) -> None:
         desk.tell(strobe_frame(state, serial, points), "strobe", whole=False)
     if desk.rest(REST):
         raise GivenUp
+    if why := no_exponent(state):
+        for points in LATER:
+            patience.check()
+            data = strobe_frame(state, serial, points, unjudged=why)
+            desk.tell(data, "strobe", whole=points == LATER[-1])
+        return
     for points in LATER:
         patience.check()
         begun = patience.spent
