@@ -20,7 +20,7 @@ from printhammer.kernel.model.layout import CAPACITANCE, TURN_RESISTANCE
 from printhammer.kernel.model.modes import HELD_UNLOADING, OK, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
-from printhammer.run.start import initial_state
+from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.threads import Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def tangent_map(
     start: float,
     end: float,
     *,
-    state: tuple[float, float] | None = None,
+    state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> TangentMap:
     """Return the derivative of the state at `end` with respect to the state at `start`.
@@ -151,8 +151,9 @@ def tangent_map(
         The drive.
     start, end : float
         Times, s, anywhere in a run from time 0. At the instant of a switch: the state after it.
-    state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at time 0; by default the rest state.
+    state : sequence of float, optional
+        Displacement, m, and velocity, m/s, at time 0, and what else belongs to it, as for
+        `printhammer.simulate`; by default the rest state.
     tolerance : float, optional
         Error allowed in one step of the run.
 
@@ -191,28 +192,13 @@ def problem_between(
     drive: Drive,
     start: float,
     end: float,
-    state: tuple[float, float] | None,
+    state: Sequence[float] | None,
     tolerance: float,
 ) -> Problem:
     """Return the run of a map from `start` to `end`, s, its arguments checked as `tangent_map` says."""
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
     return _problem(hammer, drive, state, tolerance)
-
-
-def check_plane(drive: Drive) -> None:
-    """Refuse a voltage where a state is displacement and velocity alone.
-
-    Raises
-    ------
-    InputError
-        As said: the current of the coil belongs to its state.
-    """
-    if drive.quantity == "voltage":
-        raise InputError(
-            "the drive is a voltage, expected a current or a force: the states of a section are displacement"
-            " and velocity, without the current of the coil"
-        )
 
 
 def components(mode: float) -> int:
@@ -377,7 +363,8 @@ def standard_error(series: npt.ArrayLike) -> float:
 
 def _problem(hammer: Hammer, drive: Drive, state: Sequence[float] | None, tolerance: float) -> Problem:
     check_tolerance(tolerance)
-    return Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
+    start = initial_state(hammer, None if state is None else state[:2])
+    return Problem(hammer, drive, start, 0.0, tolerance, state_beyond(hammer, state, drive.quantity))
 
 
 def _strobes(

@@ -143,9 +143,29 @@ class Regime(Declared):
         return 1.0 / self.period
 
     @property
-    def has_derivatives(self) -> bool:
-        """Whether derivatives of its motions are known: they do not go through the circuit of the coil."""
-        return self.fired.quantity != "voltage"
+    def is_planar(self) -> bool:
+        """Whether displacement and velocity are all of the state at a section where no current flows.
+
+        Under a voltage they are not with a shorted turn, nor with a capacitor as the supply.
+        """
+        if self.fired.quantity != "voltage":
+            return True
+        turn = getattr(self.hammer.coil, "turn_resistance", None)
+        return not turn and self.fired.supply().capacitance == 0.0
+
+    def check_planar(self) -> None:
+        """Refuse what has more to its state than displacement and velocity.
+
+        Raises
+        ------
+        InputError
+            As `is_planar` says.
+        """
+        if not self.is_planar:
+            raise InputError(
+                "the state at a section is displacement and velocity: expected no shorted turn and no"
+                " capacitor as the supply, whose current and voltage belong to the state as well"
+            )
 
     @property
     def memory(self) -> int:

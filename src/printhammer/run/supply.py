@@ -88,6 +88,25 @@ def inductance(hammer: Hammer, x: float, current: float) -> float:
     return coil.inductance + own
 
 
+def emf(hammer: Hammer, x: float, current: float) -> float:
+    """Return the slope of the flux linkage of the main path along the displacement, Wb/m."""
+    if hammer.magnet is None or not winding_of(hammer).back_emf:
+        return 0.0
+    law = _law(hammer, "magnet_emf")
+    return float(law(np.array(hammer.magnet.packed(hammer.origin)), x, current))
+
+
+def current_of(hammer: Hammer, x: float, linkage: float, main: float) -> float:
+    """Return the current in a coil, A, of its flux linkage and that of its main path, Wb."""
+    coil = winding_of(hammer)
+    if coil.turn_resistance:
+        return (linkage - main) / (coil.leakage or 0.0)
+    if hammer.magnet is None or not coil.back_emf:
+        return linkage / coil.inductance
+    law = _law(hammer, "magnet_current")
+    return float(law(np.array(hammer.magnet.packed(hammer.origin)), x, linkage, coil.inductance))
+
+
 def _law(hammer: Hammer, name: str) -> Any:
     module = import_module(hammer.magnet.module) if hammer.magnet is not None else absent
     return getattr(module, name, None) or getattr(absent, name)

@@ -178,7 +178,7 @@ class Attractors:
                 (self._periodic(points[:, -q:]) if shown(points, q)[0] else self._settling(points, q))[0]
             )
         x, v, branch, *_ = longer.last[0].tolist()
-        if branch >= 0.0 or not self.regime.has_derivatives:
+        if branch >= 0.0:
             return None
         (exponent,) = exponents_onward([(self.regime, (x, v))], CLOUD, self.tolerance, threads=1)
         if not is_positive(exponent):

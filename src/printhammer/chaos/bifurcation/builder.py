@@ -176,12 +176,12 @@ class DiagramBuilder:
         columns, table = self.table.columns, self.table
         begun = {}
         for row, regime in enumerate(table.regimes):
-            x, v, branch, *_ = columns.last[row].tolist()
+            x, v, branch, _memory, *electric = columns.last[row].tolist()
             # A start inside the pack would need its memory; such a train stays undecided.
-            if not regime.has_derivatives or branch >= 0.0 or math.isnan(x):
+            if branch >= 0.0 or math.isnan(x):
                 continue
             if columns.status[row] == OK and not table.cycles[row]:
-                begun[row] = regime, (x, v)
+                begun[row] = regime, (x, v, *(electric if regime.fired.quantity == "voltage" else ()))
         self.known += len(begun)
         done = self.done
         exponents = exponents_onward(

@@ -198,8 +198,6 @@ class Bifurcation(Result, rows="direction column"):
         # Inside the pack, and between firings, the state that is kept is not all that a train goes on from.
         if self.status[row, k] != "ok" or self.phase or (front is not None and x > front):
             return False
-        if not regime.has_derivatives:
-            return False
         points = self.x.shape[2]
         (exponent,) = exponents_onward([(regime, (x, v))], points, self.tolerance, threads=1)
         return is_positive(exponent)

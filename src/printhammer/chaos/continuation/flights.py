@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.chaos.continuation.family import rigid_backstop
 from printhammer.chaos.strobe.map import turns
-from printhammer.derivatives.states import check_plane, follow
+from printhammer.derivatives.states import follow
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
+_CURRENT: Final = "under a voltage the current at a touch belongs to the state"
 _CLOSE: Final = 0.01
 """Part of the period before and after a touch over which the surface is left out."""
 _STILL: Final = 1e-9
@@ -54,8 +55,10 @@ def fly(
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None
+    if regime.fired.quantity == "voltage":
+        nothing = np.full(2, np.nan)
+        return Flight(nothing, np.full((2, 2), np.nan), (math.nan, math.nan), (), place, math.nan, _CURRENT)
     train, _ = regime.train(firings + 1)
-    check_plane(train)
     begin, *_, end = (float(time) for time in regime.moments(train, firings, phase % 1.0))
     close = _CLOSE * regime.period
     state, jacobian, trouble = np.array([place, speed]), np.eye(2), ""
@@ -114,7 +117,6 @@ class NearTouch(Declared):
 def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> list[NearTouch]:
     """Return the turns of an orbit, and its impacts on a rigid backstop, those nearest to a grazing first."""
     train, _ = regime.train(firings + 1)
-    check_plane(train)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     hammer = regime.hammer
     problem = Problem(hammer, train, (float(state[0]), float(state[1])), begin, tolerance)

@@ -24,6 +24,7 @@ from printhammer.errors import InputError
 from printhammer.results import Column, Result, derived, part, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime
+from printhammer.run.supply import current_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -336,13 +337,15 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
 def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: float) -> Strobe:
     """Return the states that the tangent flow passed, judged."""
     firing = np.arange(first, last + 1)
-    x, v, mode, memory = exponent.states.T[:4]
+    x, v, mode, memory, *electric = exponent.states.T
     branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)
-    states = States(train.times(firing), x, v, branch, memory, exponent.status)
+    current = None
+    if electric:
+        rows = zip(x, *electric[:2], strict=True)
+        current = np.array([current_of(train.hammer, *(float(number) for number in row)) for row in rows])
+    states = States(train.times(firing), x, v, branch, memory, exponent.status, current)
     stopped = "" if exponent.ok else exponent.status
     distances = states.distances(train)
-    # Under a voltage a section has no derivative of its own: the states alone decide.
-    alone = stopped or train.drive.quantity == "voltage"
-    ends_at = None if alone else states.settled(train, distances)
+    ends_at = None if stopped else states.settled(train, distances)
     judged = verdict(distances, (first, last), tolerance, exponent, stopped, ends_at)
     return strobe_of(train, firing, states, tolerance, judged)

@@ -12,8 +12,10 @@ import numpy as np
 
 from printhammer.chaos.orbits.newton import CLOSED, Images
 from printhammer.chaos.strobe.map import (
+    CURRENT,
     IN_PACK,
     RANGE_LEFT,
+    STILL_COIL,
     WITH_MEMORY,
     Image,
     image_of,
@@ -21,6 +23,7 @@ from printhammer.chaos.strobe.map import (
     usable,
 )
 from printhammer.run.ensemble import Ensemble
+from printhammer.run.supply import current_scale
 from printhammer.support.threads import mapped, thread_count
 
 if TYPE_CHECKING:
@@ -57,6 +60,7 @@ class FastMaps:
     """Images after `longest` firings at most with derivatives from differences, in an ensemble."""
 
     def __init__(self, regime: Regime, tolerance: float, longest: int, threads: int | None = None) -> None:
+        regime.check_planar()
         self.regime, self.tolerance, self.threads = regime, tolerance, threads
         self.drive, _ = regime.train(longest)
         self.moments = regime.moments(self.drive, longest)
@@ -99,6 +103,10 @@ class FastMaps:
             images.jacobians[rows] = np.stack(slopes, axis=2)
             images.smooth[rows] = True
             why = np.where(kept, IN_PACK, CLOSED)
+            if table.current is not None:
+                limit = STILL_COIL * current_scale(hammer, self.drive)
+                flows = np.abs(table.current[:, 0].reshape(shape)).max(axis=1) > limit
+                why = np.where(flows, CURRENT, why)
             first = np.argmax(stopped, axis=1)
             images.reasons[rows] = np.where(stopped.any(axis=1), names[np.arange(len(rows)), first], why)
         return images

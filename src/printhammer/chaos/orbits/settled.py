@@ -79,7 +79,7 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
 
     Points, shape (m, k), are displacement, m, velocity, m/s, and what else belongs to the state, at
     successive sections; the scales, shape (k,), the half-widths of the window. Where no derivative is to be
-    had, because a section falls into the pack or on a touch without velocity, or a voltage drives the coil,
+    had, because a section falls into the pack or on a touch without velocity, or a current flows there,
     the states alone decide.
     """
     scaled = (points / scales)[np.newaxis]
@@ -88,7 +88,7 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
     for count in divisors:
         if shown(scaled, count)[0]:
             return Settled(count, states[-count:].copy())
-    if not regime.has_derivatives:
+    if not regime.is_planar:
         return _by_states(points, scaled, period)
     maps = ExactMaps(regime, MAP_TOLERANCE, 1)
     for count in divisors:

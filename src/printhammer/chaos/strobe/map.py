@@ -7,6 +7,7 @@ tangent flow passes it by the saltation matrix (docs/tangent.md).
 A section lies at a fixed phase of the period. There the state is displacement and velocity, unless the
 armature is just then in the pack on its way out: then what the pack remembers belongs to it too, and the
 image says "in the pack"; another phase of the period is to be chosen, at which that does not happen.
+Behind a rail no current is to flow at the section, else the image says "a current flows".
 """
 
 from __future__ import annotations
@@ -17,15 +18,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.derivatives.states import check_plane, follow
+from printhammer.derivatives.states import follow
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.kernel.model.layout import LINKAGE_SCALE
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import Problem, Record, check_tolerance
 from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
+from printhammer.run.supply import emf, linkage
 from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
@@ -46,6 +49,8 @@ WITH_MEMORY: Final = tuple(
     MODE_NAMES.index(name) for name in ("unloading", "reloading", "held on the unloading branch")
 )
 """Modes whose state has a memory."""
+CURRENT: Final = "a current flows"
+"""Status where the coil carries a current at a section under a voltage, which belongs to the state then."""
 _OK: Final = "ok"
 RANGE_LEFT: Final = "range left"
 """Status where no motion can be at a displacement."""
@@ -53,6 +58,8 @@ RANGE_LEFT: Final = "range left"
 _TURN_STEPS: Final = 60
 _STILL: Final = 1e-9
 """Speed, in units of the typical one, below which an extremum is found: its place is exact to the square."""
+STILL_COIL: Final = 1e-9
+"""Current, or flux linkage of one, in units of the typical one, that counts as none."""
 _SPACING: Final = 1e-4
 """Relative change of a constant by which a slope is taken."""
 
@@ -68,8 +75,8 @@ class Image(Declared):
         " (2, 2); NaN likewise"
     )
     status: str = part(
-        '"ok"; how the run ended otherwise; or "in the pack" where the state at the start or the end has a'
-        " memory"
+        '"ok"; how the run ended otherwise; "in the pack" where the state at the start or the end has a'
+        ' memory; or "a current flows" where one does at the end'
     )
     smooth: bool = part(
         "False where the motion passes a touch without velocity, where the state has no derivative"
@@ -246,8 +253,8 @@ def image_of(
     regime: Regime, state: FloatArray, firings: int, tolerance: float, *, contacts: bool = True
 ) -> Image:
     """Do as `strobe_map` with arguments that are known to be right."""
+    regime.check_planar()
     train, _ = regime.train(firings)
-    check_plane(train)
     moments = regime.moments(train, firings)
     start = float(state[0]), float(state[1])
     if not possible(regime.hammer, *start):
@@ -255,9 +262,18 @@ def image_of(
     if not usable(regime.hammer, *start):
         return _no_image(IN_PACK)
     problem = Problem(regime.hammer, train, start, float(moments[0]), tolerance)
-    followed = follow(problem, moments[[0, -1]], np.eye(3), renormalise=False)
+    columns = np.eye(problem.state_size)[:, :3]
+    if problem.laws.circuit:
+        # Without a current the linkage is that of the place.
+        columns[3, 0] = emf(regime.hammer, start[0], 0.0)
+    followed = follow(problem, moments[[0, -1]], columns, renormalise=False)
     if followed.status_name != _OK:
         return _no_image(followed.status_name)
+    if problem.laws.circuit:
+        x, linked = float(followed.states[-1, 0]), float(followed.states[-1, 4])
+        limit = STILL_COIL * float(problem.constants[LINKAGE_SCALE])
+        if not abs(linked - linkage(regime.hammer, x, 0.0)) <= limit:
+            return _no_image(CURRENT)
     if int(followed.states[-1, 2]) in WITH_MEMORY:
         return _no_image(IN_PACK)
     touched: tuple[tuple[str, float], ...] = ()

@@ -137,12 +137,12 @@ def _settled(
 def largest_multiplier(train: Train, states: States, period: int, tolerance: float) -> float:
     """Return the largest absolute eigenvalue of the derivative of the state after a period by that before it.
 
-    Infinite where the period begins inside the pack, where the state has a memory, or the derivative is not
-    known.
+    Infinite where the period begins inside the pack, where the state has a memory, where a shorted turn or a
+    capacitor belongs to it, or the derivative is not known.
     """
     from printhammer.derivatives.states import tangent_map
 
-    if _in_pack(train, states, -1) or not train.regime.has_derivatives:
+    if _in_pack(train, states, -1) or not train.regime.is_planar:
         return np.inf
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
     tangent = tangent_map(
@@ -153,7 +153,8 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
         state=_state(states, -1),
         tolerance=tolerance,
     )
-    if not tangent.ok or not tangent.smooth or tangent.matrix.shape != (2, 2):
+    size = 2 if states.current is None else 3
+    if not tangent.ok or not tangent.smooth or tangent.matrix.shape != (size, size):
         return np.inf
     return float(np.abs(np.linalg.eigvals(tangent.matrix)).max())
 
@@ -174,7 +175,7 @@ def _followed(
     verdicts = {
         i: verdict(row, judged, tolerance, None, why, ends_at[i])
         for i, (row, why) in enumerate(zip(distances, stopped, strict=True))
-        if why or not exponents or period_of(row) is not None or not trains[i].regime.has_derivatives
+        if why or not exponents or period_of(row) is not None
     }
     left = [i for i in range(len(trains)) if i not in verdicts]
     # A start inside the pack would need its memory; such a train gets its exponent the long way.
@@ -195,5 +196,6 @@ def _in_pack(train: Train, states: States, row: int) -> bool:
     return train.hammer.front is not None and bool(states.x[row] > train.hammer.front)
 
 
-def _state(states: States, row: int) -> tuple[float, float]:
-    return float(states.x[row]), float(states.v[row])
+def _state(states: States, row: int) -> tuple[float, ...]:
+    current = () if states.current is None else (float(states.current[row]),)
+    return float(states.x[row]), float(states.v[row]), *current

@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.chaos.orbits.settled import Settled, settled
 from printhammer.chaos.strobe.handing import FROM_REST, STRETCH, forgets, handed_on, pack_branches
-from printhammer.chaos.strobe.verdict import UNKNOWN, Verdict, period_of, repeats, verdict
+from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.supply import current_scale
@@ -160,11 +160,7 @@ def run_trains(
         lambda i: None if stopped[i] else watched[i].settled(trains[i], distances[i]), range(total), threads
     )
     open_cases = [
-        i
-        for i in range(total)
-        if not stopped[i]
-        and trains[i].regime.has_derivatives
-        and (every_exponent or period_of(distances[i]) is None)
+        i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
     ]
     tell = shifted(progress, 2 * total - len(open_cases), 2 * total)
     exponents = exponents_of(
@@ -179,7 +175,6 @@ def run_trains(
             growth.get(i),
             stopped[i],
             ends_at[i],
-            *(() if trains[i].regime.has_derivatives else (UNKNOWN,)),
         )
         for i in range(total)
     ]
@@ -255,7 +250,7 @@ def _in_stretches(
 
 
 def exponents_onward(
-    begun: Sequence[tuple[Regime, tuple[float, float]]],
+    begun: Sequence[tuple[Regime, tuple[float, ...]]],
     points: int,
     tolerance: float,
     *,
@@ -267,12 +262,8 @@ def exponents_onward(
     Over so many points, after a hundred firings.
     """
     window = _BEFORE + 1, _BEFORE + points
-    from printhammer.derivatives.states import check_plane
-
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
     trains = [Train(regime, regime.pulses(window[1] + 2), state) for regime, state in begun]
-    for train in trains:
-        check_plane(train.drive)
     return exponents_of(trains, window, tolerance, threads=threads, progress=progress)
 
 

@@ -35,9 +35,6 @@ FIRST: Final = 1001
 LAST: Final = 2000
 """Last firing that is judged unless told otherwise."""
 
-UNKNOWN: Final = "no exponent, since derivatives do not go through the circuit of the coil"
-"""Why there is no exponent under a voltage."""
-
 _STOPPED: Final = "the run ended before firing"
 
 
@@ -165,13 +162,12 @@ def verdict(
     exponent: Exponent | None,
     stopped: str = "",
     settled: Settled | None = None,
-    unknown: str = "the exponent was not computed",
 ) -> Verdict:
     """Judge a train by the distances from `repeats` between the first and the last of some firings.
 
     `exponent` is the largest one over these firings, None where it was not computed; `stopped` says how the
     run ended if that was before the last of them. `settled` is what became of the number after which the
-    states agree; without it that is the period. `unknown` says why there is no exponent.
+    states agree; without it that is the period.
     """
     period = None if stopped else period_of(distances)
     closest = period
@@ -184,7 +180,7 @@ def verdict(
         period, reason = settled.period, settled.reason
         closest = period or closest
     elif period is None:
-        strange, reason = _strange(exponent, unknown)
+        strange, reason = _strange(exponent)
     return Verdict(
         name="strange" if strange else ("undecided" if period is None else f"period-{period}"),
         period=period,
@@ -205,10 +201,10 @@ def is_positive(exponent: Exponent) -> bool:
     return bool(exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error)
 
 
-def _strange(exponent: Exponent | None, unknown: str) -> tuple[bool, str]:
+def _strange(exponent: Exponent | None) -> tuple[bool, str]:
     """Return whether neighbouring motions part, or why one cannot tell."""
     if exponent is None:
-        return False, f"no period, and {unknown}"
+        return False, "no period, and the exponent was not computed"
     if not exponent.ok:
         return False, f"no period, and the tangent flow ended early: {exponent.status}"
     if not exponent.smooth:

@@ -206,7 +206,7 @@ def why_undecided(result: Bifurcation) -> list[str]:
     """Return why trains that came to their end are undecided, a sentence for each reason."""
     import numpy as np
 
-    from printhammer.chaos.strobe.verdict import SIGNIFICANT, UNKNOWN
+    from printhammer.chaos.strobe.verdict import SIGNIFICANT
 
     exponents, errors = result.exponents, result.standard_errors
     undecided = (result.verdicts == "undecided") & (result.status == "ok")
@@ -220,9 +220,7 @@ def why_undecided(result: Bifurcation) -> list[str]:
         (known & ~settling, "the exponent lies within three standard errors of zero"),
         (
             undecided & ~known,
-            "no exponent was computed: --exponents does so, except where a touch grazes"
-            if result.regime.has_derivatives
-            else UNKNOWN,
+            "no exponent was computed: --exponents does so, except where a touch grazes",
         ),
     )
     every = int(undecided.sum())
