@@ -121,8 +121,8 @@ def test_a_period_includes_the_current() -> None:
 @pytest.mark.parametrize(
     ("state", "sentence"),
     [
-        ((1e-4,), "expected displacement in m"),
-        ((1e-4, 0.0, math.inf), "expected displacement in m"),
+        ((1e-4,), "expected two finite numbers"),
+        ((1e-4, 0.0, math.inf), "expected two finite numbers"),
         ((1e-4, 0.0, 0.1, 0.2, 0.0), "no shorted turn"),
         ((1e-4, 0.0, 2.0, 2e-4), "more than its front"),
     ],
@@ -139,3 +139,21 @@ def test_a_current_in_a_state_needs_a_voltage() -> None:
         ph.simulate(hammer, drive, state=(1e-4, 0.0, 0.1))
     with pytest.raises(ph.InputError, match="under a voltage then with the current"):
         ph.Ensemble(hammer, drive, 1e-3, states=[1e-4, 0.0, 0.1]).run()
+
+
+def test_members_under_a_voltage_are_single_runs_on_any_number_of_threads() -> None:
+    hammer = on_a_rail()
+    drives = [ph.PulseTrain(DRIVERS[0], rate=rate, pulses=3) for rate in (900.0, 1000.0, 1100.0)]
+    ensemble = ph.Ensemble(hammer, drives, 4e-3, tolerance=1e-9)
+    alone, both = (ensemble.run(strobes="firings", threads=count).strobes for count in (1, 2))
+    assert alone is not None
+    assert both is not None
+    assert alone.current is not None
+    np.testing.assert_array_equal(alone.x, both.x)
+    np.testing.assert_array_equal(alone.current, both.current)
+    for member, drive in enumerate(drives):
+        motion = ensemble.motion(member)
+        assert alone.x[member].tolist() == motion.strobe[1].tolist()
+        assert alone.current[member].tolist() == [motion.state_at(t)[4] for t in drive.times.tolist()]
+    with pytest.raises(ph.InputError, match="do not allow lanes"):
+        ensemble.run(engine="lanes")
