@@ -12,7 +12,12 @@ import printhammer as ph
 from printhammer.chaos import strobes
 from printhammer.chaos.bifurcation.columns import run_columns
 from printhammer.chaos.strobe.handing import FROM_REST
+from printhammer.cli.units import Units
+from printhammer.cli.verbs.chaos.strobe import summary
+from printhammer.control.least_work.burst import least_work
 from printhammer.drive.waveforms.drivers import Capacitor, Chopper, Rail
+from printhammer.identify.bench.benches import _currents
+from printhammer.printing.rates.damping import damping_study
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.regime import Regime
 
@@ -157,3 +162,22 @@ def test_members_under_a_voltage_are_single_runs_on_any_number_of_threads() -> N
         assert alone.current[member].tolist() == [motion.state_at(t)[4] for t in drive.times.tolist()]
     with pytest.raises(ph.InputError, match="do not allow lanes"):
         ensemble.run(engine="lanes")
+
+
+def test_sentences_name_the_voltage_and_a_magnet_is_measured_up_to_the_current_of_the_rail() -> None:
+    hammer = on_a_rail().replace("waveform", DRIVERS[0])
+    for refuse in (
+        lambda: least_work(hammer, rate="900 Hz", dots=2),
+        lambda: damping_study(hammer),
+    ):
+        with pytest.raises(ph.InputError, match="the waveform is a voltage, expected a current"):
+            refuse()
+    assert _currents(hammer).max() == pytest.approx(100.0 / 28.6, rel=1e-12)
+
+
+def test_the_terminal_shows_the_current_of_strobe_points() -> None:
+    with interpreted():
+        points = ph.strobe(on_a_rail(), period=1e-3, waveform=DRIVERS[0], points=2, verdict=False)
+    rows = dict(summary(points, Units.SI))
+    assert rows["current"] is not None
+    assert rows["current"].endswith(" A")
