@@ -12,7 +12,12 @@ import printhammer as ph
 from printhammer.chaos import strobes
 from printhammer.chaos.bifurcation.columns import run_columns
 from printhammer.chaos.strobe.handing import FROM_REST
+from printhammer.cli.units import Units
+from printhammer.cli.verbs.chaos.strobe import summary
+from printhammer.control.least_work.burst import least_work
 from printhammer.drive.waveforms.drivers import Capacitor, Chopper, Rail
+from printhammer.identify.bench.benches import _currents
+from printhammer.printing.rates.damping import damping_study
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.regime import Regime
 
@@ -121,8 +126,8 @@ def test_a_period_includes_the_current() -> None:
 @pytest.mark.parametrize(
     ("state", "sentence"),
     [
-        ((1e-4,), "expected displacement in m"),
-        ((1e-4, 0.0, math.inf), "expected displacement in m"),
+        ((1e-4,), "expected two finite numbers"),
+        ((1e-4, 0.0, math.inf), "expected two finite numbers"),
         ((1e-4, 0.0, 0.1, 0.2, 0.0), "no shorted turn"),
         ((1e-4, 0.0, 2.0, 2e-4), "more than its front"),
     ],
@@ -139,3 +144,40 @@ def test_a_current_in_a_state_needs_a_voltage() -> None:
         ph.simulate(hammer, drive, state=(1e-4, 0.0, 0.1))
     with pytest.raises(ph.InputError, match="under a voltage then with the current"):
         ph.Ensemble(hammer, drive, 1e-3, states=[1e-4, 0.0, 0.1]).run()
+
+
+def test_members_under_a_voltage_are_single_runs_on_any_number_of_threads() -> None:
+    hammer = on_a_rail()
+    drives = [ph.PulseTrain(DRIVERS[0], rate=rate, pulses=3) for rate in (900.0, 1000.0, 1100.0)]
+    ensemble = ph.Ensemble(hammer, drives, 4e-3, tolerance=1e-9)
+    alone, both = (ensemble.run(strobes="firings", threads=count).strobes for count in (1, 2))
+    assert alone is not None
+    assert both is not None
+    assert alone.current is not None
+    np.testing.assert_array_equal(alone.x, both.x)
+    np.testing.assert_array_equal(alone.current, both.current)
+    for member, drive in enumerate(drives):
+        motion = ensemble.motion(member)
+        assert alone.x[member].tolist() == motion.strobe[1].tolist()
+        assert alone.current[member].tolist() == [motion.state_at(t)[4] for t in drive.times.tolist()]
+    with pytest.raises(ph.InputError, match="do not allow lanes"):
+        ensemble.run(engine="lanes")
+
+
+def test_sentences_name_the_voltage_and_a_magnet_is_measured_up_to_the_current_of_the_rail() -> None:
+    hammer = on_a_rail().replace("waveform", DRIVERS[0])
+    for refuse in (
+        lambda: least_work(hammer, rate="900 Hz", dots=2),
+        lambda: damping_study(hammer),
+    ):
+        with pytest.raises(ph.InputError, match="the waveform is a voltage, expected a current"):
+            refuse()
+    assert _currents(hammer).max() == pytest.approx(100.0 / 28.6, rel=1e-12)
+
+
+def test_the_terminal_shows_the_current_of_strobe_points() -> None:
+    with interpreted():
+        points = ph.strobe(on_a_rail(), period=1e-3, waveform=DRIVERS[0], points=2, verdict=False)
+    rows = dict(summary(points, Units.SI))
+    assert rows["current"] is not None
+    assert rows["current"].endswith(" A")

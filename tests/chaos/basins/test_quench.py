@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import printhammer as ph
 from printhammer.chaos.basins.quench import QuenchMap, TwoPulseDrive, two_pulse_drives
 from printhammer.drive.segments import table
+from printhammer.drive.waveforms.drivers import Rail
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 
 TIGHT = 1e-11
@@ -196,3 +197,20 @@ def test_a_hammer_that_cannot_be_mapped_is_refused(hammer: "ph.Hammer") -> None:
         with pytest.raises(ph.InputError, match=said):
             ph.quench_map(bare)
     assert math.isfinite(ph.quench_map(hammer, gaps=(6e-4, 7e-4, 2), widths=(3e-4, 4e-4, 2)).single_force)
+
+
+def test_a_driver_s_second_pulse_comes_after_its_own_gap() -> None:
+    """The latest firing of a driver replaces what was fired before; each cell is a run of its two pulses."""
+    hammer = ph.load("hendriks-1983").replace("coil", {"resistance": "28.6 ohm", "inductance": "6.5 mH"})
+    rail = Rail(voltage=100.0, width=177e-6, decay="diode", decay_resistance=159.0)
+    gaps, widths = (0.6e-3, 0.8e-3, 2), (120e-6, 180e-6, 2)
+    found = ph.quench_map(hammer, gaps=gaps, widths=widths, waveform=rail, tolerance=1e-9, threads=1)
+    for row, gap in enumerate(gaps[:2]):
+        for column, width in enumerate(widths[:2]):
+            pair = (rail, rail.model_copy(update={"width": width}))
+            drive = ph.PulseSequence(pair, [0.0, gap])
+            dot = ph.simulate(hammer, drive, duration=gap + found.tail, tolerance=1e-9).dots[1]
+            assert found.struck[row, column] == dot.struck
+            if dot.struck:
+                assert found.force[row, column] == pytest.approx(dot.peak_force, rel=1e-6)
+    assert np.ptp(np.nan_to_num(found.force), axis=0).min() > 1.0

@@ -58,6 +58,8 @@ def summary(result: Strobe, units: Units) -> list[tuple[str, str | None]]:
         ("displacement", range_with_unit(result.x[known], "length", units)),
         ("velocity", range_with_unit(result.v[known], "speed", units)),
     ]
+    if result.current is not None:
+        rows.append(("current", range_with_unit(result.current[known], "current", units)))
     judged = result.verdict
     if judged is None:
         return rows
