@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from tests.tangents import SHARP, SMALLEST
 
+from printhammer.derivatives.constants import flow, rest_columns
+from printhammer.derivatives.parameters import Parameter, parameter_names, parameters
 from printhammer.derivatives.states import follow, state_rows
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
 from printhammer.kernel.model.layout import CHARGED, CURRENT_SCALE, LINKAGE_SCALE, RESISTANCE
 from printhammer.kernel.model.modes import RELOADING, UNLOADING
 from printhammer.kernel.single import carry
@@ -83,15 +88,15 @@ def deviation(
 ) -> float:
     """Difference between flow and differences of runs over the norm of the latter, in typical sizes."""
     problem = problem_of(hammer, drive)
-    flow: Flow = follow(problem, np.array([start, end]), np.eye(6), renormalise=False)
-    assert flow.status_name == "ok"
-    assert flow.smooth
+    followed: Flow = follow(problem, np.array([start, end]), np.eye(6), renormalise=False)
+    assert followed.status_name == "ok"
+    assert followed.smooth
     units = units_of(problem)
-    first = flow.states[0, [0, 1, 3, 4, 5, 6]]
-    branch, path = int(flow.states[0, 2]), float(flow.states[0, 7])
+    first = followed.states[0, [0, 1, 3, 4, 5, 6]]
+    branch, path = int(followed.states[0, 2]), float(followed.states[0, 7])
     begun = Problem(hammer, drive, (float(first[0]), float(first[1])), start, SHARP)
     begun.scales, begun.control = problem.scales, problem.control
-    columns, rows = (state_rows(problem, code) for code in flow.states[:, 2])
+    columns, rows = (state_rows(problem, code) for code in followed.states[:, 2])
 
     def difference(j: int, step: float) -> np.ndarray:
         move = np.zeros(6)
@@ -103,5 +108,60 @@ def deviation(
         return settled(lambda step: difference(j, step), size, levels, units)
 
     truth = np.array([column(j) for j in columns]).T[rows] / units[rows, np.newaxis]
-    own = flow.columns[np.ix_(rows, columns)] * units[columns] / units[rows, np.newaxis]
+    own = followed.columns[np.ix_(rows, columns)] * units[columns] / units[rows, np.newaxis]
     return float(np.linalg.norm(own - truth)) / max(float(np.linalg.norm(truth)), SMALLEST)
+
+
+def changed(
+    hammer: ph.Hammer, drive: ph.PulseTrain, name: str, value: float
+) -> tuple[ph.Hammer, ph.PulseTrain]:
+    """Hammer and drive with another value of a constant."""
+    section, _, last = name.rpartition(".")
+    waveform, times = drive.waveform, drive.times.tolist()
+    if section == "waveform":
+        other = type(waveform)(**{**waveform.model_dump(), last: value})
+        return hammer, PulseTrain(other, at=times, overlap=drive.overlap)
+    if name == "period":
+        return hammer, PulseTrain(waveform, at=[k * value for k in range(len(times))], overlap=drive.overlap)
+    return hammer.replace(name, value), drive
+
+
+def deviations(
+    hammer: ph.Hammer, drive: ph.PulseTrain, end: float, names: list[str] | None = None
+) -> dict[str, float]:
+    """Difference between the columns of constants and differences of runs from rest, by constant.
+
+    Over the norm of the latter, in typical sizes; a constant at an end of its range is left out.
+    """
+    problem = problem_of(hammer, drive)
+    wanted = []
+    for name in names or parameter_names(hammer, drive):
+        with suppress(InputError):
+            wanted += parameters(hammer, drive, [name])
+    record = problem.run(end)
+    carried = flow(problem, record, wanted, np.array([0.0, end]), rest_columns(problem, wanted))
+    assert carried.smooth
+    rows, units = state_rows(problem, carried.states[1, 2]), units_of(problem)
+    own = carried.changes[1][[0, 1, 2, 8, 9, 10]] / units[:, np.newaxis]
+
+    def final(name: str, value: float) -> np.ndarray:
+        other = problem_of(*changed(hammer, drive, name, value))
+        other.scales, other.control = problem.scales, problem.control
+        node = other.run(end).nodes[-1]
+        memory = node[4] if int(node[3]) in (UNLOADING, RELOADING) else 0.0
+        return np.array([node[1], node[2], memory, *node[5:8]])
+
+    found = {}
+    for k, parameter in enumerate(wanted):
+
+        def difference(step: float, parameter: Parameter = parameter) -> np.ndarray:
+            ends = [
+                final(parameter.name, parameter.value + sign * step * parameter.scale) for sign in (1.0, -1.0)
+            ]
+            return np.asarray((ends[0] - ends[1]) / (2.0 * step))
+
+        with suppress(InputError):
+            truth = settled(difference, 4e-5, 4, units) / units
+            norm = max(float(np.linalg.norm(truth[rows])), SMALLEST)
+            found[parameter.name] = float(np.linalg.norm((own[:, k] - truth)[rows])) / norm
+    return found

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 import printhammer as ph
+from printhammer.chaos.strobe.map import strobe_map
 from printhammer.drive.file import load_drive, save_drive
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.drivers import Bridge, Capacitor, Chopper, PeakAndHold, Rail
 from printhammer.drive.waveforms.shapes import HalfSine, Waveform
+from printhammer.hammer.equilibrium import rest_state
+from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -68,11 +71,9 @@ def test_a_sequence_has_one_supply() -> None:
         PulseSequence([EACH[2], HalfSine(amplitude=1.0, width=1e-3)], at=[0.0, 1e-3])
 
 
-def test_a_voltage_without_derivatives_says_so() -> None:
+def test_sections_without_the_current_say_so() -> None:
     hammer = ph.load("hendriks-1983").replace(
         {"coil": {"resistance": "2 ohm", "inductance": "3 mH"}, "waveform": EACH[0]}
     )
-    with pytest.raises(ph.InputError, match="constants do not go through the circuit"):
-        ph.sensitivities(hammer, ph.PulseTrain(EACH[0], period=1.2e-3, pulses=1))
     with pytest.raises(ph.InputError, match="without the current of the coil"):
-        ph.orbits(hammer, period="1.2 ms")
+        strobe_map(Regime.of(hammer, period="1.2 ms"), (rest_state(hammer), 0.0))

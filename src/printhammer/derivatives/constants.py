@@ -14,10 +14,27 @@ import numpy as np
 
 from printhammer.derivatives.flow import Flow, carry_columns, forcing_of
 from printhammer.derivatives.parameters import Parameter, as_arrays, parameters, rest_changes
-from printhammer.derivatives.states import components, problem_between, state_of
+from printhammer.derivatives.states import problem_between, state_of, state_rows
 from printhammer.kernel.model import modes as M
-from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION
-from printhammer.kernel.variational.layout import SPACING
+from printhammer.kernel.model.layout import (
+    BACKSTOP_PART,
+    CAPACITANCE,
+    CHARGED,
+    CHARGING,
+    COILS,
+    COUPLED,
+    DECAY_PIECE,
+    END,
+    FRONT,
+    MAGNET,
+    PACK,
+    POSITION,
+    RESERVOIR_PIECE,
+    RESISTANCE,
+    SWITCHED_PIECE,
+    TURN_RESISTANCE,
+)
+from printhammer.kernel.variational.layout import ENERGY, SPACING, electric_row
 from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, Record
 
@@ -38,7 +55,8 @@ class ConstantMap(Declared):
     """
 
     matrix: FloatArray = part(
-        "derivative d(state at the end) / d(constant), SI, the state at the start held, shape (2 or 3, n)",
+        "derivative d(state at the end) / d(constant), SI, the state at the start held, shape (2 or 3, n);"
+        " with a circuit up to (6, n)",
         more="NaN if the run ended early",
     )
     constants: tuple[str, ...] = part("names of the constants, in the order of the columns")
@@ -48,7 +66,7 @@ class ConstantMap(Declared):
     state_at_start: tuple[float, float, float] = part("the state there, as of a tangent map")
     state_at_end: tuple[float, float, float] = part("the state there, as of a tangent map")
     rate_at_start: FloatArray = part(
-        "rates of the state in time, just after any switch there, shape (2 or 3,)", repr=False
+        "rates of the state in time, just after any switch there, a number for each component", repr=False
     )
     rate_at_end: FloatArray = part("the same at the end", repr=False)
     smooth: bool = part("False where the motion in between passes a touch without velocity")
@@ -121,12 +139,16 @@ def constant_map(
     wanted = parameters(hammer, drive, constants)
     record = problem.run(end)
     marks = np.array([start, end])
-    carried = flow(problem, record, wanted, marks, np.zeros((3, len(wanted))))
+    carried = flow(problem, record, wanted, marks, np.zeros((problem.state_size, len(wanted))))
     ok = record.status == M.OK
     scales = np.array([parameter.scale for parameter in wanted])
-    before, rows = (components(code) for code in carried.states[:, 2])
-    changes = carried.changes[1, :rows] / scales if ok else np.full((2, len(wanted)), np.nan)
-    rates = _rates(problem, record, marks, carried.states) if ok else np.full((2, 3), np.nan)
+    before, rows = (state_rows(problem, code) for code in carried.states[:, 2])
+    changes = np.full((2, len(wanted)), np.nan)
+    rates = np.full((2, problem.state_size), np.nan)
+    if ok:
+        electric = electric_row(forced=True) - electric_row(forced=False)
+        changes = carried.changes[1, [row + electric * (row >= ENERGY) for row in rows]] / scales
+        rates = _rates(problem, record, marks, carried.states)
     return ConstantMap(
         matrix=changes,
         constants=tuple(constants),
@@ -135,8 +157,8 @@ def constant_map(
         end=end,
         state_at_start=state_of(carried.states[0]),
         state_at_end=state_of(carried.states[1]),
-        rate_at_start=rates[0, :before],
-        rate_at_end=rates[1, :rows],
+        rate_at_start=rates[0, before],
+        rate_at_end=rates[1, rows],
         smooth=carried.smooth,
         status=record.status_name,
     )
@@ -161,10 +183,13 @@ def flow(
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
     """Return the changes of a start from rest at time 0 with constants, shape (3, n): m, m/s, m.
 
-    A pulse fired at that time with a sharp edge begins to act later if its firing does.
+    A pulse fired at that time with a sharp edge begins to act later if its firing does. With a circuit shape
+    (6, n), of a start without current.
     """
     columns = np.zeros((3, len(wanted)))
     columns[0] = rest_changes(problem.hammer, wanted)
+    if problem.laws.circuit:
+        return without_current(problem, wanted, columns)
     begun = problem.firings == 0.0
     if begun.any():
         from printhammer.hammer.static_force import StaticForce
@@ -175,6 +200,42 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
         for k, parameter in enumerate(wanted):
             columns[1, k] = -push / problem.hammer.mass * float(parameter.firings[begun].sum())
     return columns
+
+
+def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
+    """Return the changes of a start without current at time 0, shape (6, n): those of `columns`, Wb, Wb, V.
+
+    The linkage is that of the place; a voltage switched on at that time acts later if its firing does.
+    """
+    magnet: Any = import_module(problem.laws.magnet or problem.laws.absent)
+    linkage = getattr(magnet, "magnet_linkage", None) if problem.constants[COUPLED] else None
+    electric = np.zeros((3, len(wanted)))
+    x, n = float(problem.state[0]), len(problem.firings)
+    begun = (problem.firings == 0.0) if n else np.zeros(0, bool)
+    push = 0.0
+    if begun.any():
+        first = problem.pieces[problem.begins[int(np.flatnonzero(begun)[-1])]]
+        push = float(first[2])
+        if first[1] < SWITCHED_PIECE:
+            push = float(problem.drive.value(0.0))
+        elif first[1] == DECAY_PIECE:
+            push = 0.0
+    for k, parameter in enumerate(wanted):
+        moves = parameter.hammer
+        if linkage is not None:
+            total = 0.0
+            for offset, weight in ((-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)):
+                e = offset * SPACING
+                total += weight * linkage(
+                    (problem.constants + e * moves)[MAGNET:], x + e * columns[0, k], 0.0
+                )
+            electric[:2, k] = total / (12.0 * SPACING)
+        electric[2, k] = moves[CHARGED]
+        if begun.any():
+            electric[0, k] -= push * float(parameter.firings[begun].sum())
+    if problem.constants[TURN_RESISTANCE] == 0.0:
+        electric[1] = 0.0
+    return np.vstack([columns, electric])
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
@@ -213,7 +274,7 @@ def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
 
 def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
     """Return the change [N] of the push of the pack with constants, displacement, velocity and memory."""
-    x, v, mode, peak = (float(number) for number in state)
+    x, v, mode, peak = (float(number) for number in state[:4])
     dx, dv, dp = (float(number) for number in change)
     # No point may leave the pack, and no depth may change much.
     sink = max(abs(dx - moves[FRONT]), abs(dp - moves[FRONT]))
@@ -239,8 +300,33 @@ def _rates(problem: Problem, record: Record, times: FloatArray, states: FloatArr
     table: Any = problem.resample(record, times)
     drive = table[:, 2] if problem.drive.quantity == "force" else 0.0
     acceleration = (table[:, 3:9].sum(axis=1) + drive) / problem.hammer.mass
-    rates = np.zeros((len(times), 3))
+    rates = np.zeros((len(times), problem.state_size))
     moving = states[:, 2] != M.RESTING
     rates[:, 0] = np.where(moving, table[:, 1], 0.0)
     rates[:, 1] = np.where(moving, acceleration, 0.0)
+    if problem.laws.circuit:
+        rates[:, 3:] = _electric_rates(problem, times, table)
+    return rates
+
+
+def _electric_rates(problem: Problem, times: FloatArray, table: FloatArray) -> FloatArray:
+    """Return the rates of the electric state at times of a run, shape (m, 3), from its resampled rows."""
+    c = problem.constants
+    magnetising, current, voltage, reservoir = table[:, 2], table[:, 10], table[:, 11], table[:, 13]
+    rates = np.zeros((len(times), 3))
+    rates[:, 0] = voltage - c[RESISTANCE] * current
+    rates[:, 1] = -c[TURN_RESISTANCE] * (magnetising - current)
+    if c[CAPACITANCE] > 0.0:
+        rates[:, 2] = (c[CHARGED] - reservoir) / (c[CHARGING] * c[CAPACITANCE])
+        for row, t in enumerate(times):
+            fired = int(np.searchsorted(problem.firings, t, side="right")) - 1
+            if fired < 0:
+                continue
+            piece = int(problem.begins[fired])
+            while (
+                problem.pieces[piece, 1] != END and problem.firings[fired] + problem.pieces[piece + 1, 0] <= t
+            ):
+                piece += 1
+            if problem.pieces[piece, 1] == RESERVOIR_PIECE:
+                rates[row, 2] -= c[COILS] * current[row] / c[CAPACITANCE]
     return rates

@@ -185,7 +185,7 @@ class Changes(Declared):
 def changes_of(
     motion: Motion, problem: Problem, record: Record, wanted: Sequence[Parameter], initial: FloatArray
 ) -> Changes:
-    """Return the changes of all quantities of a run from those of its state at time 0, shape (3, n)."""
+    """Return the changes of all quantities of a run from those of its state at time 0, shape (3 or 6, n)."""
     struck = struck_dots(motion, problem, record)
     times = record.nodes[:, 0]
     end = float(times[-1])
@@ -207,7 +207,7 @@ def changes_of(
         for place, name in enumerate(DOT_QUANTITIES):
             if name in changes:
                 result[dot.index, place] = changes[name]
-    return Changes(result, carried.changes[-1, _ENERGY:], carried.smooth)
+    return Changes(result, carried.changes[-1, _ENERGY : _ENERGY + len(RUN_QUANTITIES)], carried.smooth)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.errors import InputError
 from printhammer.kernel.compile.variational import variational
 from printhammer.kernel.model.layout import BACKSTOP_PART, COIL, DAMPING, FRONT, MAGNET, PACK, SPRING
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
@@ -30,20 +29,22 @@ class Flow(Declared):
     """Columns along a run, at times that are called marks."""
 
     states: FloatArray = part(
-        "displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks, shape (m, 4)"
+        "displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks, shape (m, 4); with a"
+        " circuit also electric state and path, as of a node, shape (m, 8)"
     )
     changes: FloatArray = part(
-        "changes at the marks, shape (m, 3 or 7, n): displacement, m; velocity, m/s; latest local maximum, m;"
-        " with constants also work of coil and of a drive force, loss in pack and backstop, J, since the"
-        " first mark"
+        "changes at the marks, shape (m, 3 or 8, n): displacement, m; velocity, m/s; latest local maximum, m;"
+        " with constants also work of coil and of a drive force, loss in pack, backstop and damping, J, since"
+        " the first mark; with a circuit four rows more: flux linkage of the coil and of its shorted turn,"
+        " Wb, voltage of the reservoir, V, and end of a fixed off-time, s"
     )
     growth: FloatArray = part(
         "logarithms of the growth of columns kept orthonormal, each since the mark before, shape (m, n)"
     )
     passed: FloatArray = part(
-        "changes at chosen nodes of the record, before and after the switch there, shape (q, 2, 3 or 7, n)"
+        "changes at chosen nodes of the record, before and after the switch there, shape (q, 2, .., n)"
     )
-    columns: FloatArray = part("the changes at the last mark, shape (3 or 7, n)")
+    columns: FloatArray = part("the changes at the last mark, shape (.., n)")
     smooth: bool = part("whether the motion is differentiable from the first mark to the last")
     status: int = part("code of how the run ended")
 
@@ -121,18 +122,7 @@ def carry_columns(
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
-    """Return what the kernel needs of the changes of "hammer", "firings" and "pieces" with n constants.
-
-    Raises
-    ------
-    InputError
-        A voltage drives the coil: the changes with constants do not go through its circuit.
-    """
-    if problem.laws.circuit:
-        raise InputError(
-            "the drive is a voltage, expected a current or a force: derivatives with respect to constants do"
-            " not go through the circuit of the coil"
-        )
+    """Return what the kernel needs of the changes of "hammer", "firings" and "pieces" with n constants."""
     moves = changes["hammer"]
     count = len(moves)
     away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)
@@ -142,6 +132,7 @@ def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, .
     damping = moves[:, DAMPING:SPRING].any(axis=1)
     laws = V.FIELD_MOVES * field + V.PACK_MOVES * pack
     laws = laws + V.BACKSTOP_MOVES * backstop + V.DAMPING_MOVES * damping
+    laws = laws + V.CIRCUIT_MOVES * moves[:, COIL:].any(axis=1)
     return tuple(
         V.Forcing(
             varied=problem.constants + away[:, np.newaxis] * moves[:, np.newaxis, :],

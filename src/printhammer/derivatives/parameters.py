@@ -20,8 +20,10 @@ from printhammer.drive.waveforms.shapes import Sine, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.names import PERIOD, TIMING, quantities_of, unknown
+from printhammer.kernel.model.layout import SUPPLY
 from printhammer.results import Declared, part
 from printhammer.run.problem import constants_of, scales_of
+from printhammer.run.supply import inductance, typical_current
 from printhammer.support.constants import quantities
 
 if TYPE_CHECKING:
@@ -102,7 +104,8 @@ def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
     """
     changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
-        if parameter.hammer.any():
+        # A supply does not move what is at rest.
+        if parameter.hammer.any() and not parameter.name.startswith("waveform."):
             changes[k] = _rest_change(hammer, parameter)
     return changes
 
@@ -126,6 +129,10 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
             value, unit, meaning = fields[last]
             scale = abs(value) or _natural(unit, hammer, drive)
             pieces = _table_change(lambda moved: _changed(waveform, last, moved), value, scale, name)
+            if drive.quantity == "voltage":
+                packed[SUPPLY : SUPPLY + len(waveform.supply())] = _difference(
+                    lambda moved: np.array(_changed(waveform, last, moved).supply()), value, scale, name
+                )
             return Parameter(name, value, scale, unit, meaning, packed, firings, pieces)
     elif name in TIMING:
         return _spacing(drive, name, packed)
@@ -174,7 +181,10 @@ def _of_waveform(waveform: Waveform) -> dict[str, tuple[float, str, str]]:
     fields = {
         name: (float(getattr(waveform, name)), note.si, note.meaning)
         for name, note in quantities_of(waveform).items()
+        if getattr(waveform, name) is not None
     }
+    if waveform.replaces:
+        return fields
     own = {"amplitude": (waveform.peak, waveform.unit, "largest value of the pulse")}
     return fields if "amplitude" in fields else {**own, **fields}
 
@@ -229,6 +239,10 @@ def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
         "Pa": force / (way * way),
         "A": drive.largest_pulse or 1.0,
     }
+    if drive.quantity == "voltage":
+        known["V"], known["A"] = drive.largest_pulse or 1.0, typical_current(hammer, drive)
+        known["ohm"] = known["V"] / known["A"]
+        known["H"] = abs(inductance(hammer, hammer.origin, 0.0))
     result, divides = 1.0, False
     for factor in unit.replace("/", " / ").split():
         if factor == "/":

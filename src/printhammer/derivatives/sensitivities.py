@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.derivatives.constants import rest_columns
+from printhammer.derivatives.constants import rest_columns, without_current
 from printhammer.derivatives.dots import DOT_QUANTITIES, RUN_QUANTITIES, changes_of, dot_values
 from printhammer.derivatives.parameters import Parameter, parameter_names, parameters
 from printhammer.drive.input import read_number
@@ -298,7 +298,11 @@ def sensitivities(
     wanted, left_out = _constants(hammer, drive, constants)
     end = end_of_run(drive, duration)
     problem = Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
-    initial = np.zeros((3, len(wanted))) if state is not None else rest_columns(problem, wanted)
+    initial = np.zeros((3, len(wanted)))
+    if state is None:
+        initial = rest_columns(problem, wanted)
+    elif problem.laws.circuit:
+        initial = without_current(problem, wanted, initial)
     record = problem.run(end)
     motion = Motion(problem, record, end, np.array([0.0]), "default")
     scales = np.array([parameter.scale for parameter in wanted])

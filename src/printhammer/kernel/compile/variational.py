@@ -12,7 +12,7 @@ import hashlib
 from printhammer.kernel.compile.specialise import Kernel, execute_all, one_at_a_time, source_file
 from printhammer.kernel.variational.layout import changing, electric_row
 
-TEMPLATES = ("slopes", "circuit", "forcing", "columns", "steps", "switches", "flow")
+TEMPLATES = ("slopes", "circuit", "forcing", "supply", "columns", "steps", "switches", "flow")
 
 
 def variational(plain: Kernel, *, forced: bool) -> Kernel:

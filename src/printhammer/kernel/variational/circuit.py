@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         electric_rates,
         fastest_rate,
         kind_of,
+        linkage_at,
         path_of,
         source_of,
         take_path,
@@ -47,12 +48,13 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import (
         CHANGING,
         ELECTRIC_ROW,
+        FORCED,
         HAS_CIRCUIT,
         magnet_emf,
         magnet_force,
         magnet_inductance,
     )
-    from printhammer.kernel.variational.layout import Setting
+    from printhammer.kernel.variational.layout import Forcing, Setting
     from printhammer.kernel.variational.slopes import field_slope
 
 CURRENT_SPACING = 1e-3
@@ -144,6 +146,44 @@ def coil_change(dx: float, linkage: float, turn: float, slopes: Any, hammer: Ham
 
 
 @compiled
+def current_change(x: float, electric: Electric, live: Any, k: int, forcing: Forcing) -> float:
+    """Return the change of the magnetising current [A] with a constant, at a fixed place and linkage."""
+    varied = forcing.varied
+    hammer = varied[k, V.MIDDLE]
+    if not forcing.of_hammer[k] & V.CIRCUIT_MOVES or not couples(hammer, live):
+        return 0.0
+    total, linkage = 0.0, main_linkage(electric, hammer)
+    for i in range(POINTS[CENTRAL]):
+        other = varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])]
+        total += WEIGHTS[CENTRAL, i] * current_at(x, linkage, other)
+    return float(total / V.SPACING)
+
+
+@compiled
+def coil_change_of(x: float, electric: Electric, live: Any, k: int, forcing: Forcing) -> float:
+    """Return the change of the current in the coil [A] with a constant, at a fixed place and linkages."""
+    hammer = forcing.varied[k, V.MIDDLE]
+    if path_of(live) == BLOCKED:
+        return 0.0
+    if hammer[TURN_RESISTANCE] > 0.0:
+        current = (electric[0] - electric[1]) / hammer[LEAKAGE]
+        return float(-current * forcing.moves[k, LEAKAGE] / hammer[LEAKAGE])
+    return current_change(x, electric, live, k, forcing)
+
+
+@compiled
+def linkage_change(x: float, k: int, forcing: Forcing) -> float:
+    """Return the change of the linkage without current [Wb] with a constant, at a fixed place."""
+    if not forcing.of_hammer[k] & V.CIRCUIT_MOVES:
+        return 0.0
+    total = 0.0
+    for i in range(POINTS[CENTRAL]):
+        other = forcing.varied[k, V.MIDDLE + int(OFFSETS[CENTRAL, i])]
+        total += WEIGHTS[CENTRAL, i] * linkage_at(x, 0.0, other)
+    return float(total / V.SPACING)
+
+
+@compiled
 def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: Setting) -> None:
     """Fill in the `rates` of the electric state and its changes at `y`; add to those of the velocities.
 
@@ -206,6 +246,18 @@ def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
         elif path == BLOCKED:
             emf = magnet_emf(hammer[MAGNET:], x, 0.0) if hammer[COUPLED] != 0.0 else 0.0
             columns[ELECTRIC_ROW, k] = emf * columns[0, k]
+            if FORCED:
+                columns[ELECTRIC_ROW, k] += linkage_change(x, k, setting.forcing)
+
+
+@compiled
+def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
+    """Return the change [A] of the current at which the present path ends."""
+    if kind_of(live) != SWITCHED_PIECE:
+        return 0.0
+    if path_of(live) == SOURCE:
+        return float(forcing.live_moves[k, 3])
+    return float(forcing.live_moves[k, 4]) if live[7] >= 0.0 else 0.0
 
 
 @compiled
@@ -214,7 +266,7 @@ def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
 
     The current is continuous there, and so are all forces; only the rate of the coil's linkage jumps.
     """
-    hammer, live = setting.hammer, setting.drive
+    hammer, live, forcing = setting.hammer, setting.drive, setting.forcing
     before, behind = node[ELECTRIC + 3], after[ELECTRIC + 3]
     if before == behind:
         return True
@@ -237,9 +289,14 @@ def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
             later, columns[until, k] = columns[until, k], 0.0
         elif before != BLOCKED:
             linkage, turn = columns[ELECTRIC_ROW, k], columns[ELECTRIC_ROW + 1, k]
-            later = -coil_change(columns[0, k], linkage, turn, slopes, hammer, live) / current_rate
+            ahead = coil_change(columns[0, k], linkage, turn, slopes, hammer, live)
+            if FORCED:
+                ahead += coil_change_of(x, electric, live, k, forcing) - threshold_change(live, k, forcing)
+            later = -ahead / current_rate
             if off_time and behind == CHOPPED:
                 columns[until, k] = later
+                if FORCED:
+                    columns[until, k] -= forcing.live_moves[k, 4]
         for i in range(V.ELECTRICS):
             columns[ELECTRIC_ROW + i, k] += (rates[i] - others[i]) * later
     hold_linkage(x, columns, behind, setting)

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
         memory_slope,
         pack_slopes,
     )
+    from printhammer.kernel.variational.supply import add_supply
 
 LONGEST_PHASE = 0.75
 """Largest phase in one step of the oscillation that a change of the state makes."""
@@ -92,6 +93,8 @@ def column_rates(
         rates[:] = 0.0
         rates[V.TIME] = 1.0
         add_circuit(rates, y, columns.shape[1], y[0], False, setting)
+        if FORCED:
+            add_supply(rates, y, columns.shape[1], y[0], setting)
         return
     if HAS_BACKSTOP and mode == BACKSTOP:
         pace = 2.0 * y[0]
@@ -113,6 +116,8 @@ def column_rates(
     if HAS_CIRCUIT:
         x = hammer[POSITION] - y[0] * y[0] if mode == BACKSTOP else y[0]
         add_circuit(rates, y, columns.shape[1], x, True, setting)
+        if FORCED:
+            add_supply(rates, y, columns.shape[1], x, setting)
     if FORCED:
         add_forcing(rates, y, columns, mode, memory, slopes, setting)
 

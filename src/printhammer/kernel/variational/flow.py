@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.forcing import set_live_moves
     from printhammer.kernel.variational.layout import Carried
     from printhammer.kernel.variational.steps import begin_step, carry
+    from printhammer.kernel.variational.supply import latest_edge, move_edge, rates_at
     from printhammer.kernel.variational.switches import pass_moving_edges, pass_node
 
 
@@ -234,13 +235,20 @@ def flow(
         after = nodes[min(i + 1, count - 1)]
         final = i + 1 == count
         t_end = after[0]
+        pulse, piece = -1, -1
         if FORCED and due > 0:
-            pass_moving_edges(node, train, first, last, columns, setting)
+            if HAS_CIRCUIT and train.replace:
+                pulse, piece = latest_edge(node[0], train, first, last)
+                before = rates_at(node, setting)
+            else:
+                pass_moving_edges(node, train, first, last, columns, setting)
         first, last, edge = pass_edges(node[0], train, first, last)
         if HAS_CIRCUIT:
             take_path(train.live, node[ELECTRIC + 3], math.inf)
         if FORCED:
             set_live_moves(first, last, train, forcing)
+            if HAS_CIRCUIT and pulse >= 0:
+                move_edge(node, before, pulse, piece, columns, setting)
         begin_step(node, work)
         # A mark at the time of several nodes belongs to the last of them.
         while due < marks.size and (marks[due] < t_end or (final and ended and marks[due] == t_end)):

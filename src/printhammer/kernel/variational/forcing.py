@@ -23,6 +23,7 @@ from printhammer.kernel.model.layout import (
     PACK,
     POSITION,
     SPRING,
+    TURN_RESISTANCE,
     Train,
 )
 from printhammer.kernel.model.modes import BACKSTOP, LOADING, RELOADING, UNLOADING
@@ -31,12 +32,14 @@ from printhammer.kernel.variational import layout as V
 from printhammer.kernel.variational.slopes import BACKWARD, CENTRAL, FORWARD, OFFSETS, POINTS, WEIGHTS
 
 if TYPE_CHECKING:
-    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.circuit import driven
+    from printhammer.kernel.model.forces import Hammer, pack_force, value_at
     from printhammer.kernel.model.laws import (
         BACKSTOP_PULLS,
         CHANGING,
         FORCE_DRIVE,
         HAS_BACKSTOP,
+        HAS_CIRCUIT,
         HAS_DAMPING,
         HAS_PACK,
         PACK_PULLS,
@@ -51,7 +54,13 @@ if TYPE_CHECKING:
         pack_switch,
         spring_force,
     )
-    from printhammer.kernel.model.pulses import Drive, drive_value, piece_change, piece_rate
+    from printhammer.kernel.model.pulses import Drive, piece_change, piece_rate
+    from printhammer.kernel.variational.circuit import (
+        current_change,
+        current_slopes,
+        electric_in,
+        force_with_current,
+    )
     from printhammer.kernel.variational.layout import Forcing, Setting
     from printhammer.kernel.variational.slopes import damping_slope, field_slope
 
@@ -89,6 +98,8 @@ def drive_change(t: float, drive: Drive, delayed: Any) -> float:
 @inlined
 def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forcing: Forcing) -> float:
     """Return the slope of magnet and drive force with the drive: N/A, or 1 for a drive that is a force."""
+    if HAS_CIRCUIT:
+        return force_with_current(x, value, hammer)
     if drive[0] == 0.0:
         return 0.0
     if FORCE_DRIVE:
@@ -111,10 +122,14 @@ def field_changes(
 ) -> tuple[float, float, float]:
     """Return the changes [N] of magnet, spring and drive force, and of their parts from coil and drive force.
 
-    `with_value` is the slope of the force with the `value` of the drive.
+    At a fixed flux linkage, if there is one. `with_value` is the slope of the force with the `value` of the
+    drive.
     """
     varied, of_hammer, live_moves = forcing.varied, forcing.of_hammer, forcing.live_moves
-    pulse = with_value * drive_change(t, drive, live_moves[k]) if drive[0] > 0.0 else 0.0
+    if HAS_CIRCUIT:
+        pulse = with_value * current_change(x, drive[1], drive[0], k, forcing)
+    else:
+        pulse = with_value * drive_change(t, drive, live_moves[k]) if drive[0] > 0.0 else 0.0
     total, coil = 0.0, 0.0
     current = 0.0 if FORCE_DRIVE else value
     if of_hammer[k] & V.FIELD_MOVES:
@@ -226,7 +241,8 @@ def add_forcing(
 
     `slopes` are those of `printhammer.kernel.variational.columns.force_slopes` there.
     """
-    scales, bounds, hammer, drive, forcing = setting
+    scales, bounds, hammer, live, forcing = setting
+    drive = driven(live, electric_in(y))
     moves = forcing.moves
     field_x, push_x, _push_v, push_peak, loss_x, loss_v = slopes
     v, t, pace = y[1], y[V.TIME], rates[V.TIME]
@@ -234,12 +250,17 @@ def add_forcing(
     indented = HAS_PACK and mode in (LOADING, UNLOADING, RELOADING)
     w = y[0] if compressed else 0.0
     x = hammer[POSITION] - w * w if compressed else y[0]
-    value = drive_value(t, drive)
+    value = value_at(t, x, hammer, drive)
     with_value = force_with_value(x, value, hammer, drive, forcing)
     coil, coil_x = 0.0, 0.0
     if not FORCE_DRIVE and value != 0.0:
         coil = magnet_force(hammer[MAGNET:], x, value) - magnet_force(hammer[MAGNET:], x, 0.0)
         coil_x = field_x - field_slope(x, 0.0, scales, bounds, hammer)
+    coil_linkage, main = 0.0, 0
+    if HAS_CIRCUIT:
+        current = current_slopes(x, electric_in(y), hammer, live)
+        coil_linkage = current[2] * current[1]
+        main = CHANGING - V.ELECTRICS + int(hammer[TURN_RESISTANCE] > 0.0)
     loss = 0.0
     if compressed:
         loss = backstop_viscous(hammer[BACKSTOP_PART:MAGNET], w, v)
@@ -270,6 +291,8 @@ def add_forcing(
         lost = pace * (lost + loss_v * dv) + loss_x * (dx - surface)
         lost += push_peak * (columns[V.PEAK, k] - surface)
         rates[e + V.COIL] = pace * ((coil_change + coil_x * dx) * v + coil * dv)
+        if HAS_CIRCUIT:
+            rates[e + V.COIL] += pace * coil_linkage * y[j + main] * v
         rates[e + V.DRIVE] = pace * (drive_part * v + value * dv) if FORCE_DRIVE else 0.0
         power = -lost * v - pace * loss * dv
         rates[e + V.PACK_LOSS] = power if indented else 0.0

@@ -46,10 +46,10 @@ MIDDLE = 4
 """Row of `varied` with the constants as they are."""
 VARIED = 9
 """Rows of `varied`: row 4 + j holds the constants with j times `SPACING` of the change."""
-FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES, DAMPING_MOVES = 1, 2, 4, 8
+FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES, DAMPING_MOVES, CIRCUIT_MOVES = 1, 2, 4, 8, 16
 """Bits of `of_hammer`: which laws a column changes; mass and position of the backstop are no law's."""
 DELAYED = 5
-"""Numbers kept for each pulse under way: delay of its piece, changes of p0 to p3."""
+"""Numbers kept for each pulse under way: delay of its piece, changes of p0 to p3, from place 1 on."""
 
 
 class Forcing(NamedTuple):

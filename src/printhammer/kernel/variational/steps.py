@@ -14,6 +14,7 @@ from printhammer.kernel.model.layout import (
     FRONT,
     INVERSE_MASS,
     POSITION,
+    TURN_RESISTANCE,
 )
 from printhammer.kernel.variational.layout import BACKSTOP_LOSS, ELECTRICS, MEMORIES, PEAK, START, TIME
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.methods.contact import contact_rate, length_of
     from printhammer.kernel.methods.dop853 import contact_step
     from printhammer.kernel.model.circuit import driven, path_of
-    from printhammer.kernel.model.forces import Hammer, acceleration
+    from printhammer.kernel.model.forces import Hammer, acceleration, value_at
     from printhammer.kernel.model.laws import (
         ELECTRIC_ROW,
         FORCED,
@@ -30,9 +31,15 @@ if TYPE_CHECKING:
         HAS_PACK,
         MEMORY,
     )
-    from printhammer.kernel.model.pulses import Drive, drive_value
+    from printhammer.kernel.model.pulses import Drive
     from printhammer.kernel.single.resample import memory_of
-    from printhammer.kernel.variational.circuit import couples, electric_in, hold_linkage
+    from printhammer.kernel.variational.circuit import (
+        couples,
+        current_slopes,
+        electric_at_node,
+        electric_in,
+        hold_linkage,
+    )
     from printhammer.kernel.variational.columns import (
         bring_back,
         column_rates,
@@ -95,13 +102,14 @@ def length_in_contact(
 
 
 @compiled
-def place_of_rest(t: float, node: Any, k: int, setting: Setting) -> float:
+def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -> float:
     """Return by how much a constant moves the place where the armature rests [m]."""
-    scales, bounds, hammer, drive, forcing = setting
+    scales, bounds, hammer, live, forcing = setting
     x, mode, moves = node[1], int(node[3]), forcing.moves
     if mode == M.RESTING:
         return float(moves[k, POSITION])
-    value = drive_value(t, drive)
+    drive = driven(live, electric_at_node(node))
+    value = value_at(t, x, hammer, drive)
     with_value = force_with_value(x, value, hammer, drive, forcing)
     change, _coil, _drive = field_changes(t, x, value, with_value, k, drive, forcing)
     if mode == M.HELD:
@@ -111,7 +119,13 @@ def place_of_rest(t: float, node: Any, k: int, setting: Setting) -> float:
     else:
         with_x = pack_slopes(x, 0.0, M.LOADING, 0.0, x, scales, hammer)[0]
         change += pack_change(x, 0.0, M.LOADING, k, forcing) - with_x * moves[k, FRONT]
-    return float(-change / (with_x + field_slope(x, value, scales, bounds, hammer)))
+    with_x += field_slope(x, value, scales, bounds, hammer)
+    if HAS_CIRCUIT:
+        current_x, by_linkage, force = current_slopes(x, electric_at_node(node), hammer, live)
+        main = ELECTRIC_ROW + int(hammer[TURN_RESISTANCE] > 0.0)
+        with_x += force * current_x
+        change += force * by_linkage * columns[main, k]
+    return float(-change / with_x)
 
 
 @compiled
@@ -155,17 +169,17 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
         for k in range(columns.shape[1]):
             place = 0.0
             if FORCED:
-                place = place_of_rest(t_to, node, k, setting)
+                place = place_of_rest(t_to, node, k, columns, setting)
             columns[0, k], columns[1, k] = place, 0.0
             columns[PEAK, k] = 0.0 if int(node[3]) == M.RESTING else place
         return grown
     if FORCED:
         for k in range(columns.shape[1]):
-            columns[0, k] -= place_of_rest(t, node, k, setting)
+            columns[0, k] -= place_of_rest(t, node, k, columns, setting)
     grown = settle(t_to - t, node, columns, setting)
     if FORCED:
         for k in range(columns.shape[1]):
-            place = place_of_rest(t, node, k, setting)
+            place = place_of_rest(t, node, k, columns, setting)
             columns[0, k] = columns[0, k] * math.exp(grown) + place
             columns[1, k] *= math.exp(grown)
         return 0.0
@@ -225,7 +239,7 @@ def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: S
     for k in range(columns.shape[1]):
         columns[0, k] += pause * columns[1, k]
         if FORCED:
-            value = drive_value(t, drive)
+            value = value_at(t, x, hammer, drive)
             with_value = force_with_value(x, value, hammer, drive, forcing)
             change = field_changes(t, x, value, with_value, k, drive, forcing)[0] * hammer[INVERSE_MASS]
             a = acceleration(t, x, 0.0, M.FREE, 0.0, hammer, drive)

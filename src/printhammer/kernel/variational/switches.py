@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import driven
     from printhammer.kernel.model.forces import Hammer, acceleration, backstop_acceleration
     from printhammer.kernel.model.laws import (
+        ELECTRIC_ROW,
         FORCE_DRIVE,
         FORCED,
+        HAS_CIRCUIT,
         HAS_DAMPING,
         RIGID,
         backstop_rebound,
@@ -179,6 +181,11 @@ def pass_edge(
     """Carry the columns through one edge at which the drive jumps by `change`; return its value after it."""
     hammer, forcing = setting.hammer, setting.forcing
     new = value + change
+    if HAS_CIRCUIT:
+        for k in range(columns.shape[1]):
+            later = forcing.fire_moves[k, pulse] + forcing.piece_moves[k, piece, 0]
+            columns[ELECTRIC_ROW, k] -= change * later
+        return new
     mode = int(node[3])
     if change == 0.0 or mode in (M.RESTING, M.HELD, M.HELD_LOADING, M.HELD_UNLOADING):
         return new
