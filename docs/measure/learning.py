@@ -222,6 +222,7 @@ def tolerance_curves(path: Path) -> None:
                 *zip(*points, strict=True), color=colour, linestyle=line, marker=mark, markersize=4, label=way
             )
         ax.set_ylim(-3.0, 103.0)
+        ax.margins(x=0.05)
         ax.set_xlabel("Standard deviations of the production, in parts of those stated")
         ax.set_ylabel("Dots within limits  [%]")
         ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
