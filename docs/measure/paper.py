@@ -5,7 +5,7 @@ has each print the de Bruijn cycle of order 8 on even paper, on paper that varie
 twice as much, and counts the dots within limits: in an open loop, by a table, by one that was learned from
 times of impact and forces, and with feedback. It takes some twenty minutes on one core.
 
-``--units N`` draws another number.
+``--units N`` draws another number, ``--share X`` prints at other rates, in open-loop safe rates.
 """
 
 import argparse
@@ -108,10 +108,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--units", type=int, default=10)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--share", type=float, action="append")
     asked = parser.parse_args()
     hammer = ph.load("hendriks-1983")
     units = Variability().draw(hammer, asked.units, asked.seed)
-    rows = [row for share in (1.0, 1.5) for row in measure(hammer, units, share)]
+    rates = asked.share or [1.0, 1.5]
+    rows = [row for share in rates for row in measure(hammer, units, share)]
     heads = [
         Column(name="rate, in open-loop safe rates", format="g"),
         Column(name="paper"),
@@ -119,7 +121,7 @@ def main() -> None:
         Column(name="dots within limits", unit="%", format=".1f"),
         Column(name="units that print all"),
     ]
-    write("paper", heads, rows, {"units": asked.units, "seed": asked.seed}, ROOMS)
+    write("paper", heads, rows, {"units": asked.units, "seed": asked.seed, "rates": rates}, ROOMS)
 
 
 if __name__ == "__main__":

@@ -93,6 +93,7 @@ def curves(path: Path) -> None:
         right.set_ylabel("Worst dot at 1,275 Hz  [limits]")
         right.legend(fontsize=style.SMALL, frameon=False)
         for ax in (left, right):
+            ax.margins(x=0.05)
             ax.set_xlabel("Tick of the timer  [µs]")
         style.foot(figure, "hendriks-1983")
         drawn = BytesIO()

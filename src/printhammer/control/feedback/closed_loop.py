@@ -7,7 +7,7 @@ shown so far, and nothing else of the hammer that is driven. What comes out is a
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -24,10 +24,18 @@ if TYPE_CHECKING:
 
     from printhammer.drive.sequence import PulseSequence
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 _SOON: Final = 1e-6  # Least time by which a run is carried, s
+_LATER: Final = 5e-6  # By how much a new pack is put off while the armature is inside it or the old one, s
 _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
+
+
+class Leg(NamedTuple):
+    """What runs are driven with, and until when, s, (runs,)."""
+
+    hammers: list[Hammer]
+    ends: FloatArray
 
 
 class FeedbackStrategy(Declared):
@@ -86,9 +94,16 @@ class FeedbackStrategy(Declared):
                 controller.decide(now, policy)
         return loops
 
-    def _driven(self, hammer: Hammer, loop: Loop, dot: int) -> Hammer:
-        """Return the hammer as it is from the touch of the dot before on."""
-        return hammer if self.places is None else self.places[loop.slots[max(dot - 1, 0)]]
+    def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
+        """Return hammers and until when they are driven; a dot's own comes with its firing."""
+        if self.places is None:
+            return [Leg([hammer] * len(now), ends)]
+        before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]
+        after = [self.places[loop.slots[dot]] for loop, dot in now]
+        # At rest it is still to be fired.
+        fired = [loop.pulses[dot].fired if dot < len(loop.pulses) else np.inf for loop, dot in now]
+        turns = np.minimum(fired, ends)
+        return [Leg(before, turns), Leg(after, ends)]
 
     def _see_contacts(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
         """Carry some runs until their latest contacts are over, and learn from these."""
@@ -96,8 +111,7 @@ class FeedbackStrategy(Declared):
         starts = np.array([loop.time for loop in loops])
         over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
         ends = np.maximum(np.array(over) + self.sensor.delay, starts + _SOON)
-        hammers = [self._driven(hammer, loop, dot) for loop, dot in now]
-        contacts, _flights = self._carry(hammers, loops, ends, ends)
+        contacts, _flights = self._carry(self._legs(hammer, now, ends), loops, ends)
         self.controller.learn(loops, contacts)
 
     def _see_flights(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
@@ -107,16 +121,13 @@ class FeedbackStrategy(Declared):
         touches = np.array([loop.touch - LEADS[loop.kind] for loop in loops])
         ends = np.maximum(touches, starts + _SOON)
         since = np.maximum([loop.since for loop in loops], starts)
-        hammers = [self._driven(hammer, loop, dot) for loop, dot in now]
-        contacts, flights = self._carry(hammers, loops, since, ends)
+        contacts, flights = self._carry(self._legs(hammer, now, ends), loops, since)
         self.controller.learn(loops, contacts)
         self.controller.estimate(loops, flights)
 
-    def _carry(
-        self, hammers: list[Hammer], loops: list[Loop], since: FloatArray, ends: FloatArray
-    ) -> tuple[Samples, Samples]:
+    def _carry(self, legs: list[Leg], loops: list[Loop], since: FloatArray) -> tuple[Samples, Samples]:
         """Carry runs to an end; return what is shown of contacts and, since a time, of flights."""
-        controller, sensor = self.controller, self.sensor
+        controller, sensor, ends = self.controller, self.sensor, legs[-1].ends
         starts = np.array([loop.time for loop in loops])
         # What is seen of a contact that has not been: nothing.
         spans = np.array(
@@ -130,30 +141,23 @@ class FeedbackStrategy(Declared):
         times: FloatArray = (numbers * sensor.interval).astype(np.float64)
         used &= times > starts[:, np.newaxis]
         x = np.full(numbers.shape, np.nan)
-        inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
-        for group in (np.flatnonzero(inside), np.flatnonzero(~inside)):
-            if not group.size:
-                continue
-            own = [loops[k] for k in group]
-            # A sample may be one of the contact and one of the flight.
-            strobes = [np.append(np.unique(times[k][used[k]]), ends[k]) for k in group]
-            width = 4 if inside[group[0]] else 2
-            result = Ensemble(
-                [hammers[k] for k in group],
-                [loop.recent(controller.plant.driver) for loop in own],
-                ends[group],
-                states=np.array([loop.state[:width] for loop in own]),
-                starts=starts[group],
-                tolerance=self.tolerance,
-            ).run(strobes=strobes, threads=self.threads)
-            sampled = result.strobes
-            assert sampled is not None
-            states = np.stack([sampled.x, sampled.v, sampled.branch, sampled.memory], axis=2)
-            for row, (k, loop) in enumerate(zip(group.tolist(), own, strict=True)):
-                moments = strobes[row]
-                x[k, used[k]] = sampled.x[row, np.searchsorted(moments[:-1], times[k][used[k]])]
-                loop.alive, loop.time = bool(result.ok[row]), float(ends[k])
-                loop.state = states[row, len(moments) - 1]
+        for leg, following in zip(legs, [*legs[1:], None], strict=True):
+            # What is shown at the end of the last leg may lie beyond it by rounding.
+            until = np.full(len(loops), np.inf) if following is None else leg.ends
+            self._advance(leg, loops, until, times, used, x)
+            while following is not None:
+                # A contact meets one pack: the next one waits until the armature is outside both.
+                waits = [
+                    loop.alive
+                    and loop.time < end
+                    and (loop.state[2] in _BRANCHES or loop.state[0] > other.front)
+                    for loop, other, end in zip(loops, following.hammers, ends, strict=True)
+                ]
+                if not any(waits):
+                    break
+                later = np.array([loop.time for loop in loops]) + np.where(waits, _LATER, 0.0)
+                until = np.minimum(later, ends)
+                self._advance(Leg(leg.hammers, until), loops, until, times, used, x)
         used &= np.isfinite(x)
         runs = np.array([loop.key for loop in loops], dtype=np.uint64)
         stroke = controller.plant.stroke
@@ -161,3 +165,43 @@ class FeedbackStrategy(Declared):
         samples = Samples(times, shown, used, sensor.error * stroke)
         count = contacts.shape[1]
         return samples.take((slice(None), slice(count))), samples.take((slice(None), slice(count, None)))
+
+    def _advance(
+        self,
+        leg: Leg,
+        loops: list[Loop],
+        until: FloatArray,
+        times: FloatArray,
+        used: BoolArray,
+        x: FloatArray,
+    ) -> None:
+        """Carry runs to the end of a leg, where they are not yet; put in x at samples up to `until`."""
+        hammers, ends = leg
+        inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
+        moves = np.array([loop.time < end for loop, end in zip(loops, ends, strict=True)])
+        for group in (np.flatnonzero(moves & inside), np.flatnonzero(moves & ~inside)):
+            if not group.size:
+                continue
+            own = [loops[k] for k in group]
+            here = [used[k] & (times[k] > loops[k].time) & (times[k] <= until[k]) for k in group]
+            # A sample may be one of the contact and one of the flight.
+            strobes = [
+                np.append(np.unique(times[k][mine]), ends[k]) for k, mine in zip(group, here, strict=True)
+            ]
+            width = 4 if inside[group[0]] else 2
+            result = Ensemble(
+                [hammers[k] for k in group],
+                [loop.recent(self.controller.plant.driver) for loop in own],
+                ends[group],
+                states=np.array([loop.state[:width] for loop in own]),
+                starts=np.array([loop.time for loop in own]),
+                tolerance=self.tolerance,
+            ).run(strobes=strobes, threads=self.threads)
+            sampled = result.strobes
+            assert sampled is not None
+            states = np.stack([sampled.x, sampled.v, sampled.branch, sampled.memory], axis=2)
+            for row, (k, loop) in enumerate(zip(group.tolist(), own, strict=True)):
+                moments = strobes[row]
+                x[k, here[row]] = sampled.x[row, np.searchsorted(moments[:-1], times[k][here[row]])]
+                loop.alive, loop.time = bool(result.ok[row]), float(ends[k])
+                loop.state = states[row, len(moments) - 1]
