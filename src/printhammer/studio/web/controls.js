@@ -1,5 +1,6 @@
 // The controls: one row for each constant, with unit, range, hint and reset, in groups that can be searched.
 import { element } from "./dom.js";
+import { isVoltage } from "./pulses.js";
 import { choiceRow, sliderRow, textRow } from "./rows.js";
 import { START } from "./state.js";
 import { waveformEditor } from "./waveform.js";
@@ -56,10 +57,9 @@ export function buildControls(holder, studio) {
   const sections = new Map();
   const open = described.open ?? [];
   // What a voltage drives is looked at first.
-  const driven = described.waveform?.quantity === "voltage";
-  const listed = driven ? [...described.constants, ...open].sort((one, other) => (other.section === "coil") - (one.section === "coil")) : [...described.constants, ...open];
+  const listed = [...described.constants, ...open].sort((one, other) => (other.section === "coil") - (one.section === "coil"));
   for (const constant of listed) {
-    if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, driven && constant.section === "coil"));
+    if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, false));
     add(sections.get(constant.section), {
       ...constant, id: constant.key, name: constant.unit === "degC" ? "temperature" : constant.symbol, title: constant.meaning,
       hint: `${constant.key}: ${constant.meaning}${constant.unit === "1" ? "" : `, ${constant.unit}`}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
@@ -79,7 +79,14 @@ export function buildControls(holder, studio) {
     });
   }
   searched(holder, search);
-  return () => { for (const row of rows) row.follow(studio.store.state); };
+  let driven = false;
+  return () => {
+    const { state } = studio.store;
+    const voltage = isVoltage(state.waveform ?? described.waveform);
+    if (voltage && !driven && sections.has("coil")) sections.get("coil").parentElement.open = true;
+    driven = voltage;
+    for (const row of rows) row.follow(state);
+  };
 }
 
 /** Show only the rows in whose name, key, meaning or source all words of the search occur. */
