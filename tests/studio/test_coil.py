@@ -17,6 +17,7 @@ from printhammer.studio.pictures.engine import motion_frame
 from printhammer.studio.states import controls
 from printhammer.studio.states.coil import open_constants, rail_of
 from printhammer.studio.states.drops import dropped
+from printhammer.studio.states.links import read_file, taken
 from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import State, read_state
 from printhammer.studio.states.texts import texts_of
@@ -86,6 +87,17 @@ def test_open_constants_have_controls(name: str) -> None:
         assert each["low"] < each["value"] < each["high"]
         assert (each["section"], len(each["equation"]) > 10) == ("coil", True)
     assert json.dumps(controls.vocabulary(hammer))
+
+
+def test_links_and_files_keep_a_rail_and_a_temperature() -> None:
+    content = {"hammer": "hendriks-1983", "waveform": rail(), "constants": {"coil.temperature": 60.0}}
+    assert taken(content, Shelf()) == (content, [])
+    state = of(waveform=rail(decay="zener", decay_voltage=120.0), constants={"coil.temperature": 60.0})
+    table, notes = read_file(texts_of(state)["state"], "state.json", Shelf())
+    assert notes == []
+    assert read_state(table, Shelf()) == state
+    _, notes = taken({**content, "waveform": rail(decay="battery")}, Shelf())
+    assert "waveform.decay is expected to be one of diode, zener, rail" in notes[0]
 
 
 def test_slow_and_large_devices_are_shown_in_larger_units() -> None:

@@ -38,7 +38,8 @@ FULL: Final = (512, 512)
 GAP: Final = 65535
 """Code of a displacement that is not known."""
 
-_RATES_OF_PIECE: Final = 64
+_RATES_OF_PIECE: Final = {False: 64, True: 16}
+"""Rates between two questions for a newer state, by whether a voltage drives the coil."""
 _TRIED: Final = 9
 _STEEPEST: Final = 1e38
 
@@ -113,7 +114,7 @@ def map_frame(
             struck[first:last] = result.dots.struck
 
     # While one piece is integrated, another is made ready.
-    in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])
+    in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE[by_voltage(state.fired)]])
     # Colours lie between backstop and platen, or what there is.
     known = x[np.isfinite(x)]
     low, high = hammer.position or 0.0, hammer.platen or 0.0

@@ -1,6 +1,6 @@
 // The controls: one row for each constant, with unit, range, hint and reset, in groups that can be searched.
 import { element } from "./dom.js";
-import { isVoltage } from "./pulses.js";
+import { isDriver, isVoltage } from "./pulses.js";
 import { choiceRow, sliderRow, textRow } from "./rows.js";
 import { START } from "./state.js";
 import { waveformEditor } from "./waveform.js";
@@ -36,7 +36,7 @@ export function buildControls(holder, studio) {
   }, studio);
   drive.append(pattern.element);
   rows.push(pattern);
-  const overlap = choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio);
+  const overlap = choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others, as that of a driver always does.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio);
   drive.append(overlap.element);
   rows.push(overlap);
 
@@ -85,6 +85,8 @@ export function buildControls(holder, studio) {
     const voltage = isVoltage(state.waveform ?? described.waveform);
     if (voltage && !driven && sections.has("coil")) sections.get("coil").parentElement.open = true;
     driven = voltage;
+    // Of a driver the latest firing always replaces those before it.
+    overlap.element.querySelector("select").disabled = isDriver(studio, state.waveform ?? described.waveform);
     for (const row of rows) row.follow(state);
   };
 }
