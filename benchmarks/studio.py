@@ -1,6 +1,6 @@
 """How long the studio takes from a key press on a slider to what is seen, in a headless Chromium.
 
-    python benchmarks/studio.py [HAMMER] [--times N] [--ratio 2]
+    python benchmarks/studio.py [HAMMER] [--times N] [--ratio 2] [--rail]
 
 The keys are pressed four times a second. Times are taken in the browser, from the time stamp of the key to
 the first task after the picture was handed over.
@@ -9,10 +9,12 @@ the first task after the picture was handed over.
 from __future__ import annotations
 
 import argparse
+import json
 import statistics
 import sys
 import time
 from pathlib import Path
+from urllib.parse import quote
 
 GROUPS = {
     "motion, forces and phase plane": ("motion-forces-phase", [("motion", None)]),
@@ -20,6 +22,8 @@ GROUPS = {
     "all nine views": ("", [("motion", None), ("map", "preview"), ("map", "full")]),
 }
 CONTROLS = ("waveform.width", "forms thickness")
+RAIL_CONTROLS = ("waveform.width", "waveform.voltage", "coil.temperature")
+"""Controls of the same hammer behind a rail, measured by turns with those of its current."""
 LISTEN = """
 window.seen = [];
 document.getElementById("studio").addEventListener("painted", ({ detail }) => { window.seen.push(detail); });
@@ -36,7 +40,17 @@ def main() -> None:
     parser.add_argument("hammer", nargs="?", default="hendriks-1983")
     parser.add_argument("--times", type=int, default=40)
     parser.add_argument("--ratio", type=float, default=1.0, help="pixel ratio of the screen")
+    parser.add_argument("--rail", action="store_true", help="also behind a rail, by turns")
     given = parser.parse_args()
+    drives = {"": ("", CONTROLS)}
+    if given.rail:
+        from printhammer.hammer.hammer import load
+        from printhammer.studio.states.coil import rail_of
+
+        if (rail := rail_of(load(given.hammer))) is None:
+            parser.error(f"{given.hammer} has no coil whose flux linkage is known")
+        waveform = json.dumps({"shape": "rail", **rail})
+        drives["rail, "] = (f"waveform={quote(waveform)}", RAIL_CONTROLS)
     with browser() as tab:
         page = tab()
         page.size(1280, 720, ratio=given.ratio)
@@ -46,9 +60,11 @@ def main() -> None:
             page.wait("window.studio?.studio?.frames.motion")
             print(f"start of the program to the first picture: {time.perf_counter() - begun:.2f} s")
             for name, (views, kinds) in GROUPS.items():
-                for control in CONTROLS:
+                pairs = [(kind, link, each) for kind, (link, every) in drives.items() for each in every]
+                for drive, link, control in pairs:
                     page.open("about:blank")
-                    page.open(running.address + (f"#views={views}" if views else ""))
+                    told = "&".join(part for part in (f"views={views}" if views else "", link) if part)
+                    page.open(running.address + (f"#{told}" if told else ""))
                     page.wait("window.studio?.studio?.frames.motion")
                     time.sleep(2.5)
                     page.run(LISTEN)
@@ -62,13 +78,16 @@ def main() -> None:
                     for kind, detail in kinds:
                         same = [each for each in seen if (each["kind"], each.get("detail")) == (kind, detail)]
                         took = sorted(each["took"] for each in same if each["took"] is not None)
-                        show(f"{name}, {control}: {detail or 'curves'}", took)
+                        show(f"{name}, {drive}{control}: {detail or 'curves'}", took)
 
 
 def show(told: str, took: list[float]) -> None:
     """Print one row."""
+    if not took:
+        print(f"{told:70s} none before the next key")
+        return
     median, late = statistics.median(took), took[int(0.9 * len(took))]
-    print(f"{told:60s} median {median:6.1f} ms, 90 % within {late:6.1f} ms, {len(took)} pictures")
+    print(f"{told:70s} median {median:6.1f} ms, 90 % within {late:6.1f} ms, {len(took)} pictures")
 
 
 if __name__ == "__main__":

@@ -358,3 +358,61 @@ def test_everything_fits_on_the_screen(page: Page, width: int, height: int) -> N
         assert box["height"] > 180, view
         assert box["x"] + box["width"] <= width
         assert box["y"] + box["height"] <= height
+
+
+@pytest.mark.slow
+def test_a_rail_in_the_place_of_the_current_and_back(page: Page) -> None:
+    """Drivers, decay path and temperature are controls, both curves are there, and undo leads back."""
+    page.run(HELPERS)
+    motion = "window.studio.studio.frames.motion"
+    page.run("window.studio.studio.store.set({ views: ['motion', 'energy'], pulses: 1 }); 1")
+    settled(page, "state.pulses === 1")
+    own = page.run(f"{motion}.peak")
+
+    def took(shape: str) -> float:
+        page.run(f"helpers.choose('#control-shape', '{shape}')")
+        settled(page, f"state.waveform.shape === '{shape}'")
+        page.wait(f"{motion}.quantity === 'voltage' && {motion}.data.u")
+        return page.run(f"{motion}.peak")
+
+    assert took("rail") == pytest.approx(own, rel=0.2)
+    assert page.run("document.querySelector('[data-key=\"coil.temperature\"]').checkVisibility()")
+    assert took("chopper") < own
+    assert page.run("document.querySelector('[data-key=\"waveform.off_time\"]')") is None
+    page.run("helpers.choose('#control-chopped', 'fixed time')")
+    settled(page, "state.waveform.off_time > 0 && state.waveform.lower === null")
+    for shape in ("peak-and-hold", "capacitor", "bridge", "rail"):
+        assert took(shape) > 0.2 * own
+    page.run("helpers.choose('#control-decay', 'zener')")
+    settled(page, "state.waveform.decay_voltage === state.waveform.voltage")
+    page.wait("window.studio.studio.frames.dots.serial === window.studio.studio.serial")
+    cold = page.run(f"{motion}.peak")
+    page.run("helpers.enter('[data-number=\"coil.temperature\"]', '120 °C')")
+    settled(page, "state.constants['coil.temperature'] === 120")
+    page.wait(f"{motion}.peak < 0.95 * {cold}")
+    rail = state(page)["waveform"]["voltage"]
+    plane, pulse = page.box(".pulse canvas"), page.run(f"{motion}.pulse")
+    grip = (plane["x"] + 42, plane["y"] + 6 + (plane["height"] - 36) * 0.3 / 1.42)
+    assert max(pulse["value"]) == rail
+    page.drag(grip, (grip[0], grip[1] + 5), (grip[0], grip[1] + 20))
+    settled(page, f"state.waveform.voltage < 0.9 * {rail}")
+    page.wait("document.querySelector('.view-motion .caption').textContent.includes('The coil takes up to')")
+    assert saved(page, ".view-motion .leave", "CSV").startswith(
+        "time [s],displacement [m],voltage [V],current [A]"
+    )
+    assert "voltage, V" in saved(page, ".view-motion .leave", "SVG")
+    warm = ph.Hammer.from_toml(saved(page, "select.out", "hammer, TOML"))
+    assert warm.coil.temperature == 120.0
+    kept = state(page)
+    page.wait("location.hash.includes('coil.temperature=120') && location.hash.includes('zener')")
+    page.call("Page.reload")
+    page.wait("window.studio?.studio?.frames.dots")
+    assert state(page) == kept
+    page.run(HELPERS)
+    page.run("helpers.choose('#control-shape', 'half-sine')")
+    settled(page, "state.waveform.quantity === 'current'")
+    page.wait(f"{motion}.quantity === 'current' && !{motion}.data.u")
+    page.run("document.querySelector('.undo').click()")
+    settled(page, "state.waveform.shape === 'rail'")
+    page.wait(f"{motion}.data.u")
+    assert page.complaints == []

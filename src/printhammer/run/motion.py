@@ -148,10 +148,20 @@ class Motion(Result, fields=False):
         """Return the current in the coil, A, or the force of the drive, N, at any times of the run, s."""
         return self._resampled(t)[:, 10] if self._problem.laws.circuit else self.drive.value(t)
 
-    def voltage_at(self, t: npt.ArrayLike) -> FloatArray:
-        """Return the voltage across the coil, V, at any times of the run, s; zero where none drives it."""
+    def curves_at(
+        self, t: npt.ArrayLike
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, Mapping[str, FloatArray]]:
+        """Return all that a picture shows at any times of the run, s, looked up together.
+
+        Displacement, m, velocity, m/s, current in the coil, A, or force of the drive, N, voltage across the
+        coil, V (zero unless one drives it), and the forces by name, N.
+        """
         table = self._resampled(t)
-        return table[:, 11] if self._problem.laws.circuit else np.zeros(len(table))
+        if self._problem.laws.circuit:
+            driven, voltage = table[:, 10], table[:, 11]
+        else:
+            driven, voltage = self.drive.value(t), np.zeros(len(table))
+        return table[:, 0], table[:, 1], driven, voltage, self._forces(table)
 
     @cached_property
     def switchings(self) -> tuple[FloatArray, tuple[str, ...]]:

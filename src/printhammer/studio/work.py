@@ -85,8 +85,9 @@ def try_out(
     through: bool = False,
     most: int = 0,
 ) -> Motion:
-    """Run a drive once; where it takes more than `most` steps (by default `bounds.MOST_MAP_STEPS`),
-    refuse what needs many such runs.
+    """Run a drive once; where it takes more than so many steps, refuse what needs many such runs.
+
+    By default these are `bounds.MOST_MAP_STEPS`.
 
     Raises
     ------

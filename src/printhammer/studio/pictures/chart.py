@@ -15,6 +15,7 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.start import initial_state
 from printhammer.studio import bounds
 from printhammer.studio.frames import frame
+from printhammer.studio.states.coil import by_voltage
 from printhammer.studio.work import Patience, alike, try_out
 from printhammer.support.threads import in_threads, thread_count
 
@@ -28,13 +29,17 @@ if TYPE_CHECKING:
 PREVIEW: Final = (64, 128)
 """Rates and times of the map that is shown while a slider moves."""
 
+PREVIEW_BY_VOLTAGE: Final = (32, 128)
+"""The same where a voltage drives the coil: runs with a circuit take about five times as long."""
+
 FULL: Final = (512, 512)
 """Rates and times of the map in full detail."""
 
 GAP: Final = 65535
 """Code of a displacement that is not known."""
 
-_RATES_OF_PIECE: Final = 64
+_RATES_OF_PIECE: Final = {False: 64, True: 16}
+"""Rates between two questions for a newer state, by whether a voltage drives the coil."""
 _TRIED: Final = 9
 _STEEPEST: Final = 1e38
 
@@ -65,6 +70,11 @@ def try_map(state: State, known: State | None) -> State:
     return state
 
 
+def preview_of(state: State) -> tuple[int, int]:
+    """Return rates and times of the map that is shown while a slider moves."""
+    return PREVIEW_BY_VOLTAGE if by_voltage(state.fired) else PREVIEW
+
+
 def map_frame(
     state: State,
     serial: int,
@@ -89,6 +99,8 @@ def map_frame(
     times = np.linspace(0.0, end, size[1])
     rest = initial_state(hammer, None)
     patience = Patience(newer, "the map")
+    # A touch may be shorter than the distance of two times.
+    struck = np.zeros((count, state.slots.count("1")), np.uint8) if size == FULL else None
 
     def piece(first: int, last: int) -> None:
         patience.check()
@@ -96,10 +108,13 @@ def map_frame(
         trains = _trains(state.fired, tuple(fired), state.slots, state.overlap)
         most = bounds.MOST_MAP_STEPS
         runs = Ensemble(hammer, trains, end, states=rest, tolerance=DISPLAY_TOLERANCE, max_steps=most)
-        ok[first:last] = runs.run(times=times, x=x[first:last], threads=1).ok
+        result = runs.run(times=times, x=x[first:last], threads=1, dots=struck is not None)
+        ok[first:last] = result.ok
+        if struck is not None and result.dots is not None:
+            struck[first:last] = result.dots.struck
 
     # While one piece is integrated, another is made ready.
-    in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE])
+    in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE[by_voltage(state.fired)]])
     # Colours lie between backstop and platen, or what there is.
     known = x[np.isfinite(x)]
     low, high = hammer.position or 0.0, hammer.platen or 0.0
@@ -107,7 +122,7 @@ def map_frame(
         low = float(known.min()) if hammer.position is None else low
         high = float(known.max()) if hammer.platen is None else high
     high = max(high, float(np.nextafter(np.float32(low), np.float32(np.inf))))
-    arrays = {"codes": codes_of(x, low, high)}
+    arrays = {"codes": codes_of(x, low, high), **({} if struck is None else {"struck": struck})}
     heading = {
         "rates": [state.low, state.high],
         "end": end,

@@ -53,16 +53,15 @@ def motion_frame(
     hammer, drive = state.changed, state.drive
     motion = limited_run(hammer, drive, end_of_run(drive, None), bounds.MOST_STEPS)
     times = points_of(motion.step_times)
-    places, speeds = motion.at(times)
-    force, values = motion.forces_at(times), motion.driven_at(times)
-    voltage = {"u": np.float32(motion.voltage_at(times))} if drive.quantity == "voltage" else {}
+    places, speeds, values, voltage, force = motion.curves_at(times)
+    by_voltage = drive.quantity == "voltage"
     fired, x, v = motion.strobe
     arrays: dict[str, Any] = {
         "t": times,
         "x": np.float32(places),
         "v": np.float32(speeds),
         "drive": np.float32(values),
-        **voltage,
+        **({"u": np.float32(voltage)} if by_voltage else {}),
         **{f"F {name}": np.float32(values) for name, values in force.items()},
         "strobe t": fired,
         "strobe x": np.float32(x),
@@ -84,7 +83,7 @@ def motion_frame(
         "pulse": pulse_of(state.fired),
         "outdated": outdated or {},
     }
-    if voltage:
+    if by_voltage:
         heading["supply"] = float(state.fired.peak)
     return frame("motion", serial, arrays, **heading), motion
 

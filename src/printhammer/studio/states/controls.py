@@ -79,10 +79,10 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "housner-1963": _PUSHES,
     "braille-embosser": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 60.0},
     "dot-peen": {"rate": 40.0, "pulses": 5, "low": 10.0, "high": 160.0},
-    "pinball-coil": {"rate": 10.0, "pulses": 3, "low": 10.0, "high": 20.0},
-    "pinball-flipper": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 12.0},
-    "pot-magnet": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 20.0},
-    "relay-5v": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 40.0},
+    "pinball-coil": {"rate": 10.0, "pulses": 3, "low": 10.0, "high": 20.0, "line": ""},
+    "pinball-flipper": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 12.0, "line": ""},
+    "pot-magnet": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 20.0, "line": ""},
+    "relay-5v": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 40.0, "line": ""},
 }
 """What those shipped hammers open with whose times and forces are not those of printers."""
 

@@ -16,7 +16,7 @@ def dropped(
     columns: list[tuple[str, str]] | None = None,
     shelf: Shelf | None = None,
 ) -> bytes:
-    """Return what a dropped file holds: a state, a hammer, or curves of displacement, current, force or voltage.
+    """Return what a dropped file holds: a state, a hammer, or measured curves.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Measured curves as oscilloscopes and spreadsheets write them: time, and displacement, current, force or voltage.
+"""Measured curves as oscilloscopes and spreadsheets write them: time, and what is declared in `QUANTITIES`.
 
 Columns are parted by tabs, semicolons or commas, numbers may have a decimal comma, lines above the heading
 are passed over, and units stand in the heading, as "time [us]" or "time (us)", or in a row below it. What a

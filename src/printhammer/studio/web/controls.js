@@ -1,5 +1,6 @@
 // The controls: one row for each constant, with unit, range, hint and reset, in groups that can be searched.
 import { element } from "./dom.js";
+import { isDriver, isVoltage } from "./pulses.js";
 import { choiceRow, sliderRow, textRow } from "./rows.js";
 import { START } from "./state.js";
 import { waveformEditor } from "./waveform.js";
@@ -35,7 +36,7 @@ export function buildControls(holder, studio) {
   }, studio);
   drive.append(pattern.element);
   rows.push(pattern);
-  const overlap = choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio);
+  const overlap = choiceRow("overlap", "What overlapping pulses do: add up, or the latest replaces the others, as that of a driver always does.", ["add", "replace"], (state) => state.overlap, (value) => ({ overlap: value }), studio);
   drive.append(overlap.element);
   rows.push(overlap);
 
@@ -56,10 +57,9 @@ export function buildControls(holder, studio) {
   const sections = new Map();
   const open = described.open ?? [];
   // What a voltage drives is looked at first.
-  const driven = described.waveform?.quantity === "voltage";
-  const listed = driven ? [...described.constants, ...open].sort((one, other) => (other.section === "coil") - (one.section === "coil")) : [...described.constants, ...open];
+  const listed = [...described.constants, ...open].sort((one, other) => (other.section === "coil") - (one.section === "coil"));
   for (const constant of listed) {
-    if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, driven && constant.section === "coil"));
+    if (!sections.has(constant.section)) sections.set(constant.section, group(holder, TITLES[constant.section] ?? constant.section, false));
     add(sections.get(constant.section), {
       ...constant, id: constant.key, name: constant.unit === "degC" ? "temperature" : constant.symbol, title: constant.meaning,
       hint: `${constant.key}: ${constant.meaning}${constant.unit === "1" ? "" : `, ${constant.unit}`}. ${constant.equation}. ${constant.status}: ${constant.source}.`,
@@ -79,7 +79,16 @@ export function buildControls(holder, studio) {
     });
   }
   searched(holder, search);
-  return () => { for (const row of rows) row.follow(studio.store.state); };
+  let driven = false;
+  return () => {
+    const { state } = studio.store;
+    const voltage = isVoltage(state.waveform ?? described.waveform);
+    if (voltage && !driven && sections.has("coil")) sections.get("coil").parentElement.open = true;
+    driven = voltage;
+    // Of a driver the latest firing always replaces those before it.
+    overlap.element.querySelector("select").disabled = isDriver(studio, state.waveform ?? described.waveform);
+    for (const row of rows) row.follow(state);
+  };
 }
 
 /** Show only the rows in whose name, key, meaning or source all words of the search occur. */

@@ -18,23 +18,21 @@ const borderOf = ({ low, high, front }) => (front === null ? GAP : Math.round(Ma
 
 /**
  * Return the dots that are lost in a map: for each its row and column, and of the lowest rate the number of the first.
- * A touch that is shorter than a column of the map is not seen here.
  */
 export function lostDots(frame) {
   const [rows, columns] = frame.data.codes.shape;
   const { codes } = frame.data;
-  const border = borderOf(frame);
+  const { struck } = frame.data;
   const slots = frame.pattern ? [...frame.pattern].flatMap((mark, k) => (mark === "1" ? [k] : [])) : [...Array(frame.pulses).keys()];
   const found = { list: [], first: null };
-  if (frame.front === null || frame.detail !== "full") return found;
+  if (frame.front === null || !struck) return found;
   for (let row = 0; row < rows; row += 1) {
     const rate = frame.rates[0] + (row / (rows - 1)) * (frame.rates[1] - frame.rates[0]);
     const from = row * columns;
     if (codes[from + columns - 1] === GAP) continue;
     slots.forEach((slot, k) => {
       const begin = Math.ceil((slot / rate / frame.end) * (columns - 1));
-      const end = k + 1 < slots.length ? Math.ceil((slots[k + 1] / rate / frame.end) * (columns - 1)) : columns;
-      for (let at = Math.max(begin, 1); at < end; at += 1) if (codes[from + at] >= border && codes[from + at - 1] < border) return;
+      if (struck[row * slots.length + k]) return;
       found.list.push([row, begin, k]);
       found.first ??= { rate, dot: k + 1 };
     });

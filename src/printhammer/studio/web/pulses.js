@@ -59,7 +59,8 @@ export function choicesOf(studio, wave) {
   if (!isDriver(studio, wave)) return [];
   const paths = {
     name: "decay", hint: "Path of the current after the supply is switched off: through a diode, against a zener voltage, or back into the rail.", choices: studio.decays, get: (now) => now.decay,
-    set: (decay, now) => ({ decay, decay_voltage: decay === "zener" ? short(now.decay_voltage ?? now.voltage) : null }),
+    // A resistor is that of a diode: behind a zener, or into the rail, there is none until it is set.
+    set: (decay, now) => ({ decay, decay_voltage: decay === "zener" ? short(now.decay_voltage ?? now.voltage) : null, ...(decay === "diode" ? {} : { decay_resistance: 0 }) }),
   };
   const chopping = {
     name: "chopped", hint: "Where a chopper switches on again: at a lower current, or after a fixed time.", choices: ["lower current", "fixed time"], get: (now) => (now.off_time === null ? "lower current" : "fixed time"),

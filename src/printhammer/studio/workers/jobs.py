@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from printhammer.errors import InputError
 from printhammer.studio.frames import nothing, refusal
-from printhammer.studio.pictures.chart import FULL, PREVIEW, map_frame, try_map
+from printhammer.studio.pictures.chart import FULL, map_frame, preview_of, try_map
 from printhammer.studio.pictures.engine import dots_frame, motion_frame
 from printhammer.studio.pictures.printed import line_frame
 from printhammer.studio.pictures.questions import QUESTIONS
@@ -68,7 +68,7 @@ def frequency_map(order: Order, desk: Desk) -> None:
         desk.tried = try_map(state, desk.tried)
         # Not given up for a newer state: a coarse map is to arrive while a slider moves. The browser draws
         # meanwhile, and has another core for that.
-        desk.tell(map_frame(state, serial, PREVIEW, lambda: False, 1), "map", whole=False)
+        desk.tell(map_frame(state, serial, preview_of(state), lambda: False, 1), "map", whole=False)
         desk.tell(map_frame(state, serial, FULL, desk.newer), "map")
     except InputError as error:
         desk.tell(nothing("map", serial, error), "map")
