@@ -384,7 +384,9 @@ def least_work(
             raise InputError(f"{hammer.path}: the hammer has no {role}, expected one with all parts")
     waveform = pulse_of(hammer)
     if waveform.quantity != "current":
-        raise InputError(f"{hammer.path}: the waveform is a force, expected a current, which does work")
+        raise InputError(
+            f"{hammer.path}: the waveform is a {waveform.quantity}, expected a current, which does work"
+        )
     steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
     if shape == "pulses":
         steepest = math.inf
