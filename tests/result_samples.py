@@ -171,6 +171,12 @@ def dead_time(hammer: Hammer) -> Result:
     return ph.dead_time(wire, voltage=[20.0, 38.0], temperature=[20.0], blow=3.2)
 
 
+def impact_time(hammer: Hammer) -> Result:
+    # With samples so noisy that some impacts are not seen.
+    wire = ph.load("impact-wire")
+    return ph.impact_time(wire, noise=["5 mA", "70 mA"], dots=6, units=3)
+
+
 def thermal_duty(hammer: Hammer) -> Result:
     # Bursts of which one may last, and one melts the copper.
     bursts = ["100 Hz", "1 kHz", "1 MHz"]
@@ -189,6 +195,7 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "Feedback": feedback,
     "Fit": fit,
     "Front": front,
+    "ImpactTime": impact_time,
     "Learning": learning,
     "LeastWork": least_work,
     "LeastWorkRates": least_work_rates,

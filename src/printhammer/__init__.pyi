@@ -24,6 +24,7 @@ from .control.feedback.comparison import feedback as feedback
 from .control.learning.learn import learn as learn
 from .control.learning.sensor import ImpactSensor as ImpactSensor
 from .control.least_work.burst import least_work as least_work
+from .control.sensing.impact_time import impact_time as impact_time
 from .control.table.compensation import CompensationTable as CompensationTable
 from .control.table.compensation import load_table as load_table
 from .control.table.report import judge_table as judge_table

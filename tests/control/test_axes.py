@@ -147,7 +147,8 @@ int main(void) {{
 def test_bad_axes_are_refused(tables: AxisTables) -> None:
     hammer = ph.load("hendriks-1983")
     for axis, values, sentence in (
-        ("rail", GAPS, "axis = 'rail', expected gap or forms"),
+        ("weather", GAPS, "axis = 'weather', expected one of rail, temperature, gap, forms"),
+        ("rail", ("90 V", "100 V"), "expected a hammer whose .waveform. is a driver on a rail"),
         ("gap", GAPS[:1], "expected two values or more that ascend"),
         ("gap", GAPS[::-1], "expected two values or more that ascend"),
     ):
@@ -157,3 +158,42 @@ def test_bad_axes_are_refused(tables: AxisTables) -> None:
         tables.at("30 um")
     with pytest.raises(ph.InputError, match="budget = 1 bytes"):
         tables.to_header(budget=1)
+
+
+@pytest.fixture(scope="module")
+def behind_a_rail() -> ph.Hammer:
+    coil = {"resistance": 28.6, "inductance": "6.547 mH"}
+    rail = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
+    return ph.load("hendriks-1983").replace({"coil": coil, "waveform": rail})
+
+
+def test_between_two_rails_dots_are_those_of_the_design(behind_a_rail: ph.Hammer) -> None:
+    tables = tune_along(behind_a_rail, "rail", ["94 V", "100 V"], rate=RATE, history=1)
+    single = nominal(behind_a_rail)
+    for volts in (94.0, 97.0, 100.0):
+        drive = tables.strategy(behind_a_rail, volts)(behind_a_rail, [SLOTS], RATE)[0]
+        dots = ph.simulate(behind_a_rail.replace("waveform.voltage", volts), drive).dots
+        force = np.array([dot.peak_force for dot in dots], dtype=float) / single.force - 1.0
+        touched = np.array([dot.fired_at + (dot.flight_time or 0.0) for dot in dots])
+        late = touched - (1e-3 + np.array(SLOTS) / RATE) - single.flight_time
+        assert abs(force).max() < 0.05
+        assert abs(late).max() < 15e-6
+
+
+def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
+    steps: list[tuple[int, int]] = []
+    tables = tune_along(
+        behind_a_rail,
+        "temperature",
+        ["20 degC", "80 degC"],
+        rate="600 Hz",
+        history=1,
+        reach=1,
+        progress=lambda step, total: steps.append((step, total)),
+    )
+    cold, warm = tables.tables
+    assert warm.width[0, 0] > cold.width[0, 0] + 3e-6
+    assert steps == sorted(steps)
+    assert steps[-1][0] <= steps[-1][1]
+    with pytest.raises(ph.InputError, match=r"rail = 130 V: .* the waveform peaks at"):
+        tune_along(behind_a_rail, "rail", ["100 V", "130 V"], rate=RATE)

@@ -239,6 +239,20 @@ def read_span(written: str, name: str) -> tuple[str, str, int]:
     return parts[0], parts[1], read_whole(parts[2], name)
 
 
+def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float]:
+    """Return evenly spaced values of a `span` in an SI unit, none for None; else InputError."""
+    import numpy as np
+
+    from printhammer.drive.input import read_number
+
+    if span is None:
+        return []
+    low, high = (read_number(end, si, name) for end in span[:2])
+    if not low <= high or span[2] < 1:
+        raise InputError(f"{name} {', '.join(map(str, span))!r}: expected the lower end first, and 1 or more")
+    return [float(value) for value in np.linspace(low, high, span[2])]
+
+
 def given(**options: Any) -> dict[str, Any]:
     """Return the options that are not None; the others have the defaults of the library."""
     return {name: value for name, value in options.items() if value is not None}

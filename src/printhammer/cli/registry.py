@@ -18,6 +18,7 @@ from printhammer.cli.verbs.printing.dead_time import dead_time
 from printhammer.cli.verbs.printing.duty import duty
 from printhammer.cli.verbs.printing.energy import energy
 from printhammer.cli.verbs.printing.feedback import feedback
+from printhammer.cli.verbs.printing.impact_time import impact_time
 from printhammer.cli.verbs.printing.learn import learn
 from printhammer.cli.verbs.printing.print_ import print_
 from printhammer.cli.verbs.printing.quality import quality
@@ -36,7 +37,8 @@ if TYPE_CHECKING:
 
 VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),
-    *(print_, energy, feedback, quality, tune, learn, dead_time, duty, bench, studio, sweep, measure, warm),
+    *(print_, energy, feedback, quality, tune, learn, dead_time, impact_time, duty),
+    *(bench, studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped, from_datasheet),
     *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion, fit.coil),
     *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),

@@ -1,4 +1,4 @@
-"""Tables along one more axis that a firmware knows: the gap to the pack, or the number of forms in it."""
+"""Tables along one more axis that a firmware knows: rail, temperature of the coil, gap, or forms."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.control.interpolation import with_interpolation
-from printhammer.control.table.compensation import CompensationTable, checked_tick, mixed
-from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, Settings
-from printhammer.control.table.drivers import driven_by, of_force
+from printhammer.control.table.compensation import CompensationTable, TableStrategy, checked_tick, mixed
+from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, Settings, print_pulse
+from printhammer.control.table.drivers import driven_by, of_force, with_pulse
 from printhammer.control.table.formats import HEAD
 from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
 from printhammer.control.table.tuning import tune
-from printhammer.drive.input import read_number
-from printhammer.errors import InputError
+from printhammer.control.widths import of_width
+from printhammer.drive.input import read_number, read_positive
+from printhammer.errors import InputError, located
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.results import save_dataset
@@ -38,14 +39,36 @@ _MILLIONTH: Final = 1e-6
 
 @dataclass(frozen=True)
 class Axis:
-    """Something that firmware knows and that changes the hammer; rail and temperature would be others."""
+    """Something that firmware knows and that changes the hammer."""
 
     unit: str
     meaning: str
     change: Callable[[Hammer, float], Hammer]
 
 
+def _on_rail(hammer: Hammer, value: float) -> Hammer:
+    """Return a hammer whose driver is on another rail, V."""
+    _check_driver(hammer, "rail")
+    return hammer.replace("waveform.voltage", value)
+
+
+def _warm(hammer: Hammer, value: float) -> Hammer:
+    """Return a hammer whose coil has another temperature, degC."""
+    _check_driver(hammer, "temperature")
+    return hammer.replace("coil.temperature", value)
+
+
+def _check_driver(hammer: Hammer, axis: str) -> None:
+    if not hasattr(hammer.waveform, "voltage"):
+        raise InputError(
+            f"{hammer.path}: axis = {axis!r}, expected a hammer whose [waveform] is a driver on a rail,"
+            " such as 'rail'"
+        )
+
+
 AXES: Final = {
+    "rail": Axis("V", "voltage of the supply", _on_rail),
+    "temperature": Axis("degC", "temperature of the coil", _warm),
     "gap": Axis(
         "m",
         "by how much pack and platen lie farther away",
@@ -85,6 +108,27 @@ class AxisTables:
         low, high = (Settings(*(getattr(table, name) for name in COLUMNS)) for table in (first, second))
         times: dict[str, Any] = mixed(low, high, share)._asdict()
         return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
+
+    def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
+        """Return the table for a value as a way to drive a hammer, with the pulses of that value.
+
+        Raises
+        ------
+        InputError
+            As for `at`, or the tables are made for another hammer.
+        """
+        table = self.at(value)
+        table.check_hammer(hammer)
+        place = read_number(value, AXES[self.axis].unit, self.axis)
+        other = AXES[self.axis].change(hammer, place)
+        pulse = other.waveform
+        if pulse is not None and pulse.quantity == "voltage":
+            other = with_pulse(other, of_width(pulse, float(table.width[0, 0])))
+        return TableStrategy(table, other)
+
+    def quantised(self, tick: float | str) -> AxisTables:
+        """Return the tables as a timer with a tick, s or text, fires them."""
+        return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
 
     def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
         """Return the text of the C header, arrays `[value][rate][history]`, as `CompensationTable` does.
@@ -134,8 +178,10 @@ class AxisTables:
         parts = [table.to_dataset() for table in self.tables]
         return xr.concat(parts, along, combine_attrs="drop_conflicts")
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, *, tick: float | str = NANOSECOND, budget: int | None = None) -> None:
         """Write the tables as a C header (.h), or as .csv, .json, .nc, .zarr or .parquet, by the ending.
+
+        A header has times in ticks, s, and no more bytes than a budget.
 
         Raises
         ------
@@ -144,7 +190,7 @@ class AxisTables:
         """
         suffix = Path(path).suffix.lower()
         if suffix == ".h":
-            write_file(Path(path), self.to_header())
+            write_file(Path(path), self.to_header(tick, budget))
         elif suffix == ".csv":
             write_file(Path(path), str(self.to_dataframe().to_csv(index=False, lineterminator="\n")))
         else:
@@ -158,14 +204,15 @@ def tune_along(
     *,
     rate: float | str,
     driver: str = "own",
-    largest_current: float = LARGEST_CURRENT,
+    largest_current: float | str = LARGEST_CURRENT,
+    progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> AxisTables:
     """Tune a table for each of some values of an axis; every dot is like the single pulse of the hammer.
 
     Parameters
     ----------
-    hammer, rate, driver, largest_current, options
+    hammer, rate, driver, largest_current, progress, options
         As for `printhammer.tune`.
     axis : str
         A name of `AXES`.
@@ -178,18 +225,28 @@ def tune_along(
         The axis is not known, the values do not ascend, or as for `printhammer.tune`.
     """
     if axis not in AXES:
-        raise InputError(f"axis = {axis!r}, expected {' or '.join(AXES)}")
+        raise InputError(f"axis = {axis!r}, expected one of {', '.join(AXES)}")
     places = tuple(read_number(value, AXES[axis].unit, axis) for value in values)
     if len(places) < 2 or any(second <= first for first, second in pairwise(places)):
         raise InputError(f"{axis} = {list(values)!r}, expected two values or more that ascend")
-    design = driven_by(hammer, driver, largest_current)
+    largest = read_positive(largest_current, "A", "largest_current")
+    design = driven_by(hammer, driver, largest)
     known, own = nominal(design, tolerance=DISPLAY_TOLERANCE), nominal(hammer, tolerance=DISPLAY_TOLERANCE)
-    pulse: Any = design.waveform
-    tables = []
+    fired = []
     for place in places:
-        other = AXES[axis].change(design, place)
-        fired = of_force(other, pulse, known.force, 0.5 * pulse.width, 1.5 * pulse.width)
-        table = tune(fired, rate=rate, largest_current=largest_current, **options)
-        later = own.flight_time - nominal(fired, tolerance=DISPLAY_TOLERANCE).flight_time
+        with located(f"{axis} = {place:g} {AXES[axis].unit}"):
+            other = AXES[axis].change(design, place)
+            pulse: Any = other.waveform
+            fired.append(of_force(other, pulse, known.force, 0.5 * pulse.width, 1.5 * pulse.width))
+            print_pulse(fired[-1], largest)
+    tables = []
+    for number, other in enumerate(fired):
+
+        def count(step: int, total: int, done: int = number) -> None:
+            if progress is not None:
+                progress(done * total + step, len(fired) * total)
+
+        table = tune(other, rate=rate, largest_current=largest, progress=count, **options)
+        later = own.flight_time - nominal(other, tolerance=DISPLAY_TOLERANCE).flight_time
         tables.append(table.delayed(later, driver, hammer))
     return AxisTables(axis, places, tuple(tables))

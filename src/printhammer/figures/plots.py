@@ -23,6 +23,7 @@ PLOTS: Final = {
     "FiniteTime": "chaos.finite_time.plot",
     "Fit": "fit.plot",
     "Front": "front.plot",
+    "ImpactTime": "control.impact_time.plot",
     "ImpactTrain": "chaos.impact_train.plot",
     "Learning": "control.learning.plot",
     "LeastWork": "control.energy.plot",

@@ -32,6 +32,18 @@ def test_tables_and_pictures(cli: Callable, quick: Path, tmp_path: Path) -> None
     assert names[4].read_bytes().startswith(b"\x89PNG")
 
 
+def test_tables_along_the_gap(cli: Callable, quick: Path, tmp_path: Path) -> None:
+    names = [tmp_path / f"table.{kind}" for kind in ("csv", "json", "h", "nc")]
+    out = [word for name in names for word in ("--out", name)]
+    words = ("--rate", "1.85kHz", "--history", 1, "--reach", 1, "--along", "gap -2 um, 2 um, 2")
+    done = cli("tune", quick, *words, "--tick", "1 us", "--budget", 60, *out)
+    assert done.status == 0
+    assert "Tables along the gap at 1850 Hz" in done.out
+    assert "44 bytes in a C header" in done.out
+    assert "TICK_NS 1000" in names[2].read_text()
+    assert names[0].read_text().startswith("gap [m],")
+
+
 @pytest.mark.slow
 def test_what_is_gained_and_lost(cli: Callable, quick: Path, tmp_path: Path) -> None:
     report = tmp_path / "report.svg"
@@ -53,6 +65,14 @@ def test_what_is_gained_and_lost(cli: Callable, quick: Path, tmp_path: Path) -> 
         ("--rate 1kHz --history 9", "history = 9, expected a whole number from 1 to 4"),
         ("--rate 1kHz --reach 0", "reach"),
         ("--rate 1kHz --largest-current 0.1A", "the waveform peaks at"),
+        ("--along 'gap 0 um, 10 um, 2'", "expected one rate"),
+        ("--rate 1kHz --along 'weather 0, 1, 2'", "expected one of rail, temperature, gap, forms first"),
+        ("--rate 1kHz --along 'gap 0 um'", "expected two ends and a number"),
+        ("--rate 1kHz --along 'gap 0 V, 1 V, 2'", "--along gap"),
+        ("--rate 1kHz --along 'gap 0 um, 10 um, 1'", "expected two values or more"),
+        ("--rate 1kHz --along 'rail 9 V, 10 V, 2'", "expected a hammer whose [waveform] is a driver"),
+        ("--rate 1kHz --along 'gap 0 um, 10 um, 2' --out table.png", "expected a name that ends in one of"),
+        ("--rate 1kHz --along 'gap 0 um, 10 um, 2' --report r.nc", "expected none beside --along"),
         ("--rate 1kHz --report report.nc --no-judge", "expected none beside --no-judge"),
     ],
 )

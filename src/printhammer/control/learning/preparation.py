@@ -73,7 +73,7 @@ def law_for(
         pulse=pulse,
         largest=largest_current,
         widest=widest,
-        wait=clearance(pulse, widest, largest_current),
+        wait=clearance(driven, pulse, widest, largest_current),
         single=single_of(driven, pulse, DISPLAY_TOLERANCE),
         limits=bounds,
         brake=True,

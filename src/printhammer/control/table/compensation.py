@@ -218,12 +218,16 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 f"{unit} is given: the table was learned on unit {self.serial!r}, expected this serial, or"
                 f" {ANY_UNIT!r} to drive another unit with it"
             )
+        self.check_hammer(hammer)
+        return TableStrategy(self, hammer)
+
+    def check_hammer(self, hammer: Hammer) -> None:
+        """Raise `InputError` unless the table is made for a hammer."""
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
                 f" {self.fingerprint[:12]}, expected {hammer.fingerprint[:12]}"
             )
-        return TableStrategy(self, hammer)
 
     def drive(self, hammer: Hammer, slots: Sequence[int], rate: float | str) -> Drive:
         """Return the drive that prints dots at some slots.

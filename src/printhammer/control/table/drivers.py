@@ -58,7 +58,9 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
         return hammer
     own: Any = pulse_of(hammer)
     if own.quantity != "current":
-        raise InputError(f"{hammer.path}: the waveform is a {own.quantity}, expected a current")
+        raise InputError(
+            f"{hammer.path}: the waveform is a {own.quantity}, expected a current, or driver = 'own'"
+        )
     edge = max(float(getattr(own, "decay", _EDGE)), _LEAST_EDGE)
     force = nominal(hammer, tolerance=DISPLAY_TOLERANCE).force
     decay = edge * (_REVERSED if driver == "bridge" else 1.0)

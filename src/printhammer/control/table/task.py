@@ -103,7 +103,7 @@ class Task:
     @cached_property
     def _faded(self) -> float:
         """Time after its width in which the pulse has decayed to what a chain may cut off, s."""
-        return fading(self.pulse, 0.5 * TAIL)
+        return fading(self.hammers[0], self.pulse, 0.5 * TAIL)
 
     @property
     def brake_from(self) -> float:

@@ -76,7 +76,8 @@ def tune(
     Parameters
     ----------
     hammer : Hammer
-        A hammer with a pack, a backstop and a current waveform that has a width.
+        A hammer with a pack, a backstop and a waveform that has a width: a current, or a driver of the coil,
+        of which the widths are then times on the rail.
     rate, rates : float or str, or sequence of them, optional
         Slots per second, Hz, or text with a unit; by default rates from 100 Hz, at which every dot is printed
         from rest, to the highest one at which the table keeps to the limits, `STEP` apart, and closer where
@@ -94,8 +95,9 @@ def tune(
         of on this hammer alone.
     driver : str, optional
         What switches the coil, of `DRIVERS` in `printhammer.control.table.drivers`: "own", the pulse of the
-        hammer, "switch", a fast unipolar switch, or "bridge", an H-bridge. With these the dot from rest is as
-        hard as with the own pulse, and is fired so much later that it arrives as it does.
+        hammer or the driver of its coil, "switch", a fast unipolar switch, or "bridge", an H-bridge. With
+        these two, which replace a current, the dot from rest is as hard as with the own pulse, and is fired
+        so much later that it arrives as it does.
     variability : Variability, optional
         How the constants of a production are spread. The way is then taken in which a row of dots is least
         off in the mean square, over this hammer and the sigma points of the variability.
@@ -144,7 +146,7 @@ def tune(
         pulse=pulse,
         largest=largest,
         widest=widest,
-        wait=clearance(pulse, widest, largest),
+        wait=clearance(driven, pulse, widest, largest),
         single=single,
         limits=bounds,
         brake=brake,

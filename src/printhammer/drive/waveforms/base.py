@@ -58,8 +58,6 @@ class Waveform(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     shape: ClassVar[str]
-    replaces: ClassVar[bool] = False
-    """Whether the latest firing always replaces those before it."""
     quantity: QuantityName = "current"
 
     if not TYPE_CHECKING:
@@ -118,6 +116,11 @@ class Waveform(BaseModel):
     def support(self) -> float:
         """Time from the firing to the end of the waveform, s; possibly infinite."""
         return float(self.segments()[-1, 0])
+
+    @property
+    def replaces(self) -> bool:
+        """Whether the latest firing always replaces those before it."""
+        return False
 
     @property
     def unit(self) -> str:

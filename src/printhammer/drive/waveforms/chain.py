@@ -10,7 +10,7 @@ from pydantic import model_validator
 
 from printhammer.drive.input import read_number
 from printhammer.drive.segments import evaluate, largest, table
-from printhammer.drive.waveforms.base import Waveform
+from printhammer.drive.waveforms.base import Supply, Waveform
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,6 +48,21 @@ class Chain(Waveform):
                 f"quantity = {data['quantity']!r} is expected to be that of the parts, {driven!r}"
             )
         return {**data, "parts": parts, "quantity": driven}
+
+    @property
+    def replaces(self) -> bool:
+        """Whether the parts are those of a driver, which is one output stage."""
+        return self.parts[0][1].replaces
+
+    @property
+    def support(self) -> float:
+        """Time from the firing to the end of the last part, s; a current in a coil may last longer."""
+        offset, last = self.parts[-1]
+        return offset + last.support
+
+    def supply(self) -> Supply:
+        """Return the supply, that of the first part."""
+        return self.parts[0][1].supply()
 
     def segments(self) -> FloatArray:
         """Return the segment table: those of the parts one after the other, zero in between."""
@@ -94,11 +109,12 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
 def _over(begun: float, waveform: Waveform, time: float) -> bool:
     """Tell whether a waveform that has begun has ended or decayed to its tail at a time, both in s."""
     segments = waveform.segments()
-    end = float(segments[-1, 0])
+    # After the end of a driver's supply the coil's circuit goes on, whatever comes next.
+    end = waveform.support
     # Two parts may meet, by rounding a little early.
     if time >= begun + end or math.isclose(time, begun + end, rel_tol=_ROUNDING):
         return True
-    if time <= begun:
+    if time <= begun or waveform.replaces:
         return False
     edges, tau = segments[:, 0], time - begun
     times = np.concatenate([np.linspace(tau, end, _SAMPLES), edges[edges > tau]])

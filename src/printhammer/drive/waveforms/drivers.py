@@ -27,7 +27,6 @@ DIODE = 0.7
 class _Driver(Waveform):
     """A supply switched on for a time, and what the current does after it."""
 
-    replaces: ClassVar[bool] = True
     quantity: QuantityName = "voltage"
     voltage: float = measured("V", "V", "voltage of the supply", gt=0.0)
     width: float = measured("s", "tw", "time for which the supply is switched on", gt=0.0)
@@ -51,6 +50,11 @@ class _Driver(Waveform):
         if self.decay == "zener" and self.decay_voltage is None:
             raise ValueError('decay = "zener" is given without decay_voltage, expected the zener voltage')
         return self
+
+    @property
+    def replaces(self) -> bool:
+        """Always: a driver is one output stage."""
+        return True
 
     @property
     def series(self) -> float:

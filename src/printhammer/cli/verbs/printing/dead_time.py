@@ -8,7 +8,6 @@ from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import Column, facts, table
 from printhammer.cli.units import Units, with_unit
-from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from printhammer.control.dead_time.table import DeadTime
@@ -41,8 +40,8 @@ def dead_time(
     from printhammer.control.dead_time.table import dead_time as timed
 
     grid: dict[str, Any] = {
-        "voltage": _between(voltage, "V", "--voltage"),
-        "temperature": _between(temperature, "degC", "--temperature"),
+        "voltage": opt.between(voltage, "V", "--voltage"),
+        "temperature": opt.between(temperature, "degC", "--temperature"),
     }
     with job.counting("fired") as tell:
         made = timed(hammer, progress=tell, **grid, **passed)
@@ -56,19 +55,6 @@ def dead_time(
             " strongest that all of them reach: --blow.[/yellow]"
         )
     return Answer(shown, files={"out": Content.of(made)}, complaints=ended_early(made.status.ravel()))
-
-
-def _between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float]:
-    import numpy as np
-
-    from printhammer.drive.input import read_number
-
-    if span is None:
-        return []
-    low, high = (read_number(end, si, name) for end in span[:2])
-    if not low <= high or span[2] < 1:
-        raise InputError(f"{name} {', '.join(map(str, span))!r}: expected the lower end first, and 1 or more")
-    return [float(value) for value in np.linspace(low, high, span[2])]
 
 
 def _pairs(made: DeadTime) -> list[tuple[int, int]]:

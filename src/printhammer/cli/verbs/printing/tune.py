@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
+from printhammer.cli.verbs.printing.axis_tables import tuned_along
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,6 +53,10 @@ def tune(
         "s", "TIME", "Tick of the timer, such as '1 us' (1 ns).", positive=True
     ),
     budget: int | None = opt.whole("Most bytes that the arrays of the C header may take."),
+    along: str | None = opt.text(
+        "AXIS LOW, HIGH, N",
+        "Tables along rail, temperature (of the coil), gap or forms, such as 'rail 90 V, 110 V, 3'.",
+    ),
     variability: bool = opt.switch("Choose for the spread of a production."),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
@@ -74,6 +79,10 @@ def tune(
 
         passed["variability"] = Variability()
     options = opt.given(tolerance=tolerance, threads=threads)
+    if along is not None:
+        if job.wanted["report"]:
+            raise InputError(f"--report {job.wanted['report'][0]} is given, expected none beside --along")
+        return tuned_along(job, hammer, along, opt.given(tick=tick), budget, {**passed, **options}, units)
     with job.counting("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)
     header = opt.given(tick=tick)

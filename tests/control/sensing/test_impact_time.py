@@ -1,0 +1,131 @@
+"""The time of impact from samples of the coil: exact without noise, and what noise and units do to it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+from printhammer.control.sensing.estimator import ImpactEstimator
+from printhammer.control.sensing.sampling import Sampling
+
+
+@pytest.fixture(scope="module")
+def wire() -> ph.Hammer:
+    return ph.load("impact-wire")
+
+
+@pytest.fixture(scope="module")
+def permanent() -> ph.Hammer:
+    """The paper's hammer behind a rail, whose current is over soon after the impact."""
+    coil = {"resistance": 28.6, "inductance": "6.547 mH"}
+    rail = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
+    return ph.load("hendriks-1983").replace({"coil": coil, "waveform": rail})
+
+
+def signal_of(hammer: ph.Hammer, estimator: ImpactEstimator) -> tuple[Any, float]:
+    times = estimator.times
+    motion = ph.simulate(hammer, ph.PulseTrain(estimator.pulse), duration=times[-1] + 1e-6, times=times)
+    flight = motion.dots[0].flight_time
+    assert flight is not None
+    return estimator.sampling.of(motion), flight
+
+
+@pytest.mark.parametrize("rate", [2e5, 1e6])
+def test_without_noise_the_time_is_exact(wire: ph.Hammer, rate: float) -> None:
+    estimator = ImpactEstimator(wire, Sampling(sampling_rate=rate, bits=24))
+    true, flight = signal_of(wire, estimator)
+    found = estimator(estimator.sampling.read(true, np.random.default_rng(0)))
+    assert found == pytest.approx(flight, abs=1e-8)
+
+
+def test_the_open_coil_of_a_permanent_magnet_tells_it_too(permanent: ph.Hammer) -> None:
+    estimator = ImpactEstimator(permanent, Sampling("voltage", noise=0.05))
+    late = permanent.replace("pack.front", permanent.pack.front + 5e-6)  # type: ignore[union-attr]
+    for unit in (permanent, late):
+        true, flight = signal_of(unit, estimator)
+        found = estimator(estimator.sampling.read(true, np.random.default_rng(1)))
+        assert found == pytest.approx(flight, abs=1.5e-6)
+
+
+def test_what_is_sampled_after_its_window_is_not_seen(wire: ph.Hammer) -> None:
+    estimator = ImpactEstimator(wire, Sampling(noise=5e-3))
+    true, _flight = signal_of(wire, estimator)
+    samples = estimator.sampling.read(true, np.random.default_rng(2))
+    assert estimator(np.concatenate([samples, np.full(50, np.nan)])) == estimator(samples)
+
+
+def test_no_impact_is_not_seen(wire: ph.Hammer) -> None:
+    estimator = ImpactEstimator(wire, Sampling(noise=5e-3))
+    known = {key: 1e-9 * wire.constants[key].si for key in ("pack.stiffness", "pack.damping")}
+    times = estimator.times
+    motion = ph.simulate(wire.replace(known), ph.PulseTrain(estimator.pulse), duration=1e-3, times=times)
+    true = np.concatenate([motion.current, np.full(times.size - motion.current.size, motion.current[-1])])
+    assert np.isnan(estimator(estimator.sampling.read(true, np.random.default_rng(3))))
+
+
+def test_errors_grow_with_noise_and_fall_with_the_sampling_rate(wire: ph.Hammer) -> None:
+    study = ph.impact_time(wire, noise=["2 mA", "20 mA"], sampling_rate=["200 kHz", "1 MHz"], units=10)
+    deviation = study.deviation[:, :, 0]
+    assert (deviation[1] > 3.0 * deviation[0]).all()
+    assert (deviation[:, 1] < deviation[:, 0]).all()
+    # Four standard deviations of a mean.
+    assert (np.abs(study.bias) < 4.0 * study.deviation / np.sqrt(study.dots) + 2e-8).all()
+    assert (study.unit_deviation > study.deviation).all()
+    assert not study.missed.any()
+
+
+def test_the_study_is_a_sensor_with_an_offset_of_each_unit(wire: ph.Hammer) -> None:
+    study = ph.impact_time(wire, noise=["5 mA"], units=10)
+    sensor = study.sensor(seed=3)
+    assert sensor.noise == study.deviation[0, 0, 0]
+    assert np.hypot(sensor.noise, sensor.offset) == pytest.approx(study.unit_deviation[0, 0, 0])
+    flights, forces = np.full(4000, 3e-4), np.ones(4000)
+    means = [sensor.read(flights, forces, unit, 0).time.mean() - 3e-4 for unit in range(40)]
+    again = [sensor.read(flights, forces, unit, 1).time.mean() - 3e-4 for unit in range(40)]
+    # The same in every run, and spread over units as said.
+    np.testing.assert_allclose(means, again, atol=0.1 * sensor.noise)
+    assert np.std(means) == pytest.approx(sensor.offset, rel=0.4)
+    plain = ph.ImpactSensor(noise=sensor.noise, seed=3)
+    shown = sensor.read(flights, forces, 0, 0).time - plain.read(flights, forces, 0, 0).time
+    np.testing.assert_allclose(shown, shown[0], atol=1e-15)
+    with pytest.raises(ph.InputError, match="2 ways to sample were studied, expected one"):
+        ph.impact_time(wire, noise=["5 mA", "9 mA"], dots=2, units=2).sensor()
+    with pytest.raises(ph.InputError, match=r"offset = -1\.0"):
+        ph.ImpactSensor(offset=-1.0)
+
+
+def test_few_bits_are_as_bad_as_noise(wire: ph.Hammer) -> None:
+    study = ph.impact_time(wire, noise=["1 mA"], bits=[6, 12], units=2)
+    assert study.deviation[0, 0, 0] > 2.0 * study.deviation[0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"signal": "voltage"}, "the voltage shows no impact, since the supply or a diode holds it"),
+        ({"noise": ["2 A"]}, "the impact changes the current by .* expected less noise than 2 A"),
+        ({"noise": ["-1 mA"]}, "noise = -0.001 is expected to be a number not below 0"),
+        ({"sampling_rate": ["20 kHz"]}, "samples fall on the contact"),
+        ({"bits": [0]}, "bits = 0"),
+        ({"bits": [30]}, "bits = 30, expected a whole number from 1 to 24"),
+        ({"dots": 1}, "dots = 1 and units = 20"),
+        ({"signal": "charge"}, "signal = 'charge', expected current or voltage"),
+    ],
+)
+def test_what_cannot_be_used(wire: ph.Hammer, wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(ph.InputError, match=said):
+        ph.impact_time(wire, **wrong)
+
+
+def test_a_pulse_that_is_over_before_the_impact_says_so(permanent: ph.Hammer) -> None:
+    fast = permanent.replace({"waveform.decay": "zener", "waveform.decay_voltage": 300.0})
+    with pytest.raises(
+        ph.InputError, match=r"the current shows no impact, since 0 mA of 1.98e\+03 mA are left"
+    ):
+        ph.impact_time(fast)
+
+
+def test_a_current_without_a_circuit_tells_nothing() -> None:
+    with pytest.raises(ph.InputError, match="the waveform is a current, expected the voltage of a driver"):
+        ph.impact_time(ph.load("hendriks-1983"))
