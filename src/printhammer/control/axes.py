@@ -126,10 +126,6 @@ class AxisTables:
             other = with_pulse(other, of_width(pulse, float(table.width[0, 0])))
         return TableStrategy(table, other)
 
-    def quantised(self, tick: float | str) -> AxisTables:
-        """Return the tables as a timer with a tick, s or text, fires them."""
-        return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
-
     def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
         """Return the text of the C header, arrays `[value][rate][history]`, as `CompensationTable` does.
 

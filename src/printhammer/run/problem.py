@@ -264,6 +264,11 @@ class Problem:
         """Number of components of the state: displacement, velocity, memory; electric state of a circuit."""
         return 6 if self.laws.circuit else 3
 
+    @property
+    def linkage_scale(self) -> float:
+        """Flux linkage that a typical current in the coil makes, Wb."""
+        return float(self.constants[layout.LINKAGE_SCALE])
+
     def room(self, count: int) -> FloatArray:
         """Return an array for so many nodes."""
         return np.empty((count, node_width(self.laws)))

@@ -21,7 +21,6 @@ import numpy as np
 from printhammer.derivatives.states import follow
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
-from printhammer.kernel.model.layout import LINKAGE_SCALE
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
 from printhammer.run.ensemble import MODE_NAMES
@@ -271,7 +270,7 @@ def image_of(
         return _no_image(followed.status_name)
     if problem.laws.circuit:
         x, linked = float(followed.states[-1, 0]), float(followed.states[-1, 4])
-        limit = STILL_COIL * float(problem.constants[LINKAGE_SCALE])
+        limit = STILL_COIL * problem.linkage_scale
         if not abs(linked - linkage(regime.hammer, x, 0.0)) <= limit:
             return _no_image(CURRENT)
     if int(followed.states[-1, 2]) in WITH_MEMORY:
