@@ -9,6 +9,7 @@ from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.model import modes as M
 from printhammer.kernel.model.layout import (
     CAPACITANCE,
+    CHARGED,
     CHARGING,
     ELECTRIC,
     FRONT,
@@ -195,8 +196,8 @@ def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any,
     """
     hammer, live = setting.hammer, setting.drive
     mode, grown = int(node[3]), 0.0
-    if mode == M.HELD and not couples(hammer, live) and not FORCED:
-        grown = settle(t_to - t, node, columns, setting)
+    if mode == M.HELD and not couples(hammer, live):
+        grown = rest(t, t_to, node, columns, setting)
         if hammer[CAPACITANCE] == 0.0:
             return grown
         # A reservoir is charged meanwhile, at a pace of its own.
@@ -204,7 +205,8 @@ def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any,
         for k in range(columns.shape[1]):
             columns[0, k] *= math.exp(grown)
             columns[1, k] *= math.exp(grown)
-            columns[ELECTRIC_ROW + 2, k] *= fall
+            full = setting.forcing.moves[k, CHARGED] if FORCED else 0.0
+            columns[ELECTRIC_ROW + 2, k] = full + (columns[ELECTRIC_ROW + 2, k] - full) * fall
         return 0.0
     if mode != M.HELD:
         grown = rest(t, t_to, node, columns, setting)
