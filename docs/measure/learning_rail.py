@@ -29,7 +29,16 @@ NOISE = "50 mV"
 COIL = {"resistance": 28.6, "inductance": "6.547 mH"}
 RAIL = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
 CYCLE = slots_of(cycle_with_lead_in())
-ROOMS = (*MOTION, "control/learning", "control/sensing", "control/table", "control/widths", "printing/dots")
+ROOMS = (
+    *MOTION,
+    "control/coil_current",
+    "control/learning",
+    "control/sensing",
+    "control/table",
+    "control/widths",
+    "printing/dots",
+    "printing/rates",
+)
 
 
 def main() -> None:
