@@ -75,6 +75,26 @@ def test_errors_grow_with_noise_and_fall_with_the_sampling_rate(wire: ph.Hammer)
     assert not study.missed.any()
 
 
+def test_the_study_is_a_sensor_with_an_offset_of_each_unit(wire: ph.Hammer) -> None:
+    study = ph.impact_time(wire, noise=["5 mA"], units=10)
+    sensor = study.sensor(seed=3)
+    assert sensor.noise == study.deviation[0, 0, 0]
+    assert np.hypot(sensor.noise, sensor.offset) == pytest.approx(study.unit_deviation[0, 0, 0])
+    flights, forces = np.full(4000, 3e-4), np.ones(4000)
+    means = [sensor.read(flights, forces, unit, 0).time.mean() - 3e-4 for unit in range(40)]
+    again = [sensor.read(flights, forces, unit, 1).time.mean() - 3e-4 for unit in range(40)]
+    # The same in every run, and spread over units as said.
+    np.testing.assert_allclose(means, again, atol=0.1 * sensor.noise)
+    assert np.std(means) == pytest.approx(sensor.offset, rel=0.4)
+    plain = ph.ImpactSensor(noise=sensor.noise, seed=3)
+    shown = sensor.read(flights, forces, 0, 0).time - plain.read(flights, forces, 0, 0).time
+    np.testing.assert_allclose(shown, shown[0], atol=1e-15)
+    with pytest.raises(ph.InputError, match="2 ways to sample were studied, expected one"):
+        ph.impact_time(wire, noise=["5 mA", "9 mA"], dots=2, units=2).sensor()
+    with pytest.raises(ph.InputError, match=r"offset = -1\.0"):
+        ph.ImpactSensor(offset=-1.0)
+
+
 def test_few_bits_are_as_bad_as_noise(wire: ph.Hammer) -> None:
     study = ph.impact_time(wire, noise=["1 mA"], bits=[6, 12], units=2)
     assert study.deviation[0, 0, 0] > 2.0 * study.deviation[0, 0, 1]

@@ -59,7 +59,8 @@ def learn(
     rate : float or str
         Slots per second, Hz, or text with a unit.
     driver, limits, history, reach, largest_current, threads
-        As for `printhammer.tune`; by default a fast switch.
+        As for `printhammer.tune`; by default a fast switch. "own" for a hammer whose coil a driver switches:
+        advance and time on the rail are then learned.
     sensor : ImpactSensor, optional
         By default one that tells times with a noise of 5 us.
     variability : Variability, optional

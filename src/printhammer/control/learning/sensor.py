@@ -1,7 +1,7 @@
 """What is measured of a dot: the time from firing to impact, and, if asked for, its force.
 
-A microphone, a piezo element or the dip of the coil current gives the time; a load cell or the darkness of
-the dot the force. The noise depends on seed, unit and run only.
+A microphone, a piezo element or the coil itself (`printhammer.impact_time`) gives the time; a load cell or
+the darkness of the dot the force. The noise depends on seed, unit and run only.
 """
 
 from __future__ import annotations
@@ -43,9 +43,12 @@ class ImpactSensor(Declared):
     missed: float = part("share of the impacts that are not seen", default=0.0)
     false: float = part("share of the impacts before which something else is taken for one", default=0.0)
     seed: int = part("of the noise", default=0)
+    offset: float = scalar(
+        "s", "standard deviation over units of an error that is the same for every dot of a unit", default=0.0
+    )
 
     def __post_init__(self) -> None:
-        bounds = {"noise": math.inf, "colour": 1.0, "missed": 1.0, "false": 1.0}
+        bounds = {"noise": math.inf, "offset": math.inf, "colour": 1.0, "missed": 1.0, "false": 1.0}
         if self.force is not None:
             bounds["force"] = math.inf
         for name, most in bounds.items():
@@ -62,6 +65,8 @@ class ImpactSensor(Declared):
         """Return what is shown of dots (N,) by their true flight times, s, and forces; NaN if lost."""
         rng = np.random.default_rng((self.seed, unit, run))
         time = (1.0 + self.gain) * flight + self.noise * self._noise(rng, flight.size)
+        if self.offset:
+            time = time + self.offset * np.random.default_rng((self.seed, unit)).standard_normal()
         early = rng.random(flight.size) < self.false
         time = np.where(early, rng.random(flight.size) * np.nan_to_num(flight), time)
         unseen = rng.random(flight.size) < self.missed

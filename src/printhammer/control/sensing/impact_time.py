@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
+from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.sensing.estimator import ImpactEstimator
 from printhammer.control.sensing.sampling import UNITS, Sampling
 from printhammer.drive.input import read_count, read_number, read_positive
@@ -21,11 +23,13 @@ if TYPE_CHECKING:
 
     from printhammer.control.sensing.sampling import Signal
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray, IntArray
 
 MOST: Final = 2000
 """Number of ways to sample above which a study is refused."""
 
+_MOST_MISSED: Final = 0.99  # Of the impacts that a sensor does not see
 _MOST_DOTS: Final = 10_000
 _CELLS: Final = "noise sampling_rate bits"
 
@@ -56,6 +60,33 @@ class ImpactTime(Result, rows=_CELLS):
     def title(self) -> str:
         """What it is of."""
         return f"time of impact of {self.hammer.name} from the {self.signal} of its coil"
+
+    def entries(self) -> Entries:
+        """Return the arrays, the noise in the unit of the signal."""
+        entries = super().entries()
+        note, values = entries["noise"]
+        return {**entries, "noise": (replace(note, unit=self.unit), values)}
+
+    def sensor(self, seed: int = 0) -> ImpactSensor:
+        """Return the estimator as a sensor for `printhammer.learn`, where one way to sample was studied.
+
+        Its noise is the standard deviation on the nominal hammer. What units differ by beside, which is the
+        same for every dot of a unit, is its offset.
+
+        Raises
+        ------
+        InputError
+            There is more than one way to sample, or no impact was seen.
+        """
+        if self.bias.size != 1:
+            raise InputError(f"{self.bias.size} ways to sample were studied, expected one for a sensor")
+        noise, units = float(self.deviation[0, 0, 0]), float(self.unit_deviation[0, 0, 0])
+        if not np.isfinite(noise + units):
+            raise InputError("no impact was seen in the samples, expected less noise for a sensor")
+        # The mean over units is known at the design, and is taken off.
+        offset = float(np.sqrt(max(units**2 - noise**2, 0.0)))
+        missed = min(float(self.unit_missed[0, 0, 0]), _MOST_MISSED)
+        return ImpactSensor(noise=noise, offset=offset, missed=missed, seed=seed)
 
     @property
     def unit(self) -> str:

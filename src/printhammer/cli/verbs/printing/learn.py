@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
+from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -45,6 +46,10 @@ def learn(
     hammer: Hammer = opt.HAMMER,
     unit: Path | None = opt.source("Hammer file of the unit that is driven (a random one)."),
     noise: float | None = opt.quantity("s", "TIME", "Of a time of impact ('5 us').", panel=_PANEL),
+    signal: str | None = opt.choice(
+        "current|voltage", "Take the time of impact from samples of the coil instead.", panel=_PANEL
+    ),
+    signal_noise: str | None = opt.text("VALUE", "Noise of such a sample ('5 mA', '50 mV').", panel=_PANEL),
     force_noise: float | None = opt.number(
         "Noise of a force, relative (forces are not measured).", panel=_PANEL
     ),
@@ -64,6 +69,11 @@ def learn(
     from printhammer.hammer.hammer import load
 
     readings = opt.given(noise=noise, force=force_noise, colour=colour, gain=gain, missed=missed, false=false)
+    if signal is not None:
+        opt.refuse({"noise": noise}, "none beside --signal, which has --signal-noise")
+        readings |= _from_coil(job, hammer, signal, signal_noise)
+    else:
+        opt.refuse({"signal-noise": signal_noise}, "none without --signal")
     driven = None if unit is None else load(unit)
     with job.counting("learning") as tell:
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
@@ -74,6 +84,22 @@ def learn(
         files={"out": Content.of(result), "table": Content.of(result.table)},
         complaints=[] if result.passed else [complaint],
     )
+
+
+def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict[str, float]:
+    """Return what the time of impact from samples of the coil is like: noise, offset and share missed."""
+    from dataclasses import asdict
+
+    from printhammer.control.sensing.impact_time import impact_time
+
+    if noise is None:
+        raise InputError(
+            "--signal-noise is missing, expected the noise of a sample, such as '5 mA' or '50 mV'"
+        )
+    with job.counting("sampling") as tell:
+        study = impact_time(hammer, signal=signal, noise=[noise], dots=200, units=50, progress=tell)
+    sensor = asdict(study.sensor())
+    return {name: sensor[name] for name in ("noise", "offset", "missed") if sensor[name]}
 
 
 def stages(result: Learning, units: Units) -> Table:
