@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
     from printhammer.control.sensing.sampling import Signal
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray, IntArray
 
 MOST: Final = 2000
@@ -58,6 +60,12 @@ class ImpactTime(Result, rows=_CELLS):
     def title(self) -> str:
         """What it is of."""
         return f"time of impact of {self.hammer.name} from the {self.signal} of its coil"
+
+    def entries(self) -> Entries:
+        """Return the arrays, the noise in the unit of the signal."""
+        entries = super().entries()
+        note, values = entries["noise"]
+        return {**entries, "noise": (replace(note, unit=self.unit), values)}
 
     def sensor(self, seed: int = 0) -> ImpactSensor:
         """Return the estimator as a sensor for `printhammer.learn`, where one way to sample was studied.
