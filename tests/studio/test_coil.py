@@ -11,7 +11,6 @@ from tests.studio.server import STATE
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import load
 from printhammer.studio.frames import unframe
-from printhammer.studio.pictures import section
 from printhammer.studio.pictures.chart import FULL, map_frame
 from printhammer.studio.pictures.engine import motion_frame
 from printhammer.studio.states import controls
@@ -22,8 +21,6 @@ from printhammer.studio.states.shelf import Shelf
 from printhammer.studio.states.state import State, read_state
 from printhammer.studio.states.texts import texts_of
 from printhammer.studio.work import alike
-from printhammer.studio.workers import jobs
-from printhammer.studio.workers.order import Order
 
 
 def of(hammer: str = "hendriks-1983", **changed: Any) -> State:
@@ -122,37 +119,6 @@ def test_states_of_drivers_are_compared_by_what_they_have() -> None:
     assert alike(one, of(waveform=rail(width=1.1 * rail()["width"]), constants={"coil.temperature": 22.0}))
     assert not alike(one, of(waveform=rail(), constants={"coil.temperature": 80.0}))
     assert not alike(one, of(waveform=rail(decay_voltage=3.0)))
-
-
-def test_a_train_without_derivatives_has_points_and_says_why_no_verdict(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def refused(_state: State, _points: int) -> None:
-        raise InputError("no derivatives here")
-
-    monkeypatch.setattr(section, "exponent_so_far", refused)
-    assert section.no_exponent(of()) == ""
-    sent: list[tuple[bytes, bool]] = []
-
-    class Desk:
-        tried = None
-
-        def tell(self, data: bytes, _view: str, *, whole: bool = True) -> None:
-            sent.append((data, whole))
-
-        def newer(self) -> bool:
-            return False
-
-        def rest(self, _seconds: float) -> bool:
-            return False
-
-    state = of(waveform=rail(), rate=500.0, views=["strobe"])
-    jobs.detail(Order("detail", 1, state, ("strobe",), {}), Desk())
-    headings = [unframe(data)[0] for data, _ in sent]
-    assert [whole for _, whole in sent] == [False] * (len(sent) - 1) + [True]
-    assert headings[-1]["unjudged"] == "no derivatives here"
-    assert headings[-1]["verdict"] is None
-    assert unframe(sent[-1][0])[1]["x"].size == section.LATER[-1]
 
 
 def test_a_full_map_tells_the_dots_of_its_runs_also_where_touches_are_short() -> None:

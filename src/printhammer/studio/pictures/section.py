@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.drive.trains import PulseTrain
-from printhammer.errors import InputError
 from printhammer.run.problem import TOLERANCE
 from printhammer.studio import bounds
 from printhammer.studio.frames import frame
-from printhammer.studio.states.coil import by_voltage
 from printhammer.studio.work import try_out
 
 if TYPE_CHECKING:
@@ -24,7 +22,6 @@ AT_ONCE: Final = (25, 50, 100)
 LATER: Final = (150, 200, 300, 400)
 """Points that follow where no newer state comes, with the exponent over the later half of them."""
 
-_SOME: Final = 4
 
 VERDICT_WORK: Final = 16.0
 """Work of the verdict in that of all points before it: five times the firings, and the exponent over them."""
@@ -45,17 +42,6 @@ def check_strobe(state: State) -> None:
     )
 
 
-def no_exponent(state: State) -> str:
-    """Return why a train by voltage has neither exponent nor verdict; nothing where it may have them."""
-    if not by_voltage(state.fired):
-        return ""
-    try:
-        exponent_so_far(state, _SOME)
-    except InputError as error:
-        return str(error)
-    return ""
-
-
 def strobe_frame(
     state: State,
     serial: int,
@@ -63,11 +49,8 @@ def strobe_frame(
     *,
     exponent: bool = False,
     judged: bool = False,
-    unjudged: str = "",
 ) -> bytes:
     """Return strobe points of an endless train at the rate; exponent so far and verdict if asked for.
-
-    `unjudged` is why there will be neither.
 
     Raises
     ------
@@ -79,7 +62,6 @@ def strobe_frame(
     fired: dict[str, Any] = {"waveform": state.fired, "overlap": state.overlap, "rate": state.rate}
     section = strobe(state.changed, points=points, verdict=judged, **fired)
     heading: dict[str, Any] = {"status": section.status, "rate": state.rate, "verdict": None, "reason": ""}
-    heading["unjudged"] = unjudged
     heading["exponent"] = exponent_so_far(state, points) if exponent else None
     heading["last"] = LATER[-1]
     if section.verdict is not None:

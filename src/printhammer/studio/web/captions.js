@@ -68,7 +68,6 @@ const TEXTS = {
   strobe: ({ strobe }) => {
     if (!strobe || strobe.reason) return strobe?.reason ?? "";
     const { verdict } = strobe;
-    if (!verdict && strobe.unjudged && strobe.status === "ok") return `The state at each firing of an endless train, without a verdict: ${strobe.unjudged}.`;
     if (!verdict) return strobe.status === "ok" ? "The state at each firing of an endless train; the verdict on it follows." : `An endless train cannot be followed at this rate: ${strobe.status}.`;
     const period = /^period-(\d+)$/.exec(verdict.verdict)?.[1];
     if (period) return period === "1" ? "One point in the end: the train repeats itself with every firing." : `${large(NUMBERS[period] ?? period)} points in the end: the train repeats itself after as many firings.`;

@@ -18,7 +18,6 @@ from printhammer.studio.pictures.section import (
     LATER,
     VERDICT_WORK,
     check_strobe,
-    no_exponent,
     strobe_frame,
 )
 from printhammer.studio.work import GivenUp, Patience
@@ -97,12 +96,6 @@ def _section(order: Order, desk: Desk) -> None:
         desk.tell(strobe_frame(state, serial, points), "strobe", whole=False)
     if desk.rest(REST):
         raise GivenUp
-    if why := no_exponent(state):
-        for points in LATER:
-            patience.check()
-            data = strobe_frame(state, serial, points, unjudged=why)
-            desk.tell(data, "strobe", whole=points == LATER[-1])
-        return
     for points in LATER:
         patience.check()
         begun = patience.spent
