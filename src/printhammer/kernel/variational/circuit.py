@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled, inlined
+from printhammer.kernel.compile.compiling import called, compiled, inlined
 from printhammer.kernel.model.circuit import BLOCKED, CHOPPED, SOURCE
 from printhammer.kernel.model.layout import (
     CAPACITANCE,
@@ -107,7 +107,7 @@ def force_with_current(x: float, current: float, hammer: Hammer) -> float:
     return math.nan
 
 
-@compiled
+@called
 def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float, float]:
     """Return the slopes of the magnetising current with displacement [A/m] and main linkage [A/Wb].
 
@@ -145,7 +145,7 @@ def coil_change(dx: float, linkage: float, turn: float, slopes: Any, hammer: Ham
     return float(slopes[0] * dx + slopes[1] * linkage)
 
 
-@compiled
+@called
 def current_change(x: float, electric: Electric, live: Any, k: int, forcing: Forcing) -> float:
     """Return the change of the magnetising current [A] with a constant, at a fixed place and linkage."""
     varied = forcing.varied
@@ -183,7 +183,7 @@ def linkage_change(x: float, k: int, forcing: Forcing) -> float:
     return float(total / V.SPACING)
 
 
-@compiled
+@called
 def add_circuit(rates: Any, y: Any, count: int, x: float, moves: bool, setting: Setting) -> None:
     """Fill in the `rates` of the electric state and its changes at `y`; add to those of the velocities.
 
@@ -260,7 +260,7 @@ def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
     return float(forcing.live_moves[k, 4]) if live[7] >= 0.0 else 0.0
 
 
-@compiled
+@called
 def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
     """Carry the columns through a change of the current's path between edges; tell whether differentiable.
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.compile.compiling import called, compiled
 from printhammer.kernel.model.circuit import BACKWARD, BLOCKED, CHOPPED
 from printhammer.kernel.model.layout import (
     CAPACITANCE,
@@ -64,7 +64,7 @@ def source_changes(t: float, live: Any, k: int, forcing: Forcing) -> tuple[float
     return (drive_change(t, live, pulse) if live[0] > 0.0 else 0.0), moves[k, SERIES]
 
 
-@compiled
+@called
 def add_supply(rates: Any, y: Any, count: int, x: float, setting: Setting) -> None:
     """Add what constants do to the `rates` of the electric changes at `y`."""
     hammer, live, forcing = setting.hammer, setting.drive, setting.forcing
@@ -118,7 +118,7 @@ def rates_at(node: Any, setting: Setting) -> tuple[float, float, float]:
     return electric_rates(node[0], node[1], node[2], electric_at_node(node), setting.hammer, setting.drive)
 
 
-@compiled
+@called
 def move_edge(node: Any, before: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
     """Carry the columns through an edge of a driver that moves, `before` which these were the rates."""
     live, forcing = setting.drive, setting.forcing
