@@ -9,13 +9,10 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.chaos.strobe.map import strobe_map
 from printhammer.drive.file import load_drive, save_drive
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.drivers import Bridge, Capacitor, Chopper, PeakAndHold, Rail
 from printhammer.drive.waveforms.shapes import HalfSine, Waveform
-from printhammer.hammer.equilibrium import rest_state
-from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,11 +66,3 @@ def test_a_sequence_has_one_supply() -> None:
         ph.simulate(hammer, PulseSequence([EACH[2], other], at=[0.0, 1e-3]))
     with pytest.raises(ph.InputError, match="is a current, expected a voltage"):
         PulseSequence([EACH[2], HalfSine(amplitude=1.0, width=1e-3)], at=[0.0, 1e-3])
-
-
-def test_sections_without_the_current_say_so() -> None:
-    hammer = ph.load("hendriks-1983").replace(
-        {"coil": {"resistance": "2 ohm", "inductance": "3 mH"}, "waveform": EACH[0]}
-    )
-    with pytest.raises(ph.InputError, match="without the current of the coil"):
-        strobe_map(Regime.of(hammer, period="1.2 ms"), (rest_state(hammer), 0.0))
