@@ -48,6 +48,8 @@ FEWER = {
     "tune mine.toml": "tune mine.toml --history 1 --no-judge",
     "--longest 4": "--longest 1 --starts 20",
     "--longest 3 --out regimes": "--longest 1 --seeds 1 --most 20 --out regimes",
+    "learn hendriks-1983": "learn hendriks-1983 --members 50",
+    "learn mine.toml": "learn mine.toml --members 50",
     "--doublings 1": "--doublings 1 --most 20",
     "--second backstop": "--grid 3 --most 5 --second backstop",
     "--yield 64": "--yield 2",
