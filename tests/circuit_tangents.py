@@ -13,11 +13,19 @@ from printhammer.derivatives.parameters import Parameter, parameter_names, param
 from printhammer.derivatives.states import follow, state_rows
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
-from printhammer.kernel.model.layout import CHARGED, CURRENT_SCALE, LINKAGE_SCALE, RESISTANCE
+from printhammer.kernel.model.circuit import BLOCKED
+from printhammer.kernel.model.layout import (
+    CHARGED,
+    CURRENT_SCALE,
+    LINKAGE_SCALE,
+    RESISTANCE,
+    TURN_RESISTANCE,
+)
 from printhammer.kernel.model.modes import RELOADING, UNLOADING
 from printhammer.kernel.single import carry
 from printhammer.run.problem import Problem, fresh_carry
 from printhammer.run.start import initial_state
+from printhammer.run.supply import current_of
 
 if TYPE_CHECKING:
     import printhammer as ph
@@ -39,13 +47,23 @@ def units_of(problem: Problem) -> np.ndarray:
     return np.array([way, speed, way, linkage, linkage, voltage])
 
 
+def currents(problem: Problem, state: Any, path: float) -> tuple[float, float]:
+    """Currents in the coil, A, and in its shorted turn, of the flux linkages of a state."""
+    hammer, x, linkage, main = problem.hammer, *(float(state[k]) for k in (0, 3, 4))
+    coil = current_of(hammer, x, linkage, main) if path != BLOCKED else 0.0
+    if not problem.constants[TURN_RESISTANCE] > 0.0:
+        return coil, 0.0
+    alone = hammer.replace({"coil.turn_resistance": None, "coil.leakage": None})
+    return coil, current_of(alone, x, main, main) - coil
+
+
 def arrive(problem: Problem, state: Any, branch: int, path: float, start: float, end: float) -> np.ndarray:
     """State at `end` of a run with a current from `start` on: as `state`, six numbers."""
     begin = fresh_carry()
     if branch in (UNLOADING, RELOADING):
         begin[carry.STATE], begin[carry.MODE], begin[carry.PEAK] = carry.ON_BRANCH, branch, state[2]
-    begin[carry.WITH_CURRENT], begin[carry.PATH], begin[carry.UNTIL] = 1.0, path, np.inf
-    begin[carry.ELECTRIC : carry.ELECTRIC + 3] = state[3:]
+    begin[carry.WITH_CURRENT] = 1.0
+    begin[carry.ELECTRIC : carry.ELECTRIC + 3] = (*currents(problem, state, path), state[5])
     nodes = np.empty((20_000, 9))
     status, used, _touched, _steps = problem.kernel.run(
         problem.drive_arrays(),

@@ -72,7 +72,9 @@ def rows(result: EnsembleResult, i: int) -> dict[str, npt.NDArray[Any]]:
     for name, table, mark in (("dots", result.dots, "fired_at"), ("strobes", result.strobes, "t")):
         if table is not None:
             kept = ~np.isnan(getattr(table, mark)[i])
-            found.update({f"{name}.{key}": column[i][kept] for key, column in vars(table).items()})
+            # Currents are there under a voltage only.
+            columns = {key: column for key, column in vars(table).items() if column is not None}
+            found.update({f"{name}.{key}": column[i][kept] for key, column in columns.items()})
     if result.x is not None:
         found["x"] = result.x[i]
     return found

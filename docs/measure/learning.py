@@ -60,7 +60,15 @@ AFTER = (50, 200, 1000)
 FEEDBACK = 10
 """Number of units on which feedback prints beside many others, of a shorter cycle."""
 FEW = f"feedback, {FEEDBACK} of them"
-ROOMS = (*MOTION, "control/learning", "control/table", "control/widths", "printing/dots", "printing/rates")
+ROOMS = (
+    *MOTION,
+    "control/learning",
+    "control/coil_current",
+    "control/table",
+    "control/widths",
+    "printing/dots",
+    "printing/rates",
+)
 CYCLE = slots_of(cycle_with_lead_in())
 
 

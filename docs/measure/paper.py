@@ -39,7 +39,7 @@ PAPERS = {
 }
 ROOMS = (
     *MOTION,
-    *("control/feedback", "control/learning", "control/table", "control/widths"),
+    *("control/feedback", "control/learning", "control/coil_current", "control/table", "control/widths"),
     *("printing/dots", "printing/rates"),
 )
 SPEED = 1.0

@@ -33,7 +33,14 @@ TOLERANCE = 5e-7
 BETWEEN = 2.5
 """Shift of a grid of rates that lie between those of the table, Hz."""
 
-ROOMS = (*MOTION, "control/table", "control/widths", "printing/dots", "printing/rates")
+ROOMS = (
+    *MOTION,
+    "control/coil_current",
+    "control/table",
+    "control/widths",
+    "printing/dots",
+    "printing/rates",
+)
 
 
 def finite(value: float) -> float | str:

@@ -28,7 +28,14 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 SAFE = 850.0
 """Open-loop safe rate of the shipped hammer, Hz."""
 TICKS = (None, "1 us", "2 us", "5 us", "10 us", "20 us")
-ROOMS = (*MOTION, "control/table", "control/widths", "printing/dots", "printing/rates")
+ROOMS = (
+    *MOTION,
+    "control/coil_current",
+    "control/table",
+    "control/widths",
+    "printing/dots",
+    "printing/rates",
+)
 
 
 def printed(units: list[ph.Hammer], hammer: ph.Hammer, table: CompensationTable, rate: float) -> Trial:

@@ -135,11 +135,12 @@ def test_the_widest_pulse_is_found_by_its_peak() -> None:
 
 
 def test_fading_is_that_of_the_decay() -> None:
-    pulse = crude().waveform
+    hammer = crude()
+    pulse = hammer.waveform
     assert pulse is not None
     decay = pulse.decay  # type: ignore[attr-defined]
-    assert fading(pulse, 0.02) == pytest.approx(decay * np.log(1.0 / 0.02), rel=2e-2)
-    assert fading(HalfSine(amplitude=1.0, width=1e-4), 0.02) == 0.0
+    assert fading(hammer, pulse, 0.02) == pytest.approx(decay * np.log(1.0 / 0.02), rel=2e-2)
+    assert fading(hammer, HalfSine(amplitude=1.0, width=1e-4), 0.02) == 0.0
 
 
 def test_hammers_that_no_table_is_for() -> None:
