@@ -46,6 +46,7 @@ def test_an_ideal_source(waveform: Any, overlap: Any) -> None:
     assert max(found.values()) < WANTED, found
 
 
+@pytest.mark.slow
 def test_a_held_armature_and_a_rigid_stop() -> None:
     """A rest in the backstop under a small current, and one on a rigid stop until the current lifts it."""
     names = [
