@@ -99,7 +99,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory) -> Path:
     motions = [(rate, ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=rate))) for rate in (500, 900)]
     rows = [f"{rate},{t},{x}" for rate, motion in motions for t, x in zip(motion.t, motion.x, strict=True)]
     (folder / "measured.csv").write_text("\n".join(["rate [Hz],time [s],displacement [m]", *rows[::9]]))
-    for page, name in (("drives", "burst"), ("sweeps", "spec")):
+    for page, name in (("drives", "burst"), ("sweeps", "spec"), ("quality", "paper")):
         text = (ROOT / "docs" / "howto" / f"{page}.md").read_text("utf-8")
         (folder / f"{name}.toml").write_text(TOML.findall(text)[0])
     sheet = files("printhammer").joinpath("hammers", "sheets", "dot-peen.toml")

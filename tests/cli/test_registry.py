@@ -40,7 +40,7 @@ NEEDED = {
 }
 # Examples that take more than a few seconds.
 LONG = {"basins", "bifurcation", "continue", "curve", "orbits", "energy", "feedback", "tune", "sweep"}
-LONG |= {f"reconstruct {verb}" for verb in ("judge", "front", "predictions", "schemes", "family")}
+LONG |= {f"reconstruct {verb}" for verb in ("judge", "front", "predictions", "family")}
 # Examples that are part of other tests, or take minutes.
 ELSEWHERE = {
     "paper": "takes minutes; test_paper.py writes the whole report",
@@ -50,6 +50,7 @@ ELSEWHERE = {
     "fit coil": "reads a hammer on a voltage that no other verb writes; test_fit_coil.py",
     "warm": "test_warm.py runs it",
     "learn": "designs on 800 hammers; test_learn.py, and its page, with fewer",
+    "reconstruct schemes": "takes minutes; test_reconstruct.py, and the count in test_schemes.py",
     "reconstruct search": "takes a minute; the other examples of reconstruct begin with a shorter one",
     "reconstruct base-rates": "takes minutes; test_reconstruct.py, with claims at no cost",
     "reconstruct ship": "judges all claims, which takes minutes; test_reconstruct.py, with the stated ones",

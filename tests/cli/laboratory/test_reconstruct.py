@@ -151,6 +151,26 @@ def test_base_rates_are_counted(cli: Callable, here: Path, cheap: None) -> None:
     assert (table.hammers, table.seed) == (4, 1)
 
 
+def test_verdicts_of_the_schemes_are_counted(
+    cli: Callable, here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The count itself, which takes minutes, is in tests/reconstruction/test_schemes.py."""
+    asked: dict[str, Any] = {}
+
+    def counted(hammer: ph.Hammer, hammers: int, seed: int, **how: Any) -> dict[str, Any]:
+        asked.update(hammer=hammer.name, hammers=hammers, seed=seed)
+        how["tell"](hammers, hammers)
+        change = {"first": "exact", "second": "trapezoid", "panels": 40, "differ": 17}
+        return {"hammers": hammers, "changes": [change]}
+
+    monkeypatch.setattr("printhammer.reconstruction.judging.schemes.schemes_json", counted)
+    done = cli("reconstruct", "schemes", "schemes.json", "--hammers", "2", "--workers", "1")
+    assert done.status == 0
+    assert "exact to trapezoid: 17 of 40 verdicts differ" in done.out
+    assert asked == {"hammer": "hendriks-1983", "hammers": 2, "seed": 1}
+    assert json.loads((here / "schemes.json").read_text())["hammers"] == 2
+
+
 def test_the_best_ships(cli: Callable, here: Path, cheap: None) -> None:
     del cheap
     best, other = constants_in(CRUDE), constants_in(CRUDE)
