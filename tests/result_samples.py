@@ -83,6 +83,9 @@ def learning(hammer: Hammer) -> Result:
         force_deviation=off,
         arrival_deviation=1e-4 * off,
         good=np.abs(off) <= 0.1,
+        constants=("mass",),
+        believed=np.array([2e-3]),
+        uncertainty=np.array([1e-5]),
         contraction=np.array([0.98]),
         seed=1,
     )

@@ -49,7 +49,7 @@ ELSEWHERE = {
     "fit solenoid": "reads a table that no other verb writes; test_fit_solenoid.py",
     "fit coil": "reads a hammer on a voltage that no other verb writes; test_fit_coil.py",
     "warm": "test_warm.py runs it",
-    "learn": "designs on 800 hammers; test_learn.py, and its page, with fewer",
+    "learn": "chooses among 400 hammers; test_learn.py, and its page, with fewer",
     "reconstruct schemes": "takes minutes; test_reconstruct.py, and the count in test_schemes.py",
     "reconstruct search": "takes a minute; the other examples of reconstruct begin with a shorter one",
     "reconstruct base-rates": "takes minutes; test_reconstruct.py, with claims at no cost",

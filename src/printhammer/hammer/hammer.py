@@ -360,6 +360,19 @@ class Hammer:
                 raise InputError(f"{there}: the file is another table than that of {self.name}")
         return missing
 
+    @cached_property
+    def rest(self) -> float:
+        """Displacement at which the armature rests at zero current, m.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        from printhammer.hammer.equilibrium import rest_state
+
+        return rest_state(self)
+
     def check(self) -> None:
         """Refuse a hammer that does not rest at its backstop.
 
@@ -369,11 +382,9 @@ class Hammer:
             With a magnet and a backstop, the net force at zero current at the backstop is not negative, or
             the backstop does not hold the armature.
         """
-        from printhammer.hammer.equilibrium import rest_state
-
         if self.magnet is not None and self.backstop is not None:
             with located(self._where):
-                rest_state(self)
+                _ = self.rest
 
     def warnings(self) -> list[str]:
         """Say what is odd about a hammer that can still be simulated.

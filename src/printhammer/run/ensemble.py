@@ -224,10 +224,8 @@ class Ensemble:
         full = np.zeros((self.size, 3 + len(AT_REST)))
         full[:, 3:] = AT_REST
         if rows is None:
-            from printhammer.hammer.equilibrium import rest_state
-
             hammers, hammer_of = self._own_hammers
-            full[:, 1] = np.array([rest_state(hammer) for hammer in hammers])[hammer_of]
+            full[:, 1] = np.array([hammer.rest for hammer in hammers])[hammer_of]
             return full
         places = FORMS.get(rows.shape[-1]) if rows.ndim in (1, 2) else None
         fired = self.drives.pulses if isinstance(self.drives, PulseTrains) else self.drives

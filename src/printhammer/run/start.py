@@ -64,9 +64,7 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
         backstop; no state, and the hammer has no rest state.
     """
     if state is None:
-        from printhammer.hammer.equilibrium import rest_state
-
-        return rest_state(hammer), 0.0
+        return hammer.rest, 0.0
     if len(state) != 2:
         raise InputError(
             f"state = {tuple(state)!r}, expected two numbers, displacement in m and velocity in m/s"

@@ -14,7 +14,6 @@ from printhammer.drive.batch import PulseTrains, firings_of
 from printhammer.drive.file import drive_of
 from printhammer.drive.text import FORMAT, document
 from printhammer.errors import InputError
-from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.names import RATE
 from printhammer.results import Declared, part, scalar
 from printhammer.run.simulate import CYCLE
@@ -88,7 +87,6 @@ class Maker:
 
     base: Base
     _hammers: dict[tuple[float, ...], Hammer] = field(default_factory=dict)
-    _rests: dict[int, float] = field(default_factory=dict)
     _standards: dict[int, tuple[Waveform | None, Hashable]] = field(default_factory=dict)
     _drives: dict[tuple[Hashable, ...], Drive] = field(default_factory=dict)
 
@@ -151,9 +149,7 @@ class Maker:
             if axis.target == "state":
                 x, v = (float(value), v) if axis.field == "x" else (x, float(value))
         if x is None:
-            if id(hammer) not in self._rests:
-                self._rests[id(hammer)] = rest_state(hammer)
-            x = self._rests[id(hammer)]
+            x = hammer.rest
         return x, v or 0.0
 
     def _of(self, row: Sequence[float], *targets: str) -> dict[Axis, float]:

@@ -9,7 +9,7 @@ import printhammer as ph
 def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path) -> None:
     unit, table, picture = tmp_path / "unit.toml", tmp_path / "learned.csv", tmp_path / "lines.png"
     ph.load("hendriks-1983").replace("magnet.Am", 0.282).save(unit)
-    words = ("--rate", "1.275kHz", "--force-noise", 0.03, "--members", 50, "--serial", "A17", "--unit", unit)
+    words = ("--rate", "1.275kHz", "--force-noise", 0.03, "--members", 100, "--serial", "A17", "--unit", unit)
     done = cli("learn", "hendriks-1983", *words, "--table", table, "--out", picture)
     assert done.status in (0, 1)
     assert "Unit A17 of hendriks-1983 at 1275 Hz" in done.out

@@ -27,6 +27,18 @@ def test_constants_are_spread_as_stated() -> None:
     assert platens - fronts == pytest.approx(np.full(400, platens[0] - fronts[0]), abs=1e-12)
 
 
+def test_other_laws_have_other_constants() -> None:
+    """A device with a reluctance magnet, a preloaded spring, a coil circuit and a rigid stop."""
+    hammer = ph.load("impact-wire")
+    spread = Variability().constants(hammer)
+    assert spread["backstop.restitution"] == pytest.approx(0.2 * hammer.constants["backstop.restitution"].si)
+    assert spread["coil.resistance"] == pytest.approx(0.05 * hammer.constants["coil.resistance"].si)
+    assert {"magnet.pole_area", "spring.preload", "spring.stiffness"} < set(spread)
+    without = hammer.replace("pack", None)
+    assert (Variability.of(without).travel, Variability.of(without).paper) == (0.0, 0.0)
+    assert Variability.of(hammer) == Variability()
+
+
 def test_the_same_seed_draws_the_same() -> None:
     first, again, other = (
         [each.fingerprint for each in Variability().draw(crude(), 5, seed)] for seed in (1, 1, 2)

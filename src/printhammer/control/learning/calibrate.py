@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from printhammer.control.learning.law import PRINTED, LearningLaw
+from printhammer.control.learning.ladder import DOTS
+from printhammer.control.learning.law import PRINTED, RUNS, LearningLaw
 from printhammer.control.learning.learner import Learner
-from printhammer.control.learning.lines import DOTS, REPEATED, Press
+from printhammer.control.learning.lines import LINE, Press
 from printhammer.control.table.drivers import with_pulse
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from printhammer.control.learning.sensor import ImpactSensor
     from printhammer.hammer.hammer import Hammer
@@ -31,16 +32,19 @@ class Progress(NamedTuple):
 
 
 def calibrate(
-    law: LearningLaw, units: Sequence[Hammer], sensor: ImpactSensor
+    law: LearningLaw,
+    units: Sequence[Hammer],
+    sensor: ImpactSensor,
+    report: Callable[[], None] = lambda: None,
 ) -> tuple[list[Learner], list[Progress]]:
     """Let a learner calibrate each of some units, hammers in which the pulse of the nominal one is fired.
 
     A unit prints the same every time that it prints the same; so what one run of a stage prints, all do, and
-    only the readings differ.
+    only the readings differ. `report` is called after each stage.
     """
     task = law.entries.task
     press = Press(task, law.entries.rate, [with_pulse(unit, task.pulse) for unit in units])
-    flights, forces = (np.tile(each, REPEATED) for each in press.ladder())
+    flights, forces = press.ladder(law.rungs)
     learners = [Learner(law) for _ in units]
     single = task.single.nominal
     run, history = 0, []
@@ -49,14 +53,20 @@ def calibrate(
         cycle = press.line([learner.printed for learner in learners], PRINTED)[1]
         state = np.array([learner.learned for learner in learners])
         history.append(
-            Progress(run * DOTS, cycle, line, state, np.array([learner.corrections for learner in learners]))
+            Progress(
+                run * (DOTS + len(LINE)),
+                cycle,
+                line,
+                state,
+                np.array([learner.corrections for learner in learners]),
+            )
         )
 
-    for number, stage in enumerate(law.stages):
+    for number, runs in enumerate(RUNS):
         dots, judgement = press.line([learner.settings for learner in learners])
         if not number:
             record(judgement)
-        for _ in range(stage.runs):
+        for _ in range(runs):
             for unit, learner in enumerate(learners):
                 rungs = sensor.read(flights[unit], forces[unit], unit, 2 * run)
                 line = sensor.read(
@@ -65,4 +75,5 @@ def calibrate(
                 learner.see(rungs, line)
             run += 1
         record(judgement)
+        report()
     return learners, history

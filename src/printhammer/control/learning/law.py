@@ -1,189 +1,197 @@
-"""The learning law: gains that are designed once, on simulated hammers, and then only applied.
+"""The learning law: from what is believed of a unit to the entries of its table.
 
 After stage s the corrections u of the entries become
 
-    u(s+1) = Q u(s) + L(s) e(s),    Q = 1 - forgetting,
+    u(s+1) = Q u(s) - L e(u(s)),    Q = 1 - forgetting,
 
-where e(s) holds the deviations that the sensor has shown: of the ladder, on the mean of all runs so far, and
-of the line, on the mean of the runs of this stage and of the one before. That is iterative learning control
-of higher order, from run to run. L(s) = -G+ K(s): K(s) is the linear estimate, least in the mean square, of
-all deviations of force and arrival from what the sensor shows, over hammers drawn from the stated
-variability; G is the sensitivity of the deviations to the entries, of the nominal hammer, and G+ its
-regularised inverse. The noise of a mean falls with the number of its runs, and the gains follow, as in
-stochastic learning control (S. S. Saab, IEEE Trans. Autom. Control 46 (2001) 877).
+where e holds how far force and arrival of all dots of a line are off. That is iterative learning control,
+from run to run. What the sensor shows is one number a dot, or two, with noise; e is therefore what the
+hammers that are believed in print with these entries, in the mean over the modes, and a part a of what
+readings of the line differ from that, as far as noise does not explain it: of what the laws of the model do
+not hold. L = G+, where G is the sensitivity of e to the entries, of the most probable hammer, and G+ its
+regularised inverse, in which dots that are far off count for more. On hammers that are believed in nothing
+has to be printed: there the law is followed until it leads no further (Newton's method of norm-optimal
+learning control).
 
-Convergence: corrections that differ come together, or at least not apart, where no eigenvalue of Q + L(s) G
-is beyond 1 in absolute value, L(s) being the columns for the line of the stage, and G the sensitivity of what
-the sensor shows of it. `Stage.contraction` is the largest one on the nominal hammer; a gain for which it were
-above 1 is halved until it is not.
+Convergence: corrections that differ come together, or at least not apart, where no eigenvalue of Q - L (G +
+a (G' - G)) is beyond 1 in absolute value, G' being the sensitivity of the unit. It is not known; a, 1
+otherwise, is halved until this holds for hammers that are held for possible.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.control.learning.lines import LADDER, LINE, REPEATED, Press
+from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.table.histories import histories_of
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    from printhammer.control.learning.sensor import ImpactSensor
+    from printhammer.control.learning.belief import Belief
+    from printhammer.control.learning.ladder import Rung
+    from printhammer.control.learning.production import Production
     from printhammer.control.learning.settings import Adjustable
+    from printhammer.control.learning.surrogate import Surrogate
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray
+    from printhammer.support.arrays import FloatArray
 
 RUNS: Final = (1, 1, 2, 4, 8, 24)  # Number of runs of each stage
-GATE: Final = 3.0  # Deviation, in parts of the limits, beyond which a reading counts as this
+GATE: Final = 3.0  # Deviation, in parts of the limits, beyond which one counts as this
 _DAMPING: Final = 1e-3  # Of the inverse of G: mean square of deviations, in parts of the limits, per `STEP`
-_RIDGE: Final = 1e-3  # Of the estimate, in squares of the limits
+_STEEP: Final = 2.0  # By how much more what is far off counts, for each square of the limits
+_SIZES: Final = (1.0, 0.5, 0.2)  # Parts of a change that are tried
+_NEWTON: Final = 10  # How often, at most, the law is applied to the hammer that is believed in, after a stage
+_BAD: Final = 10.0  # What is left over beyond which another way is tried
+_SLOW: Final = 0.85  # Part of the badness of the time before below which it pays to go on
+_LEAST: Final = 1e-2  # Least part of what is not explained that is put right
+_OTHERS: Final = 4  # Number of probable hammers for which corrections must not move apart
+_ALIKE: Final = 24  # Number of probable hammers that decide whether the table is handed out
+_GAIN: Final = 0.02  # Least share of the dots that the table gains in the mean over these
+TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
+"""Slots of the line that corrections are tried on, on hammers that are believed in: the cycle of order 6."""
+
 PRINTED: Final = slots_of(cycle_with_lead_in())
 """Slots of the cycle on which tables are judged."""
 
 
-@dataclass(frozen=True)
-class Stage:
-    """What is done after the runs of a stage, from its features (features,)."""
+class Update(NamedTuple):
+    """What comes of a stage."""
 
-    runs: int
-    gain: FloatArray  # L(s), shape (inputs, features)
-    contraction: float
-    estimate: FloatArray  # K(s), shape (deviations, features)
-    # What K(s) estimates of each simulated hammer (members, deviations), and which share of the dots is then
-    # within limits more than in an open loop (members,)
-    seen: FloatArray
-    edge: FloatArray
+    corrections: FloatArray  # (inputs,)
+    contraction: float  # Largest eigenvalue of Q + L G'
+    gains: bool  # Whether the table is handed out
+
+
+class _Unit(NamedTuple):
+    """What is believed of a unit, as hammers that print."""
+
+    hammers: Sequence[Hammer]  # The most probable first
+    weights: FloatArray  # Their probabilities
+    more: FloatArray  # How far dots are off beyond that, (2 dots,)
 
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """What a learner knows: the nominal hammer, and what to do with what it is shown. Nothing of a unit."""
+    """What a learner knows: the production, the ladder, and what to do with readings. Nothing of a unit."""
 
     entries: Adjustable
-    force: bool
+    production: Production
     forgetting: float
-    # Share of the simulated hammers most like the unit that may print fewer dots with the table than in an
-    # open loop
+    # Share of the probable hammers that may print fewer dots with the table than in an open loop
     doubt: float
-    ladder: tuple[FloatArray, FloatArray]  # Flight times, s, and forces that are expected, (widths,)
-    stages: tuple[Stage, ...]
+    seed: int
+    rungs: tuple[Rung, ...]
+    # How readings depend on the constants, of the ladder and of a line in an open loop, times before forces
+    shown: tuple[Surrogate, ...]
+    rows: FloatArray  # Constants of simulated hammers, (members, size): where a search may begin
+    seen: FloatArray  # Their readings, (members, readings)
 
-    def deviations(self, time: FloatArray, force: FloatArray | None, expected: Any) -> FloatArray:
-        """Return what readings are off from what is expected, in parts of the limits; NaN if unseen."""
-        limits = self.entries.task.limits
-        off = [(time - expected[0]) / limits.arrival]
-        if self.force and force is not None:
-            off.append((force - expected[1]) / limits.force)
-        return np.asarray(np.clip(np.stack(off), -GATE, GATE))
+    def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Update:
+        """Return what is done after a stage.
 
+        `unexplained` (2, dots) is by how much arrival and force of the dots of the line are off beyond what
+        is believed, in parts of the limits.
+        """
+        modes = self.production.hammers(np.array([mode.mean for mode in belief.modes]))
+        there = np.array([hammer is not None for hammer in modes])
+        weights = belief.weights[there] / belief.weights[there].sum()
+        unit = _Unit([each for each in modes if each is not None], weights, self._by_history(unexplained))
+        probable = belief.draw(_ALIKE, self.seed)
+        alike = [each for each in self.production.hammers(probable) if each is not None]
+        keep = 1.0 - self.forgetting
+        slopes = self._slopes(unit.hammers[0], corrections)
+        gain = _gain(self._expected(unit, [corrections])[0], slopes)
+        others = [gain @ self._slopes(each, corrections) for each in alike[:_OTHERS]]
+        own = keep * np.eye(len(corrections)) - gain @ slopes
 
-def features(ladder: FloatArray, lines: Sequence[FloatArray]) -> FloatArray:
-    """Return the features of a stage: ladder, line of the stage, and line of the one before.
+        def largest(part: float) -> float:
+            moved = [own - part * (other - gain @ slopes) for other in others]
+            return float(max(np.abs(np.linalg.eigvals(each)).max() for each in moved))
 
-    Arrays are (..., measured, dots), NaN where nothing was seen; that counts as no deviation.
-    """
-    used = [ladder, *lines[:-3:-1]]
-    flat = [np.nan_to_num(np.reshape(each, (*each.shape[:-2], -1))) for each in used]
-    return np.concatenate(flat, axis=-1)
+        part = 1.0
+        while largest(part) > 1.0 and part > _LEAST:
+            part *= 0.5
+        contraction, unit = largest(part), unit._replace(more=part * unit.more)
+        left, found = self._followed(unit, keep * corrections)
+        if left > _BAD and corrections.any():
+            # The table that learning starts from may lead to where what was learned does not.
+            left, found = min((left, found), self._followed(unit, 0.0 * corrections), key=lambda end: end[0])
+        corrections = found
+        return Update(corrections, contraction, self._gains(alike, corrections))
 
+    def _followed(self, unit: _Unit, corrections: FloatArray) -> tuple[float, FloatArray]:
+        """Return to which corrections the law leads, and what they leave."""
+        best = np.inf, corrections
+        for _ in range(_NEWTON):
+            (off,) = self._expected(unit, [corrections])
+            change = -_gain(off, self._slopes(unit.hammers[0], corrections)) @ off
+            tried = [self.entries.limited(corrections, size * change) for size in _SIZES]
+            left = [_badness(each) for each in self._expected(unit, tried)]
+            k = int(np.argmin(left))
+            before, corrections = best[0], tried[k]
+            best = min(best, (left[k], corrections), key=lambda end: end[0])
+            if left[k] > _SLOW * before:
+                break
+        return best
 
-def sensitivity(press: Press, entries: Adjustable, hammer: Hammer) -> FloatArray:
-    """Return the change of the deviations of a line with each input, per `STEP`, (2, dots, inputs)."""
-    count = entries.inputs.shape[1]
-    rows = [np.zeros(count), *np.eye(count)]
-    off = Press(press.task, press.rate, [hammer] * len(rows)).deviations(
-        [entries.settings(row) for row in rows]
-    )
-    return np.asarray(np.nan_to_num(np.moveaxis(off[1:] - off[0], 0, -1)))
+    def _by_history(self, unexplained: FloatArray) -> FloatArray:
+        """Return what a line shows of the histories of the dots of `TRIED`, (2 dots,)."""
+        task = self.entries.task
+        shown, wanted = (histories_of(slots, task.gaps, task.reach)[:-1] for slots in (LINE, TRIED))
+        sums = np.zeros((2, shown.max() + 1))
+        for sums_of, values in zip(sums, unexplained, strict=True):
+            np.add.at(sums_of, shown, values)
+        return np.asarray((sums / np.maximum(np.bincount(shown), 1))[:, wanted]).ravel()
 
+    def _off(self, hammers: Sequence[Hammer], corrections: Sequence[FloatArray]) -> FloatArray:
+        """Return how far arrival and force of `TRIED` are off, in parts of the limits, (M, 2 dots)."""
+        press, limits = self.production.press(hammers), self.entries.task.limits
+        judgement = press.line([self.entries.settings(row) for row in corrections], TRIED)[1]
+        off = judgement.arrival_deviation / limits.arrival, judgement.force_deviation / limits.force
+        return np.clip(np.nan_to_num(np.concatenate(off, axis=1), nan=GATE), -GATE, GATE)
 
-def design(
-    press: Press,
-    entries: Adjustable,
-    sensor: ImpactSensor,
-    *,
-    forgetting: float,
-    doubt: float,
-    seed: int,
-    report: Callable[[], None],
-) -> LearningLaw:
-    """Design the gains on a press of simulated hammers, with a sensor of white noise."""
-    rng = np.random.default_rng(seed)
-    measured = 1 if sensor.force is None else 2
-    limits, nominal = press.task.limits, press.task.hammers[0]
-    noise = np.array([sensor.noise / limits.arrival, (sensor.force or 0.0) / limits.force])[:measured, None]
+    def _expected(self, unit: _Unit, corrections: Sequence[FloatArray]) -> FloatArray:
+        """Return how far dots are off in the mean over what is believed, (M, 2 dots)."""
+        hammers = [hammer for _ in corrections for hammer in unit.hammers]
+        rows = [row for row in corrections for _ in unit.hammers]
+        off = self._off(hammers, rows).reshape(len(corrections), len(unit.hammers), -1)
+        return np.asarray(np.einsum("m,kmd->kd", unit.weights, off) + unit.more)
 
-    def shown(true: FloatArray, count: float) -> FloatArray:
-        noisy = true[:, :measured] + noise / np.sqrt(count) * rng.standard_normal(true[:, :measured].shape)
-        return np.asarray(np.clip(noisy, -GATE, GATE))
+    def _slopes(self, hammer: Hammer, corrections: FloatArray) -> FloatArray:
+        """Return how far dots move with each input, (2 dots, inputs)."""
+        rows = [corrections, *(corrections + np.eye(len(corrections)))]
+        off = self._off([hammer] * len(rows), rows)
+        return np.asarray((off[1:] - off[0]).T)
 
-    whole = sensitivity(press, entries, nominal)
-    slopes = whole.reshape(-1, whole.shape[2])
-    inverse = np.linalg.solve(slopes.T @ slopes + _DAMPING * len(LINE) * np.eye(slopes.shape[1]), slopes.T)
-    expected = tuple(rung[0] for rung in Press(press.task, press.rate, [nominal]).ladder())
-    rungs = [
-        (each - own) / limit
-        for each, own, limit in zip(press.ladder(), expected, (limits.arrival, limits.force), strict=True)
-    ]
-    ladder, seen_ladder, runs_so_far = np.stack(rungs, axis=1), np.zeros((1, 1, 1)), 0
-    members = len(press.hammers)
-    corrections = np.zeros((members, entries.inputs.shape[1]))
-    now = [entries.open_loop] * members
-    plain = _good(press, now)
-    uncorrected = press.deviations([entries.settings(row) for row in corrections])
-    lines: list[FloatArray] = []
-    stages = []
-    for number, runs in enumerate(RUNS):
-        true = press.deviations(now)
-        lines.append(shown(true, runs))
-        # The mean of all runs so far: that of those before, and the new ones.
-        fresh = shown(ladder, REPEATED * runs)
-        seen_ladder = (runs_so_far * seen_ladder + runs * fresh) / (runs_so_far + runs)
-        runs_so_far += runs
-        evidence = features(seen_ladder, lines)
-        # How far a line with the corrections made so far is off; the first line is an open loop.
-        off = np.nan_to_num(np.clip(true if number else uncorrected, -GATE, GATE)).reshape(members, -1)
-        moments = evidence.T @ evidence / members + _RIDGE * np.eye(evidence.shape[1])
-        estimate = np.asarray(np.linalg.solve(moments, evidence.T @ off / members).T, np.float64)
-        gain, contraction = _contracting(-inverse @ estimate, whole[:measured], forgetting, number)
-        corrections = np.array(
-            [
-                entries.limited((1.0 - forgetting) * row, gain @ own)
-                for row, own in zip(corrections, evidence, strict=True)
-            ]
+    def _gains(self, alike: Sequence[Hammer], corrections: FloatArray) -> bool:
+        """Return whether probable hammers print more dots with the table, and none, but for doubt, fewer."""
+        press = self.production.press(alike)
+        plain, table = (
+            good(press, [settings] * len(alike)).mean(axis=1)
+            for settings in (self.entries.open_loop, self.entries.settings(corrections))
         )
-        now = [entries.settings(row) for row in corrections]
-        edge = _good(press, now).mean(axis=1) - plain.mean(axis=1)
-        stages.append(Stage(runs, gain, contraction, estimate, evidence @ estimate.T, edge))
-        report()
-    return LearningLaw(entries, measured == 2, forgetting, doubt, (expected[0], expected[1]), tuple(stages))
+        edge = table - plain
+        return bool(np.quantile(edge, self.doubt) >= 0.0 and edge.mean() >= _GAIN)
 
 
-def _contracting(
-    gain: FloatArray, shown: FloatArray, forgetting: float, number: int
-) -> tuple[FloatArray, float]:
-    """Return a gain, halved until corrections do not move apart, and the largest eigenvalue.
-
-    `shown` (measured, dots, inputs) is the sensitivity of what the sensor shows. The first gain works on an
-    open loop, on which corrections have no influence.
-    """
-    keep = (1.0 - forgetting) * np.eye(gain.shape[0])
-    if number == 0:
-        return gain, 1.0 - forgetting
-    start = shown.shape[0] * len(LADDER)
-    slopes = shown.reshape(-1, shown.shape[2])
-    while True:
-        own = gain[:, start : start + slopes.shape[0]]
-        largest = float(np.abs(np.linalg.eigvals(keep + own @ slopes)).max())
-        if largest <= 1.0:
-            return gain, largest
-        gain = 0.5 * gain
-
-
-def _good(press: Press, settings: Sequence[FloatArray]) -> BoolArray:
+def good(press: Press, settings: Sequence[FloatArray]) -> FloatArray:
     """Return which dots of the cycle are within limits, (M, dots), those of the lead-in left out."""
     judgement = press.line(settings, PRINTED)[1]
     return np.asarray(judgement.good[:, np.asarray(PRINTED) >= LEAD_IN])
+
+
+def _badness(off: FloatArray) -> float:
+    """Return what corrections make least: the squares, and more of what is far off."""
+    return float(np.sum(off**2 + _STEEP * off**4))
+
+
+def _gain(off: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Return L of the law, (inputs, 2 dots): the inverse of a sensitivity, weighted as by `_badness`."""
+    weight = 1.0 + 2.0 * _STEEP * off**2
+    normal = slopes.T @ (weight[:, None] * slopes) + _DAMPING * len(TRIED) * np.eye(slopes.shape[1])
+    return np.asarray(np.linalg.solve(normal, slopes.T * weight))

@@ -65,14 +65,14 @@ def learn(
     sensor : ImpactSensor, optional
         By default one that tells times with a noise of 5 us.
     variability : Variability, optional
-        What is known of the production; by default `Variability()`.
+        What is known of the production; by default `Variability.of(hammer)`.
     members : int, optional
-        Number of simulated hammers on which the gains are designed, 50 to 5000.
+        Number of simulated hammers on which the ladder is chosen, 100 to 5000.
     forgetting : float, optional
         By which part the corrections of the stages before are taken back at each stage, above 0: where the
         sensor shows nothing of them, it is what keeps them from growing.
     doubt : float, optional
-        Which share of the twenty simulated hammers most like the unit may print fewer dots within limits with
+        Which share of the hammers that are held for possible may print fewer dots within limits with
         the table than in an open loop, for the table to be handed out; 0, none, by default.
     serial : str, optional
         Serial number of the unit; the table is refused for another one.
@@ -94,13 +94,13 @@ def learn(
     speed = read_positive(rate, "Hz", "rate")
     largest = read_positive(largest_current, "A", "largest_current")
     count = read_count(members, "members")
-    if not 50 <= count <= 5000:
-        raise InputError(f"members = {count}, expected 50 to 5000")
+    if not 100 <= count <= 5000:
+        raise InputError(f"members = {count}, expected 100 to 5000")
     if not serial:
         raise InputError(f"serial = {serial!r}, expected a text")
     shown = ImpactSensor() if sensor is None else sensor
-    spread = Variability() if variability is None else variability
-    steps, total = iter(range(1, len(RUNS) + 2)), len(RUNS) + 2
+    spread = Variability.of(hammer) if variability is None else variability
+    steps, total = iter(range(1, 3)), 2 + len(RUNS)
 
     def report() -> None:
         if progress is not None:
@@ -124,11 +124,15 @@ def learn(
         report=report,
     )
     driven = spread.draw(hammer, 1, seed + 1)[0] if unit is None else unit
-    learners, stages = calibrate(law, [driven], shown)
+    learners, stages = calibrate(law, [driven], shown, report)
     entries = dict(zip(COLUMNS, learners[0].printed, strict=True))
     unknown = np.full_like(base.deviation, np.nan)
     table = replace(base, **{name: values[np.newaxis] for name, values in entries.items()}, deviation=unknown)
     judged = [stage.cycle for stage in stages]
+    belief = learners[0].belief
+    assert belief is not None
+    off, apart = belief.moments()
+    sizes = spread.constants(hammer)
     return Learning(
         hammer=hammer,
         unit=driven,
@@ -144,6 +148,11 @@ def learn(
         force_deviation=np.array([judgement.force_deviation[0] for judgement in judged]),
         arrival_deviation=np.array([judgement.arrival_deviation[0] for judgement in judged]),
         good=np.array([judgement.good[0] for judgement in judged]),
-        contraction=np.array([stage.contraction for stage in law.stages]),
+        constants=tuple(sizes),
+        believed=np.array(
+            [hammer.constants[key].si + size * z for (key, size), z in zip(sizes.items(), off, strict=False)]
+        ),
+        uncertainty=np.array([size * z for size, z in zip(sizes.values(), apart, strict=False)]),
+        contraction=np.array(learners[0].contractions),
         seed=seed,
     )

@@ -2,50 +2,63 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.control.learning.law import features
-from printhammer.control.learning.lines import LADDER, LINE
-from printhammer.control.learning.settings import ADVANCE
-from printhammer.control.table.histories import histories_of
+from printhammer.control.learning.belief import Belief, Evidence, believe
+from printhammer.control.learning.law import RUNS
+from printhammer.control.learning.lines import LINE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from printhammer.control.learning.law import LearningLaw
     from printhammer.control.learning.sensor import Readings
     from printhammer.support.arrays import FloatArray
 
-_ALIKE: Final = 20  # Number of simulated hammers that look like the unit, by which the table is weighed
-_GAIN: Final = 0.02  # Least share of the dots that the table gains in the mean over these
+# How well the laws of the model hold, a standard deviation in parts of the limits
+_FLOOR: Final = 0.01
+_STARTS: Final = 6  # Number of simulated hammers from which searches begin
+_OUTLIER: Final = 6.0  # Standard deviations from the median beyond which a reading is left out
+_FEWEST: Final = 3  # Readings of which the median says something
+
+
+class Mean(NamedTuple):
+    """Means of the readings of some dots, in parts of the limits, and of how many, (measured, dots)."""
+
+    value: FloatArray  # NaN where nothing was seen
+    seen: FloatArray
 
 
 class Learner:
     """Calibrates the table of one unit from run to run, by a law.
 
-    What is handed out is the open loop before the first stage is over, and wherever the simulated hammers
-    that look most like the unit speak against the table: more of them than the doubt that is allowed would
-    print fewer dots within limits with it, or there is next to nothing to gain.
+    What is handed out is the open loop before the first stage is over, and wherever hammers that explain the
+    readings as well speak against the table: more of them than the doubt that is allowed would print fewer
+    dots within limits with it, or there is next to nothing to gain.
 
     Parameters
     ----------
     law : LearningLaw
-        The gains.
+        What to do with readings.
     """
 
     def __init__(self, law: LearningLaw) -> None:
         self.law = law
         self.stage = 0
         self.corrections = np.zeros(law.entries.inputs.shape[1])
+        self.belief: Belief | None = None
+        self.contractions: list[float] = []
         self._gains = False
         self._ladders: list[FloatArray] = []
         self._line: list[FloatArray] = []
-        self._lines: list[FloatArray] = []
+        self._first: Mean | None = None
 
     @property
     def finished(self) -> bool:
         """Whether all stages are over."""
-        return self.stage == len(self.law.stages)
+        return self.stage == len(RUNS)
 
     @property
     def settings(self) -> FloatArray:
@@ -64,39 +77,83 @@ class Learner:
         return self.settings if self.learned else self.law.entries.open_loop
 
     def see(self, ladder: Readings, line: Readings) -> None:
-        """Take in the readings of a run: of the pulses of the ladder, repeated, and of the line."""
+        """Take in the readings of a run: of the dots of the ladder, and of the line."""
         if self.finished:
             return
-        law, task = self.law, self.law.entries.task
-        repeated = len(ladder.time) // len(LADDER)
-        expected = [np.tile(each, repeated) for each in law.ladder]
-        off = law.deviations(ladder.time, ladder.force, expected)
-        self._ladders.append(off.reshape(len(off), repeated, len(LADDER)))
-        numbers = histories_of(LINE, task.gaps, task.reach)[:-1]
-        # Fired ahead of its slot, a dot may take as much longer.
-        due = task.single.nominal.flight_time + self.settings[ADVANCE, numbers]
-        self._line.append(law.deviations(line.time, line.force, (due, 1.0)))
-        if len(self._line) == law.stages[self.stage].runs:
+        self._ladders.append(self._scaled(ladder))
+        self._line.append(self._scaled(line))
+        if len(self._line) == RUNS[self.stage]:
             self._learn()
+
+    def _scaled(self, readings: Readings) -> FloatArray:
+        """Return readings in parts of the limits, (measured, dots)."""
+        limits, shown = self.law.entries.task.limits, [readings.time]
+        if self.law.production.measured > 1 and readings.force is not None:
+            shown.append(readings.force)
+        return np.stack(
+            [each / limit for each, limit in zip(shown, (limits.arrival, limits.force), strict=False)]
+        )
 
     def _learn(self) -> None:
         law = self.law
-        stage = law.stages[self.stage]
-        self._lines = [*self._lines[-1:], _mean(np.stack(self._line))]
+        noise = law.production.noise[:, None]
+        line = mean(self._line, noise)
+        if self._first is None:
+            self._first = line
+        lines = [self._first] if not self.stage else [self._first, line]
+        settings = [law.entries.open_loop, self.settings][: len(lines)]
+        self.belief = self._believe([mean(self._ladders, noise), *lines], settings)
+        unexplained = np.zeros((2, len(LINE)))
+        if self.stage:
+            shown = self.belief.modes[0].predicted.reshape(law.production.measured, -1)[:, -len(LINE) :]
+            unexplained[: len(shown)] = _unexplained(
+                line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
+            )
+        update = law.update(self.belief, self.corrections, unexplained)
+        self.corrections, self._gains = update.corrections, update.gains
+        self.contractions.append(update.contraction)
         self._line = []
-        ladder = _mean(np.concatenate(self._ladders, axis=1).swapaxes(0, 1))
-        evidence = features(ladder, self._lines)
-        kept = (1.0 - law.forgetting) * self.corrections
-        self.corrections = law.entries.limited(kept, stage.gain @ evidence)
-        apart = ((stage.seen - stage.estimate @ evidence) ** 2).sum(axis=1)
-        alike = np.argsort(apart, kind="stable")[:_ALIKE]
-        edge = stage.edge[alike]
-        self._gains = bool(np.quantile(edge, self.law.doubt) >= 0.0 and edge.mean() >= _GAIN)
         self.stage += 1
 
+    def _believe(self, means: Sequence[Mean], settings: Sequence[FloatArray]) -> Belief:
+        law = self.law
+        measured = law.production.measured
+        value = np.concatenate([each.value for each in means], axis=1)
+        count = np.concatenate([each.seen for each in means], axis=1)
+        noise = np.hypot(law.production.noise[:, None] / np.sqrt(np.maximum(count, 1.0)), _FLOOR)
+        rough = np.array([each.rest for each in law.shown]).reshape(measured, -1)
+        # A line that is printed later counts as the one in the open loop does.
+        rough = np.concatenate([rough, rough[:, -len(LINE) :]], axis=1)[:, : value.shape[1]]
+        evidence = Evidence(value.ravel(), noise.ravel(), rough.ravel())
 
-def _mean(values: FloatArray) -> FloatArray:
-    """Return the mean over the first axis of what is known, NaN where nothing is."""
+        def predict(rows: FloatArray) -> FloatArray:
+            return law.production.readings(rows, law.rungs, settings)
+
+        # The simulated hammers that look most like the unit, where only what is smooth counts.
+        known = law.seen.shape[1] // measured
+        shown = slice(None), slice(known)
+        off = value[shown] - law.seen.reshape(-1, measured, known)
+        apart = (off / np.hypot(noise, rough)[shown]) ** 2
+        places = np.argsort(np.nan_to_num(apart, nan=1.0).sum(axis=(1, 2)), kind="stable")[:_STARTS]
+        before = [] if self.belief is None else [mode.mean for mode in self.belief.modes]
+        return believe(predict, evidence, list(law.rows[places]), before)
+
+
+def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
+    """Return the means of what is known, without outliers where there are enough readings to know them."""
+    values = np.stack(readings)
     known = np.isfinite(values)
+    if len(values) >= _FEWEST:
+        middle = np.nanmedian(np.where(known.any(axis=0), values, 0.0), axis=0)
+        known &= np.abs(np.nan_to_num(values) - middle) <= _OUTLIER * noise
+    count = known.sum(axis=0)
     total = np.where(known, values, 0.0).sum(axis=0)
-    return np.asarray(np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan))
+    return Mean(np.where(count > 0, total / np.maximum(count, 1), np.nan), count.astype(np.float64))
+
+
+def _unexplained(rest: FloatArray, noise: FloatArray) -> FloatArray:
+    """Return what is left of readings (measured, dots) without what noise leaves of them; 0 if unseen."""
+    known = np.isfinite(rest).any(axis=1, keepdims=True)
+    size = 1.4826 * np.nanmedian(np.where(known, np.abs(rest), 0.0), axis=1, keepdims=True)
+    more = np.maximum(size**2 - noise**2, 0.0)
+    return np.asarray(np.nan_to_num(rest * more / (more + noise**2)))

@@ -1,8 +1,4 @@
-"""What is printed while a table is learned: a ladder of pulses from rest, and a line at the rate.
-
-The ladder excites what the line does not: from the times of impact of pulses of different widths, force and
-distance of the pack can be told apart, which one width alone confounds.
-"""
+"""What is printed while a table is learned: a ladder of pulses from rest, and a line at the rate."""
 
 from __future__ import annotations
 
@@ -13,7 +9,7 @@ import numpy as np
 
 from printhammer.control.table.drive import Settings, pulses_of, sequence
 from printhammer.control.widths import of_width
-from printhammer.drive.trains import PulseTrain
+from printhammer.drive.sequence import PulseSequence
 from printhammer.printing.dots.judging import Judgement, judge
 from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.slots import cycle_with_lead_in, slot_times, slots_of
@@ -22,18 +18,14 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE, DotTable, Ensemble
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from printhammer.control.learning.ladder import Rung
     from printhammer.control.table.task import Task
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-LADDER: Final = (0.8, 1.0, 1.3)  # Widths of the pulses from rest, in parts of that of the hammer
-REPEATED: Final = 3  # How often each of them is fired in a run
 LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 """Slots of the test line: the de Bruijn cycle of order 5, in which every history of two gaps occurs."""
-
-DOTS: Final = REPEATED * len(LADDER) + len(LINE)
-"""Number of dots of a run."""
 
 
 @dataclass(frozen=True)
@@ -44,42 +36,46 @@ class Press:
     rate: float
     hammers: Sequence[Hammer]
 
-    def ladder(self) -> tuple[FloatArray, FloatArray]:
-        """Return flight times, s, and forces in parts of the nominal one, of the pulses of the ladder."""
+    def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
+        """Return flight times, s, and forces in parts of the nominal one, of the dots of rungs, (M, dots)."""
         task, count = self.task, len(self.hammers)
-        pulses = [of_width(task.pulse, part * task.width) for part in LADDER]
-        hammers = [hammer for hammer in self.hammers for _ in LADDER]
-        drives = [PulseTrain(pulse) for _ in self.hammers for pulse in pulses]
+        drives = []
+        for rung in rungs:
+            parts = ((0.0, rung.first), (rung.later, rung.second))[: rung.dots]
+            pulses = [of_width(task.pulse, part * task.width) for _at, part in parts]
+            drives.append(PulseSequence(pulses, at=[at for at, _part in parts]))
+        hammers = [hammer for hammer in self.hammers for _ in rungs]
+        end = WAIT + max(rung.later for rung in rungs)
         dots = (
-            Ensemble(hammers, drives, WAIT, tolerance=task.tolerance)
+            Ensemble(hammers, drives * count, end, tolerance=task.tolerance)
             .run(dots=True, threads=task.threads)
             .dots
         )
         assert dots is not None
-        force = dots.peak_force[:, 0] / task.single.nominal.force
-        return dots.flight_time[:, 0].reshape(count, -1), force.reshape(count, -1)
+        times, forces = (
+            np.concatenate(
+                [each.reshape(count, len(rungs), -1)[:, k, : rung.dots] for k, rung in enumerate(rungs)],
+                axis=1,
+            )
+            for each in (dots.flight_time, dots.peak_force / task.single.nominal.force)
+        )
+        return times, forces
 
     def line(self, settings: Sequence[FloatArray], slots: Sequence[int] = LINE) -> tuple[DotTable, Judgement]:
         """Print a line, each hammer with its settings (4, entries); return dots, and how far off they are."""
         task, due = self.task, slot_times(slots, self.rate)
         known: dict[tuple[float, float, float], Waveform] = {}
-        drives = [
-            sequence(pulses_of(Settings(*own), task.gaps, task.reach, slots, self.rate), task.pulse, known)
-            for own in settings
-        ]
+        drives: dict[int, PulseSequence] = {}
+        for own in settings:
+            if id(own) not in drives:
+                pulses = pulses_of(Settings(*own), task.gaps, task.reach, slots, self.rate)
+                drives[id(own)] = sequence(pulses, task.pulse, known)
         end = float(due[-1]) + WAIT
-        result = Ensemble(self.hammers, drives, end, tolerance=DISPLAY_TOLERANCE).run(
-            dots=True, threads=task.threads
-        )
+        result = Ensemble(
+            self.hammers, [drives[id(own)] for own in settings], end, tolerance=DISPLAY_TOLERANCE
+        ).run(dots=True, threads=task.threads)
         dots = result.dots
         assert dots is not None
         shape = len(self.hammers), len(slots)
         wanted, times = np.ones(shape, np.bool_), np.broadcast_to(due, shape)
         return dots, judge(dots, wanted, times, task.single.nominal, task.limits, result.ok)
-
-    def deviations(self, settings: Sequence[FloatArray]) -> FloatArray:
-        """Return deviations of arrival and force, in parts of the limits, (M, 2, dots); NaN if lost."""
-        judgement, limits = self.line(settings)[1], self.task.limits
-        return np.stack(
-            [judgement.arrival_deviation / limits.arrival, judgement.force_deviation / limits.force], axis=1
-        )

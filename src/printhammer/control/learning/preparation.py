@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.law import LearningLaw, design
-from printhammer.control.learning.lines import Press
+from printhammer.control.learning.ladder import Rung, candidates, choose
+from printhammer.control.learning.law import LearningLaw
+from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.learning.settings import Adjustable
+from printhammer.control.learning.surrogate import Surrogate
 from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, clearance, print_pulse
 from printhammer.control.table.drivers import driven_by
 from printhammer.control.table.task import Task, single_of
@@ -27,8 +29,8 @@ if TYPE_CHECKING:
 
 FORGETTING: Final = 0.02  # By default
 DOUBT: Final = 0.0  # By default
-MEMBERS: Final = 800
-"""Number of simulated hammers on which a law is designed."""
+MEMBERS: Final = 400
+"""Number of simulated hammers on which a ladder is chosen."""
 
 
 def law_for(
@@ -57,7 +59,7 @@ def law_for(
         raise InputError(f"forgetting = {forgetting!r}, expected a number above 0 and below 1")
     if not 0.0 <= doubt <= 1.0:
         raise InputError(f"doubt = {doubt!r}, expected a number from 0 to 1")
-    spread = Variability() if variability is None else variability
+    spread = Variability.of(hammer) if variability is None else variability
     bounds = Limits() if limits is None else limits
     driven = driven_by(hammer, driver, largest_current)
     shared: dict[str, Any] = {"limits": bounds, "largest_current": largest_current, "threads": threads}
@@ -82,15 +84,36 @@ def law_for(
         report=report,
     )
     base = np.array([getattr(table, name)[0] for name in COLUMNS])
-    press = Press(task, rate, spread.draw(driven, members, seed))
-    entries = Adjustable(task, rate, base)
-    law = design(
-        press,
-        entries,
-        ImpactSensor() if sensor is None else sensor,
-        forgetting=forgetting,
-        doubt=doubt,
-        seed=seed,
-        report=report,
-    )
+    production = Production(task, rate, spread, ImpactSensor() if sensor is None else sensor)
+    law = _law(production, Adjustable(task, rate, base), members, seed, forgetting, doubt)
+    report()
     return law, table
+
+
+def _law(
+    production: Production, entries: Adjustable, members: int, seed: int, forgetting: float, doubt: float
+) -> LearningLaw:
+    """Choose the ladder, and find how what it shows depends on the constants of a hammer."""
+    task, constants = production.task, production.constants
+    drawn = production.variability.draw_rows(production.nominal, members, seed)
+    press = production.press([hammer for _row, hammer in drawn])
+    own = np.array([row for row, _hammer in drawn])
+    limits = np.array([task.limits.arrival, task.limits.force])[:, None, None]
+    line = press.line([entries.open_loop] * members)[0]
+    lines = np.stack([line.flight_time, line.peak_force / task.single.nominal.force]) / limits
+    rungs = tuple(
+        choose(
+            candidates(task),
+            lambda rung: press.ladder([rung])[0] / task.limits.arrival,
+            [Surrogate.of(own, each) for each in lines[0].T],
+            Surrogate.of(own, press.ladder([Rung(1.0)])[1][:, 0]),
+            own,
+            float(production.noise[0]),
+        )
+    )
+    rows = np.zeros((members, production.size))
+    rows[:, :constants] = own
+    both = np.concatenate([np.stack(press.ladder(rungs)) / limits, lines], axis=2)[: production.measured]
+    seen = np.concatenate(list(both), axis=1)
+    shown = tuple(Surrogate.of(own, each) for each in seen.T)
+    return LearningLaw(entries, production, forgetting, doubt, seed, rungs, shown, rows, seen)

@@ -40,7 +40,10 @@ class Learning(Result, rows=_DOTS):
     )
     arrival_deviation: FloatArray = column("s", "touch less slot time and single-pulse flight time", _DOTS)
     good: BoolArray = column("1", "whether the dot is within limits", _DOTS, dtype=np.int8)
-    contraction: FloatArray = part("largest eigenvalue of Q + L G of each update, at most 1")
+    constants: tuple[str, ...] = coordinate("", "a constant that varies", "constant", name="constant")
+    believed: FloatArray = column("SI", "constant of the unit, as its readings tell it", "constant")
+    uncertainty: FloatArray = column("SI", "its standard deviation", "constant")
+    contraction: FloatArray = part("largest eigenvalue of the law at each update")
     seed: int = scalar("1", "seed of the simulated hammers")
 
     @property

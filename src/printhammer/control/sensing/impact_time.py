@@ -14,7 +14,7 @@ from printhammer.control.sensing.sampling import UNITS, Sampling
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
-from printhammer.printing.rates.variability import CONSTANTS, Variability
+from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.simulate import simulate
 
@@ -135,7 +135,7 @@ def impact_time(
     units : int, optional
         Hammers drawn from the variability.
     variability : Variability, optional
-        By default that of `Variability()` for the constants that the hammer has.
+        By default `Variability.of(hammer)`.
     seed : int, optional
         Of the units and of the noise.
     progress : callable, optional
@@ -168,7 +168,7 @@ def impact_time(
     total = int(np.prod(shape))
     if not 0 < total <= MOST:
         raise InputError(f"{total} ways to sample are asked for, expected 1 to {MOST}")
-    spread = variability_of(hammer) if variability is None else variability
+    spread = Variability.of(hammer) if variability is None else variability
     drawn = spread.draw(hammer, others, first)
     rng = np.random.default_rng((first, 1))
     names = ("bias", "deviation", "missed", "unit_bias", "unit_deviation", "unit_missed")
@@ -206,13 +206,6 @@ def impact_time(
         bits=widths,
         **arrays,
     )
-
-
-def variability_of(hammer: Hammer) -> Variability:
-    """Return the usual variability, as far as the hammer has its constants."""
-    known = hammer.constants
-    there = {name for name, keys in CONSTANTS.items() if any(key in known for key in keys)}
-    return Variability(**{name: 0.0 for name in CONSTANTS if name not in there})
 
 
 def _largest_current(hammer: Hammer) -> float:

@@ -101,7 +101,7 @@ class Task:
         return float(own.width)
 
     @cached_property
-    def _faded(self) -> float:
+    def faded(self) -> float:
         """Time after its width in which the pulse has decayed to what a chain may cut off, s."""
         return fading(self.hammers[0], self.pulse, 0.5 * TAIL)
 
@@ -112,7 +112,7 @@ class Task:
         By then the armature has left the pack, and the pulse of the dot has decayed, even where it is late or
         wide by `_WIDE`.
         """
-        return float(max(self.single.left, self.width + _WIDE + self._faded))
+        return float(max(self.single.left, self.width + _WIDE + self.faded))
 
     def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:
         """Return how long after the slot of the dot before a dot may be fired first, s.
@@ -124,7 +124,7 @@ class Task:
 
     def latest(self, width: FloatArray) -> FloatArray:
         """Return how long after its slot a dot of a width may be fired, s, so that it may be braked."""
-        return np.asarray(self.brake_from - self._faded - width)
+        return np.asarray(self.brake_from - self.faded - width)
 
     def deviations(
         self, hammer: Hammer, drives: Sequence[Drive], slots: FloatArray, ends: FloatArray

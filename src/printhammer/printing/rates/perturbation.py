@@ -8,7 +8,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from printhammer.errors import InputError
-from printhammer.hammer.equilibrium import rest_state
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
@@ -117,7 +116,7 @@ def changed(
         with suppress(InputError):
             other = hammer.replace(change, source=source) if change else hammer
             fate = "does not rest"
-            rest_state(other)
+            _ = other.rest
             fate = "ok"
         made.append(other)
         status.append(fate)

@@ -21,17 +21,18 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 CONSTANTS: Final = {
-    "magnet": ("magnet.F0", "magnet.Am"),
-    "spring": ("spring.Bs", "spring.As"),
-    "damping": ("backstop.damping",),
-    "current": ("magnet.Bm",),
-    "travel": ("pack.front",),
-    "paper": ("pack.stiffness",),
+    "magnet": (("magnet.F0", "magnet.Am"), ("magnet.pole_area",), ("magnet.constant",)),
+    "spring": (("spring.Bs", "spring.As"), ("spring.preload", "spring.stiffness"), ("spring.stiffness",)),
+    "damping": (("backstop.damping",), ("backstop.relaxation_time",), ("backstop.restitution",)),
+    "current": (("magnet.Bm",), ("coil.resistance",)),
+    "travel": (("pack.front",),),
+    "paper": (("pack.stiffness",),),
 }
-"""The constants that each standard deviation is that of."""
+"""The constants that each standard deviation is that of: the first group of which a hammer has any."""
 
 _TRIES: Final = 10  # How often as many hammers are drawn as are wanted
-_WIDEST: Final = 3.0  # Standard deviations at which a draw is cut off
+WIDEST: Final = 3.0
+"""Standard deviations at which a draw is cut off."""
 
 
 class Variability(Declared):
@@ -43,21 +44,34 @@ class Variability(Declared):
         A number is negative or not finite, or a relative one not below a third.
     """
 
-    magnet: float = part("of F0 and Am of equation (3), relative", default=0.01)
-    spring: float = part("of Bs and As of equation (4), relative", default=0.01)
-    damping: float = part("of the damping of the backstop, relative", default=0.2)
-    current: float = part("of all currents, relative; Bm of equation (3)", default=0.05)
+    magnet: float = part(
+        "of F0 and Am of equation (3), of the area of a pole or the force constant, relative", default=0.01
+    )
+    spring: float = part("of Bs and As of equation (4), of preload and stiffness, relative", default=0.01)
+    damping: float = part("of damping, relaxation time or restitution of the backstop, relative", default=0.2)
+    current: float = part(
+        "of all currents, relative: Bm of equation (3), or the resistance of the coil", default=0.05
+    )
     travel: float = part("of the distance of pack and platen, m", default=10e-6)
     paper: float = part("of the stiffness of the pack, relative", default=0.1)
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
-            most = math.inf if name == "travel" else 1.0 / _WIDEST
+            most = math.inf if name == "travel" else 1.0 / WIDEST
             if not (math.isfinite(value) and 0.0 <= value < most):
                 limit = "" if name == "travel" else " and below 1/3"
                 raise InputError(
                     f"variability: {name} = {value!r} is expected to be a number not below 0{limit}"
                 )
+
+    @classmethod
+    def of(cls, hammer: Hammer) -> Variability:
+        """Return the usual one, without what a hammer has no constants of."""
+        known = hammer.constants.keys()
+        there = {
+            name for name, groups in CONSTANTS.items() if known & {key for keys in groups for key in keys}
+        }
+        return cls(**{name: 0.0 for name in CONSTANTS if name not in there})
 
     @property
     def text(self) -> str:
@@ -86,11 +100,13 @@ class Variability(Declared):
         for name, value in asdict(self).items():
             if not value:
                 continue
-            there = [key for key in CONSTANTS[name] if key in known]
+            groups = [[key for key in group if key in known] for group in CONSTANTS[name]]
+            there = next((group for group in groups if group), [])
             if not there:
+                every = ", ".join(dict.fromkeys(key for group in CONSTANTS[name] for key in group))
                 raise InputError(
-                    f"{hammer.path}: variability of {name} = {value:g}, expected 0 for a hammer without"
-                    f" {' and '.join(CONSTANTS[name])}"
+                    f"{hammer.path}: variability of {name} = {value:g}, expected 0 for a hammer without any"
+                    f" of {every}"
                 )
             spread |= {key: value if name == "travel" else value * abs(known[key].si) for key in there}
         return spread
@@ -105,11 +121,22 @@ class Variability(Declared):
         InputError
             As for `constants`; or hardly any of those drawn is a hammer that rests.
         """
+        return [drawn for _row, drawn in self.draw_rows(hammer, count, seed)]
+
+    def draw_rows(self, hammer: Hammer, count: int, seed: int) -> list[tuple[FloatArray, Hammer]]:
+        """Return what `draw` does, each hammer after the standard deviations that its constants are off by.
+
+        Raises
+        ------
+        InputError
+            As for `draw`.
+        """
         rng = np.random.default_rng(seed)
-        drawn: list[Hammer] = []
+        drawn: list[tuple[FloatArray, Hammer]] = []
         for _ in range(_TRIES):
-            rows = rng.standard_normal((count, len(self.constants(hammer))))
-            drawn += self._hammers(hammer, np.clip(rows, -_WIDEST, _WIDEST))
+            rows = np.clip(rng.standard_normal((count, len(self.constants(hammer)))), -WIDEST, WIDEST)
+            made = zip(rows, self.hammers(hammer, rows), strict=True)
+            drawn += [(row, other) for row, other in made if other is not None]
             if len(drawn) >= count:
                 return drawn[:count]
         raise InputError(
@@ -120,10 +147,15 @@ class Variability(Declared):
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:
         """Return the hammers of which one constant is one standard deviation off, up or down."""
         own = np.eye(len(self.constants(hammer)))
-        return self._hammers(hammer, np.concatenate([own, -own]))
+        points = self.hammers(hammer, np.concatenate([own, -own]))
+        return [point for point in points if point is not None]
 
-    def _hammers(self, hammer: Hammer, rows: FloatArray) -> list[Hammer]:
-        """Return the hammers whose constants are off by standard deviations (M, constants)."""
+    def hammers(self, hammer: Hammer, rows: FloatArray) -> list[Hammer | None]:
+        """Return the hammers whose constants are off by standard deviations (M, constants).
+
+        The constants are in the order of `constants`. There is none where it would be no hammer, or not rest
+        at the backstop.
+        """
         spread = self.constants(hammer)
         changes: list[tuple[dict[str, Any], str]] = []
         for row in rows.tolist():
@@ -133,4 +165,4 @@ class Variability(Declared):
                 change["platen"] = hammer.platen + off["pack.front"]
             changes.append((change, "drawn from the variability of a production"))
         hammers, status = changed(hammer, changes)
-        return [other for other, fate in zip(hammers, status, strict=True) if fate == "ok"]
+        return [other if fate == "ok" else None for other, fate in zip(hammers, status, strict=True)]

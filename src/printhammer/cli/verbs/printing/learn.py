@@ -31,7 +31,7 @@ _PANEL: Final = "The sensor"
         ),
         "history": opt.whole("Gaps that a history holds, 1 to 4.", default=2),
         "reach": opt.whole("Longest gap that counts, slots.", default=2),
-        "members": opt.whole("Simulated hammers on which the gains are designed.", default=800),
+        "members": opt.whole("Simulated hammers on which the ladder is chosen.", default=400),
         "forgetting": opt.number("Part of the corrections that each stage takes back.", default=0.02),
         "doubt": opt.number("Share of hammers like the unit to which the table may do harm.", default=0.0),
         "serial": opt.text("TEXT", "Serial number of the unit.", default="unit"),
@@ -81,7 +81,7 @@ def learn(
     share = 100.0 * result.share[-1]
     complaint = f"{share:.1f} % of the dots are within limits in the end"
     return Answer(
-        [stages(result, units)],
+        [stages(result, units), constants(result, units)],
         files={"out": Content.of(result), "table": Content.of(result.table)},
         complaints=[] if result.passed else [complaint],
     )
@@ -120,3 +120,15 @@ def stages(result: Learning, units: Units) -> Table:
     )
     title = f"Unit {result.table.serial} of {result.hammer.name} at {result.rate:g} Hz"
     return table(columns, range(result.dots.size), units, title=title)
+
+
+def constants(result: Learning, units: Units) -> Table:
+    """Return what is believed of the constants of the unit in the end, a row each."""
+    nominal = [result.hammer.constants[name].si for name in result.constants]
+    columns: tuple[Column[int], ...] = (
+        Column("constant", lambda row: result.constants[row], left=True),
+        Column("off by", lambda row: f"{100.0 * (result.believed[row] / nominal[row] - 1.0):+.2f} %"),
+        Column("known to", lambda row: f"{100.0 * result.uncertainty[row] / abs(nominal[row]):.2f} %"),
+    )
+    title = f"Constants of unit {result.table.serial}, from its readings"
+    return table(columns, range(len(result.constants)), units, title=title)

@@ -77,7 +77,7 @@ def tune(
     if variability:
         from printhammer.printing.rates.variability import Variability
 
-        passed["variability"] = Variability()
+        passed["variability"] = Variability.of(hammer)
     options = opt.given(tolerance=tolerance, threads=threads)
     if along is not None:
         if job.wanted["report"]:

@@ -1,0 +1,98 @@
+"""What is known of a unit before it is there: the design, and how far a production is spread about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.control.learning.lines import LINE, Press
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.control.learning.ladder import Rung
+    from printhammer.control.learning.sensor import ImpactSensor
+    from printhammer.control.table.task import Task
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.rates.variability import Variability
+    from printhammer.support.arrays import FloatArray
+
+SCALE: Final = 0.01
+"""Standard deviation that the scale of a sensor is taken to be off by, relative."""
+
+
+@dataclass(frozen=True)
+class Production:
+    """Hammers by their constants, in standard deviations, and what a sensor shows of them.
+
+    A row of constants is followed by what a sensor itself may be off by, in standard deviations too: the
+    scale of its times, that of its forces where it has any, and the offset of its times where it has one.
+    """
+
+    task: Task
+    rate: float
+    variability: Variability
+    sensor: ImpactSensor
+
+    @property
+    def nominal(self) -> Hammer:
+        """The hammer as it was designed, with its driver."""
+        return self.task.hammers[0]
+
+    @cached_property
+    def constants(self) -> int:
+        """Number of constants that vary."""
+        return len(self.variability.constants(self.nominal))
+
+    @property
+    def size(self) -> int:
+        """Length of a row."""
+        return self.constants + 1 + (self.sensor.force is not None) + (self.sensor.offset > 0.0)
+
+    @property
+    def measured(self) -> int:
+        """How many numbers a dot the sensor shows: 1, or 2 with forces."""
+        return 1 if self.sensor.force is None else 2
+
+    @property
+    def noise(self) -> FloatArray:
+        """Standard deviation of a reading of each of them, in parts of the limits."""
+        limits = self.task.limits
+        return np.array([self.sensor.noise / limits.arrival, (self.sensor.force or 0.0) / limits.force])[
+            : self.measured
+        ]
+
+    def hammers(self, rows: FloatArray) -> list[Hammer | None]:
+        """Return the hammers of rows (M, size), none where there is no such hammer."""
+        return self.variability.hammers(self.nominal, rows[:, : self.constants])
+
+    def press(self, hammers: Sequence[Hammer]) -> Press:
+        """Return hammers that print."""
+        return Press(self.task, self.rate, hammers)
+
+    def readings(self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]) -> FloatArray:
+        """Return what is shown of hammers (M, size): of the ladder, and of lines printed with settings.
+
+        The result, shape (M, measured * dots), is in parts of the limits; NaN where a dot is lost.
+        """
+        hammers = self.hammers(rows)
+        there = [k for k, hammer in enumerate(hammers) if hammer is not None]
+        press = self.press([hammer for hammer in hammers if hammer is not None])
+        count = sum(rung.dots for rung in rungs) + len(LINE) * len(lines)
+        shown = np.full((len(rows), 2, count), np.nan)
+        if there:
+            parts = [press.ladder(rungs)] if rungs else []
+            for settings in lines:
+                dots = press.line([settings] * len(there))[0]
+                parts.append((dots.flight_time, dots.peak_force / self.task.single.nominal.force))
+            shown[there] = np.concatenate([np.stack(part, axis=1) for part in parts], axis=2)
+        limits = self.task.limits
+        shown /= np.array([limits.arrival, limits.force])[:, None]
+        own = rows[:, self.constants :]
+        shown[:, : self.measured] *= 1.0 + SCALE * own[:, : self.measured, None]
+        if self.sensor.offset:
+            shown[:, 0] += self.sensor.offset / limits.arrival * own[:, -1:]
+        return np.asarray(shown[:, : self.measured].reshape(len(rows), -1))
