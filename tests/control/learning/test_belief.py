@@ -119,6 +119,6 @@ def test_means_leave_out_what_lies_apart() -> None:
     readings[5][0, 2] = np.nan
     found = mean(readings, np.array([[0.1]]))
     assert np.abs(found.value).max() < 0.1
-    assert found.count.tolist() == [[20.0, 19.0, 19.0]]
+    assert found.seen.tolist() == [[20.0, 19.0, 19.0]]
     nothing = mean([np.full((1, 2), np.nan)] * 4, np.array([[0.1]]))
     assert np.isnan(nothing.value).all()

@@ -138,7 +138,8 @@ def test_no_rung_is_fired_while_the_armature_is_in_the_pack(by_time: LearningLaw
                 each for each in ph.simulate(task.hammers[0], drive).contacts if each.surface == "pack"
             )
             assert dot.t_out is not None
-            assert rung.later >= dot.t_out + MARGIN
+            # The ladder is laid out by runs of a wider tolerance.
+            assert rung.later >= dot.t_out + MARGIN - 1e-9
 
 
 def test_the_table_is_for_its_unit_only(tmp_path: Path) -> None:
