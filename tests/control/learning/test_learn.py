@@ -72,8 +72,7 @@ def test_two_learners_shown_the_same_learn_the_same(law: LearningLaw) -> None:
 
 @pytest.mark.parametrize("late", [-400e-6, 400e-6, float("nan")])
 def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> None:
-    learner, entries = Learner(law), law.entries
-    task = entries.task
+    learner, task = Learner(law), law.entries.task
     while not learner.finished:
         learner.see(*readings(law, late=late))
         advance, width, delay, brake = learner.settings
@@ -83,7 +82,7 @@ def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> No
             first = gap * (task.reach + 1) ** (task.gaps - 1)
             own = slice(first, first + (task.reach + 1) ** (task.gaps - 1))
             fired = gap / RATE - advance[own]
-            base = gap / RATE - entries.base[0, own]
+            base = gap / RATE - learner.law.entries.base[0, own]
             clear = task.earliest(delay[own], brake[own])
             # After the nominal armature has left the pack, with a margin where the table itself has one.
             assert (fired >= np.minimum(clear + MARGIN * (brake[own] == 0.0), base) - 1e-9).all()

@@ -42,7 +42,7 @@ def test_learning_depends_on_readings_and_on_nothing_else_of_the_unit(law: Learn
     assert (one.corrections == two.corrections).all()
     assert set(vars(one)) == {
         *("law", "stage", "corrections", "belief", "contractions"),
-        *("_gains", "_ladders", "_line", "_first"),
+        *("_gains", "_started", "_ladders", "_line", "_first"),
     }
 
 

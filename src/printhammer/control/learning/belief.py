@@ -35,7 +35,8 @@ _SHARE: Final = 0.01  # Probability below which a mode is left out, in parts of 
 _CARE: Final = 1.3  # By how much wider than it says a covariance is taken to be, where harm may be done
 _FREEDOM: Final = 4.0  # Degrees of freedom of Student's t
 _LOST: Final = 12.0  # What a dot that is seen but not predicted adds to the objective, twice
-_STEP: Final = 0.1  # Of the differences, in standard deviations
+_STEP: Final = 0.1  # Of the differences by which a search finds its way, in standard deviations
+_FINE: Final = 0.01  # Of those that say how well constants are known: what explains readings is bent
 _ITERATIONS: Final = 10  # At most, at a level
 _STILL: Final = 0.03  # Step at which a level is over, in standard deviations
 _GAIN: Final = 0.01  # Of the objective, below which a step is none
@@ -168,8 +169,10 @@ def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> 
         if np.isfinite(misfit) and left > _EXPLAINED:
             break
         place, level, misfit = after, finer, left
-    if not place.fresh:
-        place = yield from _look(place.constants, place.shown)
+    own = place.constants
+    moved = yield np.concatenate([own + _FINE * np.eye(own.size), own - _FINE * np.eye(own.size)])
+    up, down = np.split(moved, 2)
+    place = place._replace(slopes=(up - down).T / (2.0 * _FINE))
     normal = _normal(place, evidence.value, evidence.at(level))[0]
     # What is not explained is as much of a reason to doubt as noise is.
     covariance = np.asarray(max(misfit, 1.0) * np.linalg.inv(normal), np.float64)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from printhammer.control.learning.sensor import ImpactSensor
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.judging import Judgement
-    from printhammer.support.arrays import BoolArray, FloatArray
+    from printhammer.support.arrays import BoolArray
 
 
 class Progress(NamedTuple):
@@ -28,7 +28,6 @@ class Progress(NamedTuple):
     cycle: Judgement
     line: Judgement
     learned: BoolArray  # Which units print with the table that is learned, not in an open loop
-    corrections: FloatArray  # (units, inputs)
 
 
 def calibrate(
@@ -58,7 +57,6 @@ def calibrate(
                 cycle,
                 line,
                 state,
-                np.array([learner.corrections for learner in learners]),
             )
         )
 

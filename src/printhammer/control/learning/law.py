@@ -20,13 +20,20 @@ otherwise, is halved until this holds for hammers that are held for possible.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.learning.settings import ADVANCE, DELAY
+from printhammer.control.table.drive import COLUMNS
+from printhammer.control.table.drivers import of_force, with_pulse
 from printhammer.control.table.histories import histories_of
+from printhammer.control.table.tuning import tune
+from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
 
 if TYPE_CHECKING:
@@ -46,7 +53,9 @@ _DAMPING: Final = 1e-3  # Of the inverse of G: mean square of deviations, in par
 _STEEP: Final = 2.0  # By how much more what is far off counts, for each square of the limits
 _SIZES: Final = (1.0, 0.5, 0.2)  # Parts of a change that are tried
 _NEWTON: Final = 10  # How often, at most, the law is applied to the hammer that is believed in, after a stage
-_BAD: Final = 10.0  # What is left over beyond which another way is tried
+BAD: Final = 10.0
+"""What is left over, as `Update` has it, beyond which another start is tried."""
+
 _SLOW: Final = 0.85  # Part of the badness of the time before below which it pays to go on
 _LEAST: Final = 1e-2  # Least part of what is not explained that is put right
 _OTHERS: Final = 4  # Number of probable hammers for which corrections must not move apart
@@ -63,8 +72,11 @@ class Update(NamedTuple):
     """What comes of a stage."""
 
     corrections: FloatArray  # (inputs,)
-    contraction: float  # Largest eigenvalue of Q + L G'
+    contraction: float  # Largest eigenvalue of Q - L (G + a (G' - G))
     gains: bool  # Whether the table is handed out
+    left: (
+        float  # What dots are off by in the end, on the hammers believed in: squares, in parts of the limits
+    )
 
 
 class _Unit(NamedTuple):
@@ -118,11 +130,43 @@ class LearningLaw:
             part *= 0.5
         contraction, unit = largest(part), unit._replace(more=part * unit.more)
         left, found = self._followed(unit, keep * corrections)
-        if left > _BAD and corrections.any():
+        if left > BAD and corrections.any():
             # The table that learning starts from may lead to where what was learned does not.
             left, found = min((left, found), self._followed(unit, 0.0 * corrections), key=lambda end: end[0])
         corrections = found
-        return Update(corrections, contraction, self._gains(alike, corrections))
+        return Update(corrections, contraction, self._gains(alike, corrections), left)
+
+    def started_anew(self, belief: Belief) -> LearningLaw | None:
+        """Return the same law, starting from a table that is tuned for the hammer believed in.
+
+        Its dots from rest are made as hard as those of the nominal hammer, and arrive when those do. There is
+        none where no table prints every dot.
+        """
+        task = self.entries.task
+        (hammer,) = self.production.hammers(belief.modes[0].mean[None])
+        if hammer is None:
+            return None
+        with suppress(InputError):
+            single = task.single.nominal
+            driven = with_pulse(hammer, task.pulse)
+            struck = of_force(driven, task.pulse, single.force, 0.5 * task.width, task.widest)
+            table = tune(
+                struck,
+                rate=self.entries.rate,
+                history=task.gaps,
+                reach=task.reach,
+                limits=task.limits,
+                brake=task.brake,
+                largest_current=task.largest,
+                tolerance=task.tolerance,
+                threads=task.threads,
+            )
+            base = np.array([getattr(table, name)[0] for name in COLUMNS])
+            sooner = nominal(struck, tolerance=task.tolerance).flight_time - single.flight_time
+            base[ADVANCE] += sooner
+            base[DELAY] = np.where(base[DELAY] > 0.0, np.maximum(base[DELAY] - sooner, task.brake_from), 0.0)
+            return replace(self, entries=self.entries.started_from(base))
+        return None
 
     def _followed(self, unit: _Unit, corrections: FloatArray) -> tuple[float, FloatArray]:
         """Return to which corrections the law leads, and what they leave."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from printhammer.control.learning.belief import Belief, Evidence, believe
-from printhammer.control.learning.law import RUNS
+from printhammer.control.learning.law import BAD, RUNS
 from printhammer.control.learning.lines import LINE
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ _FLOOR: Final = 0.01
 _STARTS: Final = 6  # Number of simulated hammers from which searches begin
 _OUTLIER: Final = 6.0  # Standard deviations from the median beyond which a reading is left out
 _FEWEST: Final = 3  # Readings of which the median says something
+_STARTED: Final = 2  # How often, at most, a table is tuned for the hammer believed in
 
 
 class Mean(NamedTuple):
@@ -41,7 +42,7 @@ class Learner:
     Parameters
     ----------
     law : LearningLaw
-        What to do with readings.
+        What to do with readings; where it leads nowhere, one that starts from another table takes its place.
     """
 
     def __init__(self, law: LearningLaw) -> None:
@@ -51,6 +52,7 @@ class Learner:
         self.belief: Belief | None = None
         self.contractions: list[float] = []
         self._gains = False
+        self._started = 0
         self._ladders: list[FloatArray] = []
         self._line: list[FloatArray] = []
         self._first: Mean | None = None
@@ -110,6 +112,13 @@ class Learner:
                 line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
             )
         update = law.update(self.belief, self.corrections, unexplained)
+        if update.left > BAD and self._started < _STARTED:
+            self._started += 1
+            other = law.started_anew(self.belief)
+            if other is not None:
+                again = other.update(self.belief, np.zeros(other.entries.inputs.shape[1]), unexplained)
+                if again.left < update.left:
+                    self.law, update = other, again
         self.corrections, self._gains = update.corrections, update.gains
         self.contractions.append(update.contraction)
         self._line = []

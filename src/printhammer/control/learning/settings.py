@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
@@ -55,6 +55,14 @@ class Adjustable:
         after = before + np.clip(change, -_LARGEST, _LARGEST)
         rows, columns = self.inputs
         return np.asarray((self._bounded(self._raw(after)) - self.base)[rows, columns] / STEP)
+
+    def started_from(self, base: FloatArray) -> Adjustable:
+        """Return the entries of another table, (4, entries), moved to where they keep to all bounds."""
+        # No entry has the right to stay beyond a bound.
+        strict, own = base.copy(), base.copy()
+        strict[ADVANCE] = -np.inf
+        own[ADVANCE] = np.maximum(own[ADVANCE], -self.task.latest(own[WIDTH]))
+        return replace(self, base=replace(self, base=strict)._bounded(own))
 
     def settings(self, corrections: FloatArray) -> FloatArray:
         """Return the settings with corrections (inputs,), shape (4, entries)."""
