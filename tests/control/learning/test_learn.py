@@ -10,12 +10,13 @@ from tests.hammers import crude
 import printhammer as ph
 from printhammer.control.learning.belief import Belief, Mode
 from printhammer.control.learning.ladder import DOTS, Rung, candidates
-from printhammer.control.learning.law import LearningLaw
+from printhammer.control.learning.law import LearningLaw, good
 from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import LINE, Press
 from printhammer.control.learning.sensor import ImpactSensor, Readings
 from printhammer.control.learning.settings import MARGIN, WIDTH
 from printhammer.control.table.drivers import driven_by
+from printhammer.control.table.histories import histories, number_of
 from printhammer.control.widths import of_width
 
 RATE = 1275.0
@@ -59,6 +60,29 @@ def test_the_open_loop_is_left_for_a_gain_without_harm_only(law: LearningLaw) ->
     unsure = believed(law, 1.5)
     assert not law.update(unsure, off, unexplained).gains
     assert replace(law, doubt=1.0).update(unsure, off, unexplained).gains
+
+
+def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLaw) -> None:
+    """Single dots are as hard as the nominal ones and arrive when those do, though the hammer is another."""
+    row = np.array([0.0, 0.0, 0.0, 0.0, 1.0, -1.0, -1.0, 1.0])
+    unit = replace(believed(law, 0.1).modes[0], mean=np.pad(row, (0, law.production.size - row.size)))
+    started = law.started_anew(Belief.of([unit]))
+    assert started is not None
+    task, (hammer,) = law.entries.task, law.production.hammers(unit.mean[None])
+    assert hammer is not None
+    shown, kept = (
+        good(law.production.press([hammer]), [entries.settings(np.zeros(entries.inputs.shape[1]))]).mean()
+        for entries in (law.entries, started.entries)
+    )
+    assert shown < 0.9
+    assert kept == 1.0
+    for history in histories(task.gaps, task.reach):
+        advance, width, delay, brake = started.entries.base[:, number_of(history, task.reach)]
+        assert width <= task.widest
+        assert brake == 0.0 or delay >= task.brake_from
+        if history[0]:
+            clear = task.earliest(delay, brake) + MARGIN * (brake == 0.0)
+            assert history[0] / RATE - advance >= clear - 1e-12
 
 
 def test_two_learners_shown_the_same_learn_the_same(law: LearningLaw) -> None:

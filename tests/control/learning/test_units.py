@@ -9,6 +9,7 @@ import printhammer as ph
 from printhammer.control.learning.calibrate import calibrate
 from printhammer.control.learning.ladder import DOTS, Rung
 from printhammer.control.learning.law import RUNS, LearningLaw
+from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import LINE, Press
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.sensor import ImpactSensor, Readings
@@ -21,6 +22,13 @@ SENSOR = ImpactSensor(force=0.03)
 
 def nominal() -> ph.Hammer:
     return ph.load("hendriks-1983")
+
+
+def apart(learner: Learner, row: np.ndarray) -> np.ndarray:
+    """Return how far constants are off from what is believed of them, in its standard deviations."""
+    assert learner.belief is not None
+    mean, deviation = learner.belief.moments()
+    return np.asarray(((mean - np.pad(row, (0, mean.size - row.size))) / deviation)[: row.size])
 
 
 def test_updates_do_not_lead_apart(law: LearningLaw) -> None:
@@ -80,8 +88,10 @@ def test_it_gains_with_other_sensors_than_it_was_designed_for(
 
 def test_times_tell_the_force_that_they_do_not_show(by_time: LearningLaw) -> None:
     """After 1,000 dots, better than single pulses could (3.2 %)."""
-    units = Variability().draw(nominal(), 4, 5)
+    rows, units = zip(*Variability().draw_rows(nominal(), 4, 5), strict=True)
     learners, stages = calibrate(by_time, units, ImpactSensor())
+    off = np.abs(np.concatenate([apart(each, row) for each, row in zip(learners, rows, strict=True)]))
+    assert (off < 2.0).mean() > 0.8
     production = by_time.production
     known = [
         production.hammers(each.belief.modes[0].mean[None])[0] for each in learners if each.belief is not None
@@ -104,9 +114,13 @@ def test_times_tell_the_force_that_they_do_not_show(by_time: LearningLaw) -> Non
 def test_nearly_all_units_print_all_dots_and_none_fewer_than_in_an_open_loop(
     sensor: ImpactSensor, asked: float
 ) -> None:
-    units = Variability().draw(nominal(), 40, 11)
-    stages = calibrate(law_for(nominal(), RATE, sensor=sensor)[0], units, sensor)[1]
+    rows, units = zip(*Variability().draw_rows(nominal(), 40, 11), strict=True)
+    learners, stages = calibrate(law_for(nominal(), RATE, sensor=sensor)[0], units, sensor)
     first, *others = (stage.cycle.good.mean(axis=1) for stage in stages)
     assert (others[-1] == 1.0).mean() >= asked
     # A single dot of the cycle may be lost on the way.
     assert min((good - first).min() for good in others) >= -0.02
+    # Constants lie where they are said to lie: 68 and 95 of 100 within one and two standard deviations.
+    off = np.abs(np.concatenate([apart(each, row) for each, row in zip(learners, rows, strict=True)]))
+    assert 0.55 < (off < 1.0).mean() < 0.85
+    assert (off < 2.0).mean() > 0.88
