@@ -4,7 +4,7 @@ Run it with ``.venv/bin/python docs/measure/learning.py``. It draws hammers from
 production, and counts the dots of the de Bruijn cycle of order 8 within limits at parts of the nominal
 hammer's open-loop safe rate: open loop, table and robust table, each with the hammer's own pulse and with a
 fast switch, and what is learned after some dots from times of impact with 5 us of noise, and with forces to 3
-% as well. It takes some ten minutes on two cores.
+% as well: all units at 1.5 times, a fifth of them elsewhere. It takes an hour on two cores.
 
 ``--units N`` draws another number, ``--feedback N`` lets feedback print a cycle of order 6 on as many of
 them. ``--sensors`` tries other sensors instead, ``--tolerance`` other variabilities, ``--drivers`` other
