@@ -349,9 +349,10 @@ def curves(path: Path) -> None:
         ax.set_xlabel("Rate, in open-loop safe rates of the nominal hammer")
         ax.set_ylabel("Units that print all dots  [%]")
         ax.legend(fontsize=style.SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-        style.foot(
-            figure, f"hendriks-1983 · {learned.settings['units']} units, feedback {seen.settings['units']}"
+        sizes = (
+            f"{learned.settings['units']} units at {ASKED:g}, {min(row[2] for row in learned.rows)} elsewhere"
         )
+        style.foot(figure, f"hendriks-1983 · {sizes}, feedback {seen.settings['units']}")
         drawn = BytesIO()
         figure.savefig(drawn, dpi=110)
     path.write_bytes(drawn.getvalue())
