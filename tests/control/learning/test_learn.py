@@ -85,16 +85,14 @@ def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLa
             assert history[0] / RATE - advance >= clear - 1e-12
 
 
-def test_two_learners_shown_the_same_learn_the_same(law: LearningLaw) -> None:
-    one, two = Learner(law), Learner(law)
-    for _ in range(4):
-        for learner in (one, two):
-            learner.see(*readings(law, late=7e-6))
-    assert (one.corrections == two.corrections).all()
-    assert one.corrections.any()
-
-
-@pytest.mark.parametrize("late", [-400e-6, 400e-6, float("nan")])
+@pytest.mark.parametrize(
+    "late",
+    [
+        400e-6,
+        pytest.param(-400e-6, marks=pytest.mark.slow),
+        pytest.param(float("nan"), marks=pytest.mark.slow),
+    ],
+)
 def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> None:
     learner, task = Learner(law), law.entries.task
     while not learner.finished:
