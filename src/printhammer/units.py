@@ -156,7 +156,8 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
     try:
         number = float(value)
         if math.isfinite(number):
-            return float(Fraction(repr(number)) * factor)
+            # What is in SI already needs no exact product.
+            return number + 0.0 if factor == 1 else float(Fraction(repr(number)) * factor)
     except OverflowError:
         pass
     raise InputError(f"{value!r} {unit} is not a finite number")

@@ -164,7 +164,7 @@ class PulseSequence(Drive):
         self._segments = tables[0]
         self._tables = tables
         self._supports = [0.0] * len(tables)
-        for waveform in waveforms:
+        for waveform in {id(each): each for each in waveforms}.values():
             self._supports[known[id(waveform)]] = waveform.support
         # Looked for when first asked for.
         self._largest = math.nan
@@ -209,7 +209,11 @@ def _checked(waveforms: Any) -> list[Waveform]:
         fired = []
     if not fired:
         raise InputError(f"waveforms = {waveforms!r} is expected to be a list of waveforms, one a firing")
+    seen: set[int] = set()
     for number, waveform in enumerate(fired):
+        if id(waveform) in seen:
+            continue
+        seen.add(id(waveform))
         if not isinstance(waveform, Waveform):
             raise InputError(f"waveforms[{number}] = {waveform!r} is expected to be a waveform")
         if not math.isfinite(waveform.support):

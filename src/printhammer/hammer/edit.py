@@ -136,9 +136,15 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
 
 
 def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
-    """Return a copy of a plain document with edits made."""
-    result: dict[str, Any] = _copied(document)
+    """Return a plain document with edits made; what is not edited is shared with the one given."""
+    result = dict(document)
     for key, value in edits:
+        section, _, name = key.rpartition(".")
+        holder = result
+        if section:
+            holder = result[section] = dict(result.get(section, {}))
+        if isinstance(holder.get(name), Mapping):
+            holder[name] = dict(holder[name])
         _put(result, key, _copied(value), dict)
     return result
 

@@ -131,17 +131,20 @@ def _problems(
         own = members[places]
         hammer, drive = hammers[hammer_of[own[0]]], fired.drives[own[0]]
         x, v = states[own, 1], states[own, 2]
+        way: float | None = None
         if hammer.position is None or hammer.front is None:
             periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
             keys = np.column_stack([x, v, periods])
         else:
             # Only what is faster than the typical speed has scales of its own.
-            keys = np.maximum(np.abs(v), scales_of(hammer, drive, (float(x[0]), 0.0))[1])
+            way, typical = scales_of(hammer, drive, (float(x[0]), 0.0))
+            keys = np.maximum(np.abs(v), typical)
         _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         problem_of[places] = len(problems) + which
         for k in first.tolist():
             state = float(x[k]), float(v[k])
-            problems.append(Problem(hammer, fired.drives[own[k]], state, 0.0, tolerance))
+            scales = None if way is None else (way, max(typical, abs(state[1])))
+            problems.append(Problem(hammer, fired.drives[own[k]], state, 0.0, tolerance, scales=scales))
     return problems, problem_of
 
 

@@ -196,8 +196,8 @@ class Problem:
     """One hammer under one drive, ready to be integrated.
 
     The state, displacement, m, and velocity, m/s, is that at the time `start`, s. The tolerance is the error
-    allowed in one step, in units of the stroke and of a typical speed. In the pack and under a voltage more
-    belongs to the state, which is `beyond`.
+    allowed in one step, in units of the stroke and of a typical speed: those of `scales_of` where no `scales`
+    are given. In the pack and under a voltage more belongs to the state, which is `beyond`.
     """
 
     max_steps: int | None = None
@@ -211,6 +211,7 @@ class Problem:
         start: float,
         tolerance: float,
         beyond: Beyond = AT_REST,
+        scales: tuple[float, float] | None = None,
     ) -> None:
         self.hammer = hammer
         self.drive = drive
@@ -227,7 +228,7 @@ class Problem:
         self.firings = np.array(firings, dtype=np.float64)
         self.begins = np.array(begins, dtype=np.int64)
         self.pieces = np.array(pieces, dtype=np.float64)
-        self.scales = scales_of(hammer, drive, state)
+        self.scales = scales_of(hammer, drive, state) if scales is None else scales
         # The eighth order is controlled through the estimates of the sixth and the seventh.
         self.control = (*self.scales, (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance)
         low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)

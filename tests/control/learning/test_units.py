@@ -33,8 +33,8 @@ def apart(learner: Learner, row: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def learned(law: LearningLaw) -> tuple[list[Learner], list[Progress]]:
-    """Return what three units learn from times and forces."""
-    return calibrate(law, Variability().draw(nominal(), 3, 5), SENSOR)
+    """Return what two units learn from times and forces."""
+    return calibrate(law, Variability().draw(nominal(), 2, 5), SENSOR)
 
 
 def test_updates_do_not_lead_apart(learned: tuple[list[Learner], list[Progress]]) -> None:
@@ -83,14 +83,13 @@ def test_it_gains_where_the_force_is_measured(learned: tuple[list[Learner], list
         {"seed": 7},
         {"colour": 0.8},
         {"gain": 0.02},
-        {"missed": 0.1},
     ],
     ids=str,
 )
 def test_it_gains_with_other_sensors_than_it_was_designed_for(
     law: LearningLaw, options: dict[str, Any]
 ) -> None:
-    units = Variability().draw(nominal(), 3, 5)
+    units = Variability().draw(nominal(), 2, 5)
     stages = calibrate(law, units, ImpactSensor(**{"force": 0.03, **options}))[1]
     first, *others = (stage.cycle.good.mean(axis=1) for stage in stages)
     assert others[-1].mean() > 0.93
@@ -99,6 +98,7 @@ def test_it_gains_with_other_sensors_than_it_was_designed_for(
         assert (good >= first - 0.02).all()
 
 
+@pytest.mark.slow
 def test_times_tell_the_force_that_they_do_not_show(by_time: LearningLaw) -> None:
     """After 1,000 dots, better than single pulses could (3.2 %)."""
     rows, units = zip(*Variability().draw_rows(nominal(), 3, 5), strict=True)
@@ -125,10 +125,10 @@ def test_times_tell_the_force_that_they_do_not_show(by_time: LearningLaw) -> Non
 def test_nearly_all_units_print_all_dots_and_none_fewer_than_in_an_open_loop(
     sensor: ImpactSensor,
 ) -> None:
-    rows, units = zip(*Variability().draw_rows(nominal(), 10, 11), strict=True)
+    rows, units = zip(*Variability().draw_rows(nominal(), 8, 11), strict=True)
     learners, stages = calibrate(law_for(nominal(), RATE, sensor=sensor)[0], units, sensor)
     first, *others = (stage.cycle.good.mean(axis=1) for stage in stages)
-    assert (others[-1] == 1.0).sum() >= 9
+    assert (others[-1] == 1.0).sum() >= 7
     # A single dot of the cycle may be lost on the way.
     assert min((good - first).min() for good in others) >= -0.02
     # Constants lie about where they are said to lie: 64 and 87 of 100 within one and two standard
