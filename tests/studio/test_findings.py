@@ -105,7 +105,8 @@ def test_pins_have_names_and_stay_in_the_address(opened: Page) -> None:
         " box.dispatchEvent(new Event('change')); })()"
     )
     opened.wait("document.querySelector('.apart').textContent.includes('at most')")
-    opened.wait("location.hash.includes('pins')")
+    # The address follows a little later than the state.
+    opened.wait("['built', '1500'].every((text) => location.hash.includes(text))")
     opened.call("Page.reload")
     opened.wait("window.studio?.studio?.ghosts.length === 2")
     names = opened.run("window.studio.studio.ghosts.map((ghost) => ghost.name)")
