@@ -1,6 +1,8 @@
 """Units that learn: what they gain, by times of impact alone and with forces."""
 
-from typing import Any
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -33,8 +35,8 @@ def apart(learner: Learner, row: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def learned(law: LearningLaw) -> tuple[list[Learner], list[Progress]]:
-    """Return what two units learn from times and forces."""
-    return calibrate(law, Variability().draw(nominal(), 2, 5), SENSOR)
+    """Return what four units learn from times and forces."""
+    return calibrate(law, Variability().draw(nominal(), 4, 5), SENSOR)
 
 
 def test_updates_do_not_lead_apart(learned: tuple[list[Learner], list[Progress]]) -> None:
@@ -61,6 +63,7 @@ def test_learning_depends_on_readings_and_on_nothing_else_of_the_unit(law: Learn
 
     one, two = calibrate(law, Variability().draw(nominal(), 2, 8), Deaf(force=0.03))[0]
     assert (one.corrections == two.corrections).all()
+    assert one.corrections.any()
     assert set(vars(one)) == {
         *("law", "stage", "corrections", "belief", "contractions"),
         *("_gains", "_started", "_ladders", "_line", "_first"),
@@ -83,13 +86,14 @@ def test_it_gains_where_the_force_is_measured(learned: tuple[list[Learner], list
         {"seed": 7},
         {"colour": 0.8},
         {"gain": 0.02},
+        {"missed": 0.1},
     ],
     ids=str,
 )
 def test_it_gains_with_other_sensors_than_it_was_designed_for(
     law: LearningLaw, options: dict[str, Any]
 ) -> None:
-    units = Variability().draw(nominal(), 2, 5)
+    units = Variability().draw(nominal(), 4, 5)
     stages = calibrate(law, units, ImpactSensor(**{"force": 0.03, **options}))[1]
     first, *others = (stage.cycle.good.mean(axis=1) for stage in stages)
     assert others[-1].mean() > 0.93
@@ -101,7 +105,7 @@ def test_it_gains_with_other_sensors_than_it_was_designed_for(
 @pytest.mark.slow
 def test_times_tell_the_force_that_they_do_not_show(by_time: LearningLaw) -> None:
     """After 1,000 dots, better than single pulses could (3.2 %)."""
-    rows, units = zip(*Variability().draw_rows(nominal(), 3, 5), strict=True)
+    rows, units = zip(*Variability().draw_rows(nominal(), 4, 5), strict=True)
     learners, stages = calibrate(by_time, units, ImpactSensor())
     off = np.abs(np.concatenate([apart(each, row) for each, row in zip(learners, rows, strict=True)]))
     assert (off < 2.0).mean() > 0.8
@@ -120,19 +124,69 @@ def test_times_tell_the_force_that_they_do_not_show(by_time: LearningLaw) -> Non
     assert good[-1].mean() > 0.98
 
 
+class Many(NamedTuple):
+    """What 40 units learn."""
+
+    good: np.ndarray  # Share of the dots of the cycle within limits, (stages, units), in an open loop first
+    off: np.ndarray  # How far constants are off, in the standard deviations said of them
+
+
+@pytest.fixture(scope="module")
+def many() -> Callable[[ImpactSensor], Many]:
+    """Return a function that lets 40 units learn, once for each sensor."""
+
+    @cache
+    def learn(sensor: ImpactSensor) -> Many:
+        rows, units = zip(*Variability().draw_rows(nominal(), 40, 11), strict=True)
+        learners, stages = calibrate(law_for(nominal(), RATE, sensor=sensor)[0], units, sensor)
+        off = [apart(each, row) for each, row in zip(learners, rows, strict=True)]
+        return Many(np.array([stage.cycle.good.mean(axis=1) for stage in stages]), np.abs(off))
+
+    return learn
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("sensor", [ImpactSensor(force=0.03), ImpactSensor()], ids=["force", "time"])
-def test_nearly_all_units_print_all_dots_and_none_fewer_than_in_an_open_loop(
-    sensor: ImpactSensor,
+@pytest.mark.parametrize(("sensor", "asked"), [(SENSOR, 0.94), (ImpactSensor(), 0.9)], ids=["force", "time"])
+def test_nearly_all_units_print_all_dots(
+    many: Callable[[ImpactSensor], Many], sensor: ImpactSensor, asked: float
 ) -> None:
-    rows, units = zip(*Variability().draw_rows(nominal(), 8, 11), strict=True)
-    learners, stages = calibrate(law_for(nominal(), RATE, sensor=sensor)[0], units, sensor)
-    first, *others = (stage.cycle.good.mean(axis=1) for stage in stages)
-    assert (others[-1] == 1.0).sum() >= 7
+    assert (many(sensor).good[-1] == 1.0).mean() >= asked
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        pytest.param(SENSOR, id="force"),
+        pytest.param(
+            ImpactSensor(),
+            id="time",
+            marks=pytest.mark.xfail(reason="one of 40 units loses 4 of 87 dots after its first 25 dots"),
+        ),
+    ],
+)
+def test_no_unit_prints_fewer_dots_than_in_an_open_loop(
+    many: Callable[[ImpactSensor], Many], sensor: ImpactSensor
+) -> None:
+    good = many(sensor).good
     # A single dot of the cycle may be lost on the way.
-    assert min((good - first).min() for good in others) >= -0.02
-    # Constants lie about where they are said to lie: 64 and 87 of 100 within one and two standard
-    # deviations, of 40 units.
-    off = np.abs(np.concatenate([apart(each, row) for each, row in zip(learners, rows, strict=True)]))
-    assert 0.5 < (off < 1.0).mean() < 0.9
-    assert (off < 2.0).mean() > 0.75
+    assert (good[1:] - good[0]).min() >= -0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "sensor",
+    [
+        pytest.param(
+            SENSOR, id="force", marks=pytest.mark.xfail(reason="86 of 100 constants are within two (0022)")
+        ),
+        pytest.param(ImpactSensor(), id="time"),
+    ],
+)
+def test_constants_lie_where_they_are_said_to_lie(
+    many: Callable[[ImpactSensor], Many], sensor: ImpactSensor
+) -> None:
+    """68 and 95 of 100 within one and two standard deviations."""
+    off = many(sensor).off
+    assert 0.55 < (off < 1.0).mean() < 0.85
+    assert (off < 2.0).mean() > 0.88
