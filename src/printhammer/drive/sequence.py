@@ -148,6 +148,7 @@ class PulseSequence(Drive):
         """Take over the waveforms of the firings: which segment tables there are, and whose is which."""
         numbers: dict[bytes, int] = {}
         tables: list[FloatArray] = []
+        supports: list[float] = []
         known: dict[int, int] = {}
         for waveform in waveforms:
             if id(waveform) in known:
@@ -158,14 +159,13 @@ class PulseSequence(Drive):
             if content not in numbers:
                 numbers[content] = len(tables)
                 tables.append(segments)
+                supports.append(waveform.support)
             known[id(waveform)] = numbers[content]
         self._waveforms = tuple(waveforms)
         self._waveform = self._waveforms[0]
         self._segments = tables[0]
         self._tables = tables
-        self._supports = [0.0] * len(tables)
-        for waveform in {id(each): each for each in waveforms}.values():
-            self._supports[known[id(waveform)]] = waveform.support
+        self._supports = supports
         # Looked for when first asked for.
         self._largest = math.nan
         self._which = np.array([known[id(waveform)] for waveform in waveforms], dtype=np.int64)
