@@ -154,39 +154,28 @@ def test_nearly_all_units_print_all_dots(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "sensor",
-    [
-        pytest.param(SENSOR, id="force"),
-        pytest.param(
-            ImpactSensor(),
-            id="time",
-            marks=pytest.mark.xfail(reason="one of 40 units loses 4 of 87 dots after its first 25 dots"),
-        ),
-    ],
-)
-def test_no_unit_prints_fewer_dots_than_in_an_open_loop(
-    many: Callable[[ImpactSensor], Many], sensor: ImpactSensor
-) -> None:
-    good = many(sensor).good
+def test_no_unit_prints_fewer_dots_than_in_an_open_loop(many: Callable[[ImpactSensor], Many]) -> None:
+    good = many(SENSOR).good
     # A single dot of the cycle may be lost on the way.
     assert (good[1:] - good[0]).min() >= -0.02
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "sensor",
-    [
-        pytest.param(
-            SENSOR, id="force", marks=pytest.mark.xfail(reason="86 of 100 constants are within two (0022)")
-        ),
-        pytest.param(ImpactSensor(), id="time"),
-    ],
-)
-def test_constants_lie_where_they_are_said_to_lie(
-    many: Callable[[ImpactSensor], Many], sensor: ImpactSensor
-) -> None:
+def test_constants_lie_where_they_are_said_to_lie(many: Callable[[ImpactSensor], Many]) -> None:
     """68 and 95 of 100 within one and two standard deviations."""
-    off = many(sensor).off
+    off = many(ImpactSensor()).off
     assert 0.55 < (off < 1.0).mean() < 0.85
     assert (off < 2.0).mean() > 0.88
+
+
+@pytest.mark.slow
+def test_golden_figures_of_what_falls_short(many: Callable[[ImpactSensor], Many]) -> None:
+    """What the page says of these units: a loss by times alone, and how well forces tell constants.
+
+    None and 0.95 were asked for; whoever comes nearer changes page and figures, and takes up the tests above.
+    """
+    lost = many(ImpactSensor()).good[1:] - many(ImpactSensor()).good[0]
+    assert np.argwhere(lost < 0.0).tolist() == [[0, 23]]
+    assert lost.min() == pytest.approx(-4 / 87)
+    off = many(SENSOR).off
+    assert [round(100.0 * (off < size).mean()) for size in (1.0, 2.0)] == [64, 86]
