@@ -99,10 +99,16 @@ def read_document(text: str, where: str) -> dict[str, Any]:
         raise InputError(f"{where}: expected a TOML file ({' '.join(str(error).split())})") from None
 
 
-def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
+def build(
+    document: Mapping[str, Any],
+    where: str,
+    folder: Path,
+    like: tuple[Mapping[str, Any], Contents] | None = None,
+) -> Contents:
     """Build and check the contents of a hammer file, parts and constants in SI, from its TOML document.
 
     Messages begin with `where`, usually the file; `folder` is where a force table or a sampled waveform lies.
+    What the document shares with another one, read in the same folder, is taken from the contents of that.
 
     Raises
     ------
@@ -111,7 +117,7 @@ def build(document: Mapping[str, Any], where: str, folder: Path) -> Contents:
         order.
     """
     with located(where):
-        return _build(document, folder)
+        return _build(document, folder, *(like or ({}, None)))
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
@@ -140,7 +146,9 @@ def file_options(model: type[BaseModel]) -> dict[str, Any]:
     return {name: kind for name, kind in options(model).items() if name != "quantity"}
 
 
-def _build(document: Mapping[str, Any], folder: Path) -> Contents:
+def _build(
+    document: Mapping[str, Any], folder: Path, before: Mapping[str, Any], known: Contents | None
+) -> Contents:
     _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS, UNCERTAINTY), "")
     if "format" not in document:
         raise InputError(f"format is missing, expected format = {FORMAT}")
@@ -156,16 +164,25 @@ def _build(document: Mapping[str, Any], folder: Path) -> Contents:
         raise InputError("name is missing, expected a short name of the hammer")
     constants: dict[str, Constant] = {}
     top = {key: document[key] for key in quantities(Body) if key in document}
-    body = _read(Body, top, "", constants, folder)
+    body = _read(Body, top, "", constants, folder, before, known)
     made: dict[str, Any] = {}
     for section, selector in SELECTORS.items():
         if section in document:
             table = document[section]
             if not isinstance(table, Mapping):
                 raise InputError(f"{section} = {shown(table)}: expected a table [{section}]")
+            same = table is before.get(section)
+            if known is not None and same:
+                made[section] = known.parts.get(section, known.waveform)
+                keys = (f"{section}.{name}" for name in table)
+                constants |= {key: known.constants[key] for key in keys if key in known.constants}
+                continue
             kind = _kind(table, section, selector)
             rest = {key: value for key, value in table.items() if key != selector}
-            made[section] = _read(model_of(section, kind), rest, f"{section}.", constants, folder)
+            model = model_of(section, kind)
+            made[section] = _read(
+                model, rest, f"{section}.", constants, folder, before.get(section, {}), known
+            )
     contents = Contents(
         **texts,
         body=body,
@@ -199,16 +216,28 @@ def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
 
 
 def _read(
-    model: type[_M], table: Mapping[str, Any], prefix: str, constants: dict[str, Constant], folder: Path
+    model: type[_M],
+    table: Mapping[str, Any],
+    prefix: str,
+    constants: dict[str, Constant],
+    folder: Path,
+    before: Mapping[str, Any],
+    read: Contents | None,
 ) -> _M:
-    """Read the constants and options of one table into its model, and the constants also into `constants`."""
+    """Read the constants and options of one table into its model, and the constants also into `constants`.
+
+    Constants that are shared with the table `before` have been read.
+    """
     known, choices = quantities(model), file_options(model)
     _only(table, (*known, *choices), prefix)
     fields: dict[str, Any] = {}
     written: dict[str, str] = {}
     for name, value in table.items():
         if name in known:
-            constant = _constant(prefix + name, value, known[name])
+            if read is not None and before.get(name) is value:
+                constant = read.constants[prefix + name]
+            else:
+                constant = _constant(prefix + name, value, known[name])
             constants[constant.key] = constant
             fields[name] = constant.si
             written[name] = f"{constant.value!r} {constant.unit}"

@@ -178,37 +178,37 @@ class Hammer:
         """Resistance of the coil, ohm."""
         return getattr(self.coil, "resistance", None)
 
-    @property
+    @cached_property
     def magnet(self) -> MagnetPart | None:
         """Permanent magnet and coil."""
         part = self._contents.parts.get("magnet")
         return part if isinstance(part, MagnetPart) else None
 
-    @property
+    @cached_property
     def coil(self) -> CoilPart | None:
         """Circuit of the coil."""
         part = self._contents.parts.get("coil")
         return part if isinstance(part, CoilPart) else None
 
-    @property
+    @cached_property
     def spring(self) -> SpringPart | None:
         """Spring of the armature."""
         part = self._contents.parts.get("spring")
         return part if isinstance(part, SpringPart) else None
 
-    @property
+    @cached_property
     def pack(self) -> PackPart | None:
         """Ribbon and paper pack."""
         part = self._contents.parts.get("pack")
         return part if isinstance(part, PackPart) else None
 
-    @property
+    @cached_property
     def backstop(self) -> BackstopPart | None:
         """Backstop."""
         part = self._contents.parts.get("backstop")
         return part if isinstance(part, BackstopPart) else None
 
-    @property
+    @cached_property
     def damping(self) -> DampingPart | None:
         """Damping of the armature wherever it is."""
         part = self._contents.parts.get("damping")
@@ -224,17 +224,17 @@ class Hammer:
         """Standard waveform of one pulse."""
         return self._contents.waveform
 
-    @property
+    @cached_property
     def position(self) -> float | None:
         """Position of the backstop, m."""
         return self.backstop.position if self.backstop is not None else None
 
-    @property
+    @cached_property
     def front(self) -> float | None:
         """Front of the pack, m."""
         return self.pack.front if self.pack is not None else None
 
-    @property
+    @cached_property
     def origin(self) -> float:
         """Position b of equation (4): that of the backstop, or 0 without one, m."""
         return self.position if self.position is not None else 0.0
@@ -318,7 +318,7 @@ class Hammer:
                     units = {key: constant.si_unit for key, constant in self.constants.items()}
                     edits.append((UNCERTAINTY, known.without(gone).table(units)))
                     document = changed(document, edits[-1:])
-        contents = build(document, where, self._folder)
+        contents = build(document, where, self._folder, like=(self._document, self._contents))
         return Hammer(contents, document, self._text, (*self._edits, *edits), where, self._folder)
 
     def to_toml(self) -> str:

@@ -86,7 +86,14 @@ class StaticForce:
 
     def total(self, x: float, current: float = 0.0) -> float:
         """Net force with the contacts, N."""
-        return self.free(x, current) + self.elastic(self._position - x) + self.pack(x)
+        # As by `free`, `elastic` and `pack`, of which a search for equilibria spends its time in the calls.
+        force = float(self._magnet(self._magnet_constants, x, current)) + float(
+            self._spring(self._spring_constants, x)
+        )
+        depth = self._position - x
+        if depth > 0.0 and not self.rigid:
+            force += float(self._backstop(self._backstop_constants, math.sqrt(depth)))
+        return force + self.pack(x) if x > self.front else force
 
     def magnet(self, x: float, current: float = 0.0) -> float:
         """Force of the magnet, N."""

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.drive.ragged import Ragged, starts_of
+from printhammer.hammer.static_force import StaticForce
 from printhammer.kernel.lanes import layout as lane_layout
 from printhammer.kernel.model.layout import MAGNET, PLACES, ROOM
 from printhammer.kernel.single import carry
-from printhammer.run.problem import Problem, live_size, node_width, scales_of
+from printhammer.run.problem import (
+    bounds_of,
+    constants_of,
+    control_of,
+    laws_of,
+    live_size,
+    node_width,
+    scales_of,
+)
+from printhammer.run.supply import take_supply
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,27 +63,25 @@ class Group:
         tolerance: float,
         max_steps: int,
     ) -> None:
-        self.members = members
-        problems, problem_of = _problems(members, hammers, hammer_of, fired, states, tolerance)
-        own_tables, waveform_of = np.unique(fired.table_of[members], return_inverse=True)
-        tables = [fired.tables[number] for number in own_tables.tolist()]
-        self.kernel: Kernel = problems[0].kernel
-        self.laws = problems[0].laws
-        constants = np.zeros((len(problems), max(problem.constants.size for problem in problems)))
-        for row, problem in enumerate(problems):
-            constants[row, : problem.constants.size] = problem.constants
-        self.lane_kinds = fired.kinds[own_tables[0]]
-        self.uniform = len(problems) == 1 and len(tables) == 1
-        self.firings = fired.firings.take(members)
-        self.most_firings = self.firings.longest
         # Imported late, since it takes numba.
+        from printhammer.kernel.compile.specialise import specialise
         from printhammer.kernel.lanes.batch import Batch
 
+        self.members = members
+        self.laws = laws_of(hammers[hammer_of[members[0]]], fired.drives[members[0]])
+        posed = _posed(members, hammers, hammer_of, fired, states, tolerance, self.laws.circuit)
+        own_tables, waveform_of = np.unique(fired.table_of[members], return_inverse=True)
+        tables = [fired.tables[number] for number in own_tables.tolist()]
+        self.kernel: Kernel = specialise(self.laws)
+        self.lane_kinds = fired.kinds[own_tables[0]]
+        self.uniform = len(posed.bounds) == 1 and len(tables) == 1
+        self.firings = fired.firings.take(members)
+        self.most_firings = self.firings.longest
         self.batch = Batch(
-            hammer_of=problem_of,
-            hammers=constants,
-            controls=np.array([problem.control for problem in problems]),
-            bounds=np.array([problem.bounds for problem in problems]),
+            hammer_of=posed.by,
+            hammers=posed.constants,
+            controls=posed.controls,
+            bounds=posed.bounds,
             waveform_of=waveform_of.astype(np.int64),
             piece_starts=starts_of(np.array([len(table) for table in tables], dtype=np.int64)),
             pieces=np.concatenate(tables),
@@ -110,42 +118,77 @@ class Group:
         return specialise_lanes(self.laws, self.lane_kinds)
 
 
-def _problems(
+class _Posed(NamedTuple):
+    """The problems that members pose, drives apart: arrays with a row for each, and which is whose, `by`."""
+
+    constants: FloatArray
+    controls: FloatArray
+    bounds: FloatArray
+    by: IntArray
+
+
+def _posed(
     members: IntArray,
     hammers: Sequence[Hammer],
     hammer_of: IntArray,
     fired: Fired,
     states: FloatArray,
     tolerance: float,
-) -> tuple[list[Problem], IntArray]:
-    """Return the problems that members pose, drives apart: hammer and scales; and which is whose."""
-    problems: list[Problem] = []
-    problem_of = np.zeros(len(members), np.int64)
+    circuit: bool,
+) -> _Posed:
+    constants: list[FloatArray] = []
+    controls: list[tuple[float, ...]] = []
+    bounds: list[tuple[float, ...]] = []
+    by = np.zeros(len(members), np.int64)
     peaks, peak_of = np.unique(fired.peak_of[members], return_inverse=True)
     # A capacitor or a diode is the drive's, and lies with the hammer's constants.
     supplies = fired.supply_of.max(initial=0) + 1
     alike = Ragged.sorted_by(
         (hammer_of[members] * len(peaks) + peak_of) * supplies + fired.supply_of[members]
     )
+    hammer: Hammer | None = None
+    static: StaticForce | None = None
+    packed = np.zeros(0)
     for places in map(alike.__getitem__, range(len(alike))):
         own = members[places]
-        hammer, drive = hammers[hammer_of[own[0]]], fired.drives[own[0]]
-        x, v = states[own, 1], states[own, 2]
-        way: float | None = None
-        if hammer.position is None or hammer.front is None:
-            periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
-            keys = np.column_stack([x, v, periods])
-        else:
-            # Only what is faster than the typical speed has scales of its own.
-            way, typical = scales_of(hammer, drive, (float(x[0]), 0.0))
-            keys = np.maximum(np.abs(v), typical)
+        drive = fired.drives[own[0]]
+        # Sorted by the hammer before all else.
+        if hammer is not hammers[hammer_of[own[0]]]:
+            hammer = hammers[hammer_of[own[0]]]
+            static, packed = StaticForce(hammer), constants_of(hammer)
+        full = packed
+        if circuit:
+            full = packed.copy()
+            take_supply(full, hammer, drive)
+        scales_of_own, which = _scales(hammer, static, own, fired, states)
+        by[places] = len(bounds) + which
+        for scales in scales_of_own:
+            constants.append(full)
+            controls.append(control_of(scales, tolerance))
+            bounds.append(bounds_of(hammer, scales))
+    table = np.zeros((len(bounds), max(row.size for row in constants)))
+    for row, values in zip(table, constants, strict=True):
+        row[: values.size] = values
+    return _Posed(table, np.array(controls), np.array(bounds), by)
+
+
+def _scales(
+    hammer: Hammer, static: StaticForce | None, own: IntArray, fired: Fired, states: FloatArray
+) -> tuple[list[tuple[float, float]], IntArray]:
+    """Return what scales there are among members with the same hammer, and which ones a member has."""
+    x, v = states[own, 1], states[own, 2]
+    if hammer.position is None or hammer.front is None:
+        periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
+        keys = np.column_stack([x, v, periods])
         _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        problem_of[places] = len(problems) + which
-        for k in first.tolist():
-            state = float(x[k]), float(v[k])
-            scales = None if way is None else (way, max(typical, abs(state[1])))
-            problems.append(Problem(hammer, fired.drives[own[k]], state, 0.0, tolerance, scales=scales))
-    return problems, problem_of
+        posed = [((float(x[k]), float(v[k])), fired.drives[own[k]]) for k in first.tolist()]
+        return [scales_of(hammer, drive, state, static) for state, drive in posed], which
+    way, typical = scales_of(hammer, fired.drives[own[0]], (float(x[0]), 0.0), static)
+    if len(own) == 1:
+        return [(way, max(typical, abs(float(v[0]))))], np.zeros(1, np.int64)
+    # Only what is faster than the typical speed has scales of its own.
+    speeds, which = np.unique(np.maximum(np.abs(v), typical), return_inverse=True)
+    return [(way, speed) for speed in speeds.tolist()], which
 
 
 class Job:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.hammer.static_force import StaticForce
 from printhammer.kernel.model import layout
 from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.model.layout import CIRCUIT_NODE_WIDTH, NODE_WIDTH
@@ -156,16 +157,18 @@ def constants_of(hammer: Hammer) -> FloatArray:
     return array
 
 
-def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple[float, float]:
+def scales_of(
+    hammer: Hammer, drive: Drive, state: tuple[float, float], static: StaticForce | None = None
+) -> tuple[float, float]:
     """Return a typical displacement [m] and speed [m/s] of a hammer, by which tolerances are measured.
 
     The displacement is the way from the backstop to the pack. Without one of them it is how far the forces
     would bring the mass in one period of the drive or of its own, or the distance of the initial state. The
-    speed is what the largest force gives the mass over that way.
+    speed is what the largest force gives the mass over that way. The `static` force is that of the hammer,
+    made here where it is not at hand.
     """
-    from printhammer.hammer.static_force import StaticForce
-
-    static = StaticForce(hammer)
+    if static is None:
+        static = StaticForce(hammer)
     origin = hammer.origin
     largest_value = drive.largest_pulse
     current, push = (0.0, largest_value) if drive.quantity == "force" else (largest_value, 0.0)
@@ -192,12 +195,24 @@ def scales_of(hammer: Hammer, drive: Drive, state: tuple[float, float]) -> tuple
     return way, speed or way
 
 
+def control_of(scales: tuple[float, float], tolerance: float) -> tuple[float, float, float, float]:
+    """Return what the kernel controls its steps by."""
+    # The eighth order is controlled through the estimates of the sixth and the seventh.
+    return (*scales, (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance)
+
+
+def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float, float, float]:
+    """Return where the force law of a hammer holds, its origin, and how far from it counts as run away."""
+    low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
+    return (low, high, hammer.origin, FAR * scales[0])
+
+
 class Problem:
     """One hammer under one drive, ready to be integrated.
 
     The state, displacement, m, and velocity, m/s, is that at the time `start`, s. The tolerance is the error
-    allowed in one step, in units of the stroke and of a typical speed: those of `scales_of` where no `scales`
-    are given. In the pack and under a voltage more belongs to the state, which is `beyond`.
+    allowed in one step, in units of the stroke and of a typical speed. In the pack and under a voltage more
+    belongs to the state, which is `beyond`.
     """
 
     max_steps: int | None = None
@@ -211,7 +226,6 @@ class Problem:
         start: float,
         tolerance: float,
         beyond: Beyond = AT_REST,
-        scales: tuple[float, float] | None = None,
     ) -> None:
         self.hammer = hammer
         self.drive = drive
@@ -228,11 +242,9 @@ class Problem:
         self.firings = np.array(firings, dtype=np.float64)
         self.begins = np.array(begins, dtype=np.int64)
         self.pieces = np.array(pieces, dtype=np.float64)
-        self.scales = scales_of(hammer, drive, state) if scales is None else scales
-        # The eighth order is controlled through the estimates of the sixth and the seventh.
-        self.control = (*self.scales, (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance)
-        low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
-        self.bounds = (low, high, hammer.origin, FAR * self.scales[0])
+        self.scales = scales_of(hammer, drive, state)
+        self.control = control_of(self.scales, tolerance)
+        self.bounds = bounds_of(hammer, self.scales)
 
     @cached_property
     def kernel(self) -> Kernel:

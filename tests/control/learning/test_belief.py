@@ -1,14 +1,18 @@
 """What is believed from readings, against functions of which the answer is known."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from printhammer.control.learning.belief import Evidence, believe
+from printhammer.control.learning.belief import Belief, Evidence, believe
 from printhammer.control.learning.learner import mean
 from printhammer.control.learning.surrogate import Surrogate
+from printhammer.support.works import answered
 
+Readings = Callable[[np.ndarray], np.ndarray]
 SIZE = 4
 RNG = np.random.default_rng(3)
 SLOPES = RNG.standard_normal((12, SIZE))
@@ -24,20 +28,25 @@ def bent(rows: np.ndarray) -> np.ndarray:
     return np.asarray(flat + 0.8 * np.sin(4.0 * flat) * (np.arange(12) >= 6))
 
 
+def believed(readings: Readings, evidence: Evidence, *places: list[np.ndarray]) -> Belief:
+    """Return what is believed where readings are a function of constants."""
+    return answered(believe(evidence, *places), lambda asked: [readings(rows) for rows in asked])
+
+
 def evidence(value: np.ndarray, noise: float, rough: float = 0.0) -> Evidence:
     return Evidence(value, np.full(value.size, noise), np.full(value.size, rough))
 
 
 @given(st.lists(st.floats(-2.0, 2.0), min_size=SIZE, max_size=SIZE))
 def test_constants_are_found_where_readings_are_exact(truth: list[float]) -> None:
-    belief = believe(linear, evidence(linear(np.array([truth]))[0], 1e-3), [np.zeros(SIZE)]).modes[0]
+    belief = believed(linear, evidence(linear(np.array([truth]))[0], 1e-3), [np.zeros(SIZE)]).modes[0]
     assert belief.mean == pytest.approx(np.array(truth), abs=2e-2)
     assert belief.level == 0.0
 
 
 def test_little_is_known_from_readings_that_are_mostly_noise() -> None:
     """The prior is what is left: standard deviations of 1."""
-    belief = believe(linear, evidence(np.zeros(12), 1e3), [np.zeros(SIZE)]).modes[0]
+    belief = believed(linear, evidence(np.zeros(12), 1e3), [np.zeros(SIZE)]).modes[0]
     assert belief.mean == pytest.approx(np.zeros(SIZE), abs=1e-3)
     assert belief.covariance == pytest.approx(np.eye(SIZE), abs=1e-3)
 
@@ -45,7 +54,7 @@ def test_little_is_known_from_readings_that_are_mostly_noise() -> None:
 def test_the_covariance_is_that_of_linear_regression() -> None:
     """Where errors are small, Student's t with 4 degrees is a normal one of 4/5 the variance."""
     noise = 0.1
-    belief = believe(linear, evidence(np.zeros(12), noise), [np.zeros(SIZE)]).modes[0]
+    belief = believed(linear, evidence(np.zeros(12), noise), [np.zeros(SIZE)]).modes[0]
     expected = np.linalg.inv(np.eye(SIZE) + SLOPES.T @ SLOPES * 1.25 / noise**2)
     assert belief.covariance == pytest.approx(expected, rel=1e-6)
 
@@ -54,7 +63,7 @@ def test_one_reading_that_is_wrong_counts_for_little() -> None:
     truth = np.array([0.5, -1.0, 0.2, 0.8])
     value = linear(truth[None])[0]
     value[3] += 100.0
-    belief = believe(linear, evidence(value, 0.01), [np.zeros(SIZE)]).modes[0]
+    belief = believed(linear, evidence(value, 0.01), [np.zeros(SIZE)]).modes[0]
     assert belief.mean == pytest.approx(truth, abs=0.03)
 
 
@@ -62,7 +71,7 @@ def test_readings_that_bend_are_followed_from_level_to_level() -> None:
     truth = np.array([0.9, -1.1, 0.4, -0.6])
     value = bent(truth[None])[0]
     rough = np.where(np.arange(12) >= 6, 0.6, 0.0)
-    belief = believe(bent, Evidence(value, np.full(12, 0.01), rough), [np.zeros(SIZE)]).modes[0]
+    belief = believed(bent, Evidence(value, np.full(12, 0.01), rough), [np.zeros(SIZE)]).modes[0]
     assert belief.mean == pytest.approx(truth, abs=0.05)
     assert belief.level == 0.0
 
@@ -71,7 +80,7 @@ def test_a_dot_that_nobody_saw_counts_for_nothing() -> None:
     truth = np.array([0.5, -1.0, 0.2, 0.8])
     value = linear(truth[None])[0]
     value[[1, 7]] = np.nan
-    mode = believe(linear, evidence(value, 1e-3), [np.zeros(SIZE)]).modes[0]
+    mode = believed(linear, evidence(value, 1e-3), [np.zeros(SIZE)]).modes[0]
     assert mode.mean == pytest.approx(truth, abs=0.02)
 
 
@@ -83,13 +92,13 @@ def test_two_ways_to_explain_readings_are_both_believed_in() -> None:
 
     value = np.array([1.0, 0.25])
     starts = [np.array([0.8, 0.3]), np.array([-0.8, 0.3]), np.array([0.9, 0.3])]
-    belief = believe(squared, evidence(value, 0.01), starts)
+    belief = believed(squared, evidence(value, 0.01), starts)
     assert len(belief.modes) == 2
     assert belief.weights == pytest.approx(np.array([0.5, 0.5]), rel=0.15)
     assert sorted(mode.mean[0] for mode in belief.modes) == pytest.approx([-1.0, 1.0], abs=0.02)
     drawn = belief.draw(20, 1)[:, 0]
     assert (drawn > 0.0).sum() == 10
-    later = believe(squared, evidence(value, 0.01), starts, [mode.mean for mode in belief.modes])
+    later = believed(squared, evidence(value, 0.01), starts, [mode.mean for mode in belief.modes])
     assert len(later.modes) == 2
 
 

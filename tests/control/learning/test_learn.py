@@ -10,9 +10,9 @@ from tests.hammers import crude
 import printhammer as ph
 from printhammer.control.learning.belief import Belief, Mode
 from printhammer.control.learning.ladder import DOTS, Rung, candidates
-from printhammer.control.learning.law import LearningLaw, good
+from printhammer.control.learning.law import RUNS, LearningLaw, order_good
 from printhammer.control.learning.learner import Learner
-from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.learning.lines import LINE, Press, printed
 from printhammer.control.learning.sensor import ImpactSensor, Readings
 from printhammer.control.learning.settings import MARGIN, WIDTH
 from printhammer.control.table.drivers import driven_by
@@ -45,6 +45,13 @@ def believed(law: LearningLaw, spread: float) -> Belief:
     return Belief.of([mode])
 
 
+def show(learner: Learner, ladder: Readings, line: Readings) -> None:
+    """Show a learner the same in all runs of a stage, and have it learn."""
+    for _ in range(RUNS[learner.stage]):
+        learner.see(ladder, line)
+    printed(learner.learn(), learner.law.entries.task)
+
+
 def test_it_begins_in_an_open_loop(law: LearningLaw) -> None:
     learner = Learner(law)
     assert not learner.learned
@@ -56,10 +63,14 @@ def test_the_open_loop_is_left_for_a_gain_without_harm_only(law: LearningLaw) ->
     """A belief that knows the unit leaves it; one that knows next to nothing does not, but for doubt."""
     off = np.zeros(law.entries.inputs.shape[1])
     unexplained = np.zeros((2, len(LINE)))
-    assert law.update(believed(law, 0.01), off, unexplained).gains
+
+    def gains(law: LearningLaw, belief: Belief) -> bool:
+        return printed(law.update(belief, off, unexplained), law.entries.task).gains
+
+    assert gains(law, believed(law, 0.01))
     unsure = believed(law, 1.5)
-    assert not law.update(unsure, off, unexplained).gains
-    assert replace(law, doubt=1.0).update(unsure, off, unexplained).gains
+    assert not gains(law, unsure)
+    assert gains(replace(law, doubt=1.0), unsure)
 
 
 def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLaw) -> None:
@@ -70,8 +81,9 @@ def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLa
     assert started is not None
     task, (hammer,) = law.entries.task, law.production.hammers(unit.mean[None])
     assert hammer is not None
+    press = law.production.press([hammer])
     shown, kept = (
-        good(law.production.press([hammer]), [entries.settings(np.zeros(entries.inputs.shape[1]))]).mean()
+        printed(order_good(press, [entries.settings(np.zeros(entries.inputs.shape[1]))]), task).mean()
         for entries in (law.entries, started.entries)
     )
     assert shown < 0.9
@@ -96,7 +108,7 @@ def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLa
 def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> None:
     learner, task = Learner(law), law.entries.task
     while not learner.finished:
-        learner.see(*readings(law, late=late))
+        show(learner, *readings(law, late=late))
         advance, width, delay, brake = learner.settings
         assert (width <= task.widest).all()
         assert (learner.settings[WIDTH] > 0.0).all()
@@ -113,20 +125,20 @@ def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> No
 def test_a_missed_impact_changes_little(law: LearningLaw) -> None:
     whole, holed = Learner(law), Learner(law)
     rungs, line = readings(law)
-    whole.see(rungs, line)
+    show(whole, rungs, line)
     time = rungs.time.copy()
     time[0] = np.nan
-    holed.see(Readings(time, rungs.force), line)
+    show(holed, Readings(time, rungs.force), line)
     assert holed.corrections == pytest.approx(whole.corrections, abs=1.0)
 
 
 def test_an_impact_that_was_none_changes_little(law: LearningLaw) -> None:
     whole, fooled = Learner(law), Learner(law)
     rungs, line = readings(law)
-    whole.see(rungs, line)
+    show(whole, rungs, line)
     time = line.time.copy()
     time[5] = 60e-6
-    fooled.see(rungs, Readings(time, line.force))
+    show(fooled, rungs, Readings(time, line.force))
     assert fooled.corrections == pytest.approx(whole.corrections, abs=1.5)
 
 

@@ -14,19 +14,22 @@ them count for more from level to level; it ends at the last level that explains
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from printhammer.printing.rates.variability import WIDEST
+from printhammer.support.works import together
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Sequence
 
     from printhammer.support.arrays import FloatArray
+    from printhammer.support.works import Work
 
-    # A search asks for the readings of units, and is sent them.
-    Search = Generator["FloatArray", "FloatArray", "Mode"]
+    T = TypeVar("T")
+    # Asks for the readings of units, (M, readings), by their constants, (M, constants); NaN for lost dots.
+    Search: TypeAlias = Work[FloatArray, FloatArray, T]
 
 LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)  # How much of what is not smooth in a reading counts as noise
 _NEAR: Final = (0.1, 0.0)  # The same where the search begins at what was believed before
@@ -115,38 +118,17 @@ class Belief:
 
 
 def believe(
-    predict: Callable[[FloatArray], FloatArray],
-    evidence: Evidence,
-    starts: Sequence[FloatArray],
-    before: Sequence[FloatArray] = (),
-) -> Belief:
-    """Return what the evidence says of a unit.
+    evidence: Evidence, starts: Sequence[FloatArray], before: Sequence[FloatArray] = ()
+) -> Search[Belief]:
+    """Return what the evidence says of a unit; asks for the readings of units.
 
-    `predict` returns the readings, (M, readings), of units with constants (M, constants), NaN where a dot is
-    lost. Searches begin at what was believed `before`; where there is nothing, or none of them ends at the
-    finest level, at each of `starts` too.
+    Searches begin at what was believed `before`; where there is nothing, or none of them ends at the finest
+    level, at each of `starts` too.
     """
-    ends = _together(predict, [_descend(evidence, start, _NEAR) for start in before])
+    ends = yield from together([_descend(evidence, start, _NEAR) for start in before])
     if not any(end.level == LEVELS[-1] for end in ends):
-        ends += _together(predict, [_descend(evidence, start, LEVELS) for start in starts])
+        ends += yield from together([_descend(evidence, start, LEVELS) for start in starts])
     return Belief.of(ends)
-
-
-def _together(predict: Callable[[FloatArray], FloatArray], searches: Sequence[Search]) -> list[Mode]:
-    """Run searches side by side: what they ask for is run at once."""
-    ends: dict[int, Mode] = {}
-    asked = {k: next(search) for k, search in enumerate(searches)}
-    while asked:
-        readings = predict(np.concatenate(list(asked.values())))
-        at = 0
-        for k, rows in list(asked.items()):
-            own, at = readings[at : at + len(rows)], at + len(rows)
-            try:
-                asked[k] = searches[k].send(own)
-            except StopIteration as end:
-                ends[k] = end.value
-                del asked[k]
-    return [ends[k] for k in sorted(ends)]
 
 
 class _Place(NamedTuple):
@@ -158,8 +140,8 @@ class _Place(NamedTuple):
     fresh: bool  # Whether the slopes are differences made here
 
 
-def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> Search:
-    (shown,) = yield start[None]
+def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> Search[Mode]:
+    ((shown,),) = yield [start[None]]
     place, level, misfit = (yield from _look(start, shown)), levels[0], np.inf
     for finer in levels:
         noise = evidence.at(finer)
@@ -170,7 +152,7 @@ def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> 
             break
         place, level, misfit = after, finer, left
     own = place.constants
-    moved = yield np.concatenate([own + _FINE * np.eye(own.size), own - _FINE * np.eye(own.size)])
+    (moved,) = yield [np.concatenate([own + _FINE * np.eye(own.size), own - _FINE * np.eye(own.size)])]
     up, down = np.split(moved, 2)
     place = place._replace(slopes=(up - down).T / (2.0 * _FINE))
     normal = _normal(place, evidence.value, evidence.at(level))[0]
@@ -180,9 +162,9 @@ def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> 
     return Mode(place.constants, covariance, place.shown, level, float(finest[0]))
 
 
-def _look(constants: FloatArray, shown: FloatArray) -> Generator[FloatArray, FloatArray, _Place]:
+def _look(constants: FloatArray, shown: FloatArray) -> Search[_Place]:
     """Return a place with the slopes there, by differences."""
-    moved = yield constants + _STEP * np.eye(constants.size)
+    (moved,) = yield [constants + _STEP * np.eye(constants.size)]
     return _Place(constants, shown, np.asarray((moved - shown).T / _STEP), fresh=True)
 
 
@@ -211,7 +193,7 @@ def _size(rest: FloatArray) -> float:
     return 1.4826 * float(np.median(known)) if known.size else 0.0
 
 
-def _climb(value: FloatArray, noise: FloatArray, place: _Place) -> Generator[FloatArray, FloatArray, _Place]:
+def _climb(value: FloatArray, noise: FloatArray, place: _Place) -> Search[_Place]:
     """Return where constants are most probable near a place."""
     damping = 0.1
     for _ in range(_ITERATIONS):
@@ -222,7 +204,7 @@ def _climb(value: FloatArray, noise: FloatArray, place: _Place) -> Generator[Flo
         tried = [damping * factor for factor in (0.1, 1.0, 10.0, 100.0)]
         moves = [np.linalg.solve(normal + each * np.diag(np.diag(normal)), uphill) for each in tried]
         places = np.clip(place.constants + np.array(moves), -WIDEST, WIDEST)
-        readings = yield places
+        (readings,) = yield [places]
         objective = _objective(places, readings, value, wide)
         k = int(np.argmin(objective))
         if not best - objective[k] > _GAIN:

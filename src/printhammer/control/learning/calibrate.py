@@ -9,8 +9,9 @@ import numpy as np
 from printhammer.control.learning.ladder import DOTS
 from printhammer.control.learning.law import PRINTED, RUNS, LearningLaw
 from printhammer.control.learning.learner import Learner
-from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.learning.lines import LINE, Press, printed
 from printhammer.control.table.drivers import with_pulse
+from printhammer.support.works import together
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -72,6 +73,7 @@ def calibrate(
                 )
                 learner.see(rungs, line)
             run += 1
+        printed(together([learner.learn() for learner in learners]), task)
         record(judgement)
         report()
     return learners, history

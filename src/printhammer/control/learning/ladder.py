@@ -20,7 +20,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.run.simulate import simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Mapping, Sequence
 
     from printhammer.control.table.task import Task
     from printhammer.support.arrays import FloatArray
@@ -76,8 +76,7 @@ def candidates(task: Task) -> list[Rung]:
 
 
 def choose(
-    rungs: Sequence[Rung],
-    times: Callable[[Rung], FloatArray],
+    times: Mapping[Rung, FloatArray],
     line: Sequence[Surrogate],
     force: Surrogate,
     rows: FloatArray,
@@ -87,10 +86,8 @@ def choose(
 
     Parameters
     ----------
-    rungs
-        Those to choose from.
     times
-        Gives the times of impact of the dots of a rung, in parts of the limit, (members, dots).
+        Rungs to choose from, and the times of impact of their dots, in parts of the limit, (members, dots).
     line
         How the times of a line in an open loop depend on the constants.
     force
@@ -113,8 +110,7 @@ def choose(
         return float(np.log(np.einsum("pi,pi->p", wanted, solved)).mean())
 
     offered = {}
-    for rung in rungs:
-        shown = times(rung)
+    for rung, shown in times.items():
         if rung == Rung(1.0) or np.isfinite(shown).all(axis=1).mean() >= _SEEN:
             offered[rung] = information([Surrogate.of(rows, column) for column in shown.T])
     known = np.eye(rows.shape[1]) + information(line)

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.learning.lines import LINE
 from printhammer.control.learning.settings import ADVANCE, DELAY
 from printhammer.control.table.drive import COLUMNS
 from printhammer.control.table.drivers import of_force, with_pulse
@@ -35,17 +35,19 @@ from printhammer.control.table.tuning import tune
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.support.works import together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.learning.belief import Belief
     from printhammer.control.learning.ladder import Rung
+    from printhammer.control.learning.lines import Press, Printing
     from printhammer.control.learning.production import Production
     from printhammer.control.learning.settings import Adjustable
     from printhammer.control.learning.surrogate import Surrogate
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import BoolArray, FloatArray
 
 RUNS: Final = (1, 1, 2, 4, 8, 24)  # Number of runs of each stage
 GATE: Final = 3.0  # Deviation, in parts of the limits, beyond which one counts as this
@@ -103,8 +105,8 @@ class LearningLaw:
     rows: FloatArray  # Constants of simulated hammers, (members, size): where a search may begin
     seen: FloatArray  # Their readings, (members, readings)
 
-    def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Update:
-        """Return what is done after a stage.
+    def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
+        """Return what is done after a stage; asks for what the hammers believed in print.
 
         `unexplained` (2, dots) is by how much arrival and force of the dots of the line are off beyond what
         is believed, in parts of the limits.
@@ -116,9 +118,14 @@ class LearningLaw:
         probable = belief.draw(_ALIKE, self.seed)
         alike = [each for each in self.production.hammers(probable) if each is not None]
         keep = 1.0 - self.forgetting
-        slopes = self._slopes(unit.hammers[0], corrections)
-        gain = _gain(self._expected(unit, [corrections])[0], slopes)
-        others = [gain @ self._slopes(each, corrections) for each in alike[:_OTHERS]]
+        (off,), slopes, *others = yield from together(
+            [
+                self._expected(unit, [corrections]),
+                *(self._slopes(each, corrections) for each in (unit.hammers[0], *alike[:_OTHERS])),
+            ]
+        )
+        gain = _gain(off, slopes)
+        others = [gain @ other for other in others]
         own = keep * np.eye(len(corrections)) - gain @ slopes
 
         def largest(part: float) -> float:
@@ -129,12 +136,13 @@ class LearningLaw:
         while largest(part) > 1.0 and part > _LEAST:
             part *= 0.5
         contraction, unit = largest(part), unit._replace(more=part * unit.more)
-        left, found = self._followed(unit, keep * corrections)
+        left, found = yield from self._followed(unit, keep * corrections)
         if left > BAD and corrections.any():
             # The table that learning starts from may lead to where what was learned does not.
-            left, found = min((left, found), self._followed(unit, 0.0 * corrections), key=lambda end: end[0])
-        corrections = found
-        return Update(corrections, contraction, self._gains(alike, corrections), left)
+            other = yield from self._followed(unit, 0.0 * corrections)
+            left, found = min((left, found), other, key=lambda end: end[0])
+        gains = yield from self._gains(alike, found)
+        return Update(found, contraction, gains, left)
 
     def started_anew(self, belief: Belief) -> LearningLaw | None:
         """Return the same law, starting from a table that is tuned for the hammer believed in.
@@ -168,14 +176,17 @@ class LearningLaw:
             return replace(self, entries=self.entries.started_from(base))
         return None
 
-    def _followed(self, unit: _Unit, corrections: FloatArray) -> tuple[float, FloatArray]:
+    def _followed(self, unit: _Unit, corrections: FloatArray) -> Printing[tuple[float, FloatArray]]:
         """Return to which corrections the law leads, and what they leave."""
         best = np.inf, corrections
         for _ in range(_NEWTON):
-            (off,) = self._expected(unit, [corrections])
-            change = -_gain(off, self._slopes(unit.hammers[0], corrections)) @ off
+            (off,), slopes = yield from together(
+                [self._expected(unit, [corrections]), self._slopes(unit.hammers[0], corrections)]
+            )
+            change = -_gain(off, slopes) @ off
             tried = [self.entries.limited(corrections, size * change) for size in _SIZES]
-            left = [_badness(each) for each in self._expected(unit, tried)]
+            expected = yield from self._expected(unit, tried)
+            left = [_badness(each) for each in expected]
             k = int(np.argmin(left))
             before, corrections = best[0], tried[k]
             best = min(best, (left[k], corrections), key=lambda end: end[0])
@@ -192,40 +203,44 @@ class LearningLaw:
             np.add.at(sums_of, shown, values)
         return np.asarray((sums / np.maximum(np.bincount(shown), 1))[:, wanted]).ravel()
 
-    def _off(self, hammers: Sequence[Hammer], corrections: Sequence[FloatArray]) -> FloatArray:
+    def _off(self, hammers: Sequence[Hammer], corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
         """Return how far arrival and force of `TRIED` are off, in parts of the limits, (M, 2 dots)."""
         press, limits = self.production.press(hammers), self.entries.task.limits
-        judgement = press.line([self.entries.settings(row) for row in corrections], TRIED)[1]
+        known = {id(row): self.entries.settings(row) for row in corrections}
+        _dots, judgement = yield from press.order_line([known[id(row)] for row in corrections], TRIED)
         off = judgement.arrival_deviation / limits.arrival, judgement.force_deviation / limits.force
         return np.clip(np.nan_to_num(np.concatenate(off, axis=1), nan=GATE), -GATE, GATE)
 
-    def _expected(self, unit: _Unit, corrections: Sequence[FloatArray]) -> FloatArray:
+    def _expected(self, unit: _Unit, corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
         """Return how far dots are off in the mean over what is believed, (M, 2 dots)."""
         hammers = [hammer for _ in corrections for hammer in unit.hammers]
         rows = [row for row in corrections for _ in unit.hammers]
-        off = self._off(hammers, rows).reshape(len(corrections), len(unit.hammers), -1)
-        return np.asarray(np.einsum("m,kmd->kd", unit.weights, off) + unit.more)
+        off = yield from self._off(hammers, rows)
+        by_hammer = off.reshape(len(corrections), len(unit.hammers), -1)
+        return np.asarray(np.einsum("m,kmd->kd", unit.weights, by_hammer) + unit.more)
 
-    def _slopes(self, hammer: Hammer, corrections: FloatArray) -> FloatArray:
+    def _slopes(self, hammer: Hammer, corrections: FloatArray) -> Printing[FloatArray]:
         """Return how far dots move with each input, (2 dots, inputs)."""
         rows = [corrections, *(corrections + np.eye(len(corrections)))]
-        off = self._off([hammer] * len(rows), rows)
+        off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
 
-    def _gains(self, alike: Sequence[Hammer], corrections: FloatArray) -> bool:
+    def _gains(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[bool]:
         """Return whether probable hammers print more dots with the table, and none, but for doubt, fewer."""
         press = self.production.press(alike)
-        plain, table = (
-            good(press, [settings] * len(alike)).mean(axis=1)
-            for settings in (self.entries.open_loop, self.entries.settings(corrections))
+        plain, table = yield from together(
+            [
+                order_good(press, [settings] * len(alike))
+                for settings in (self.entries.open_loop, self.entries.settings(corrections))
+            ]
         )
-        edge = table - plain
+        edge = table.mean(axis=1) - plain.mean(axis=1)
         return bool(np.quantile(edge, self.doubt) >= 0.0 and edge.mean() >= _GAIN)
 
 
-def good(press: Press, settings: Sequence[FloatArray]) -> FloatArray:
+def order_good(press: Press, settings: Sequence[FloatArray]) -> Printing[BoolArray]:
     """Return which dots of the cycle are within limits, (M, dots), those of the lead-in left out."""
-    judgement = press.line(settings, PRINTED)[1]
+    _dots, judgement = yield from press.order_line(settings, PRINTED)
     return np.asarray(judgement.good[:, np.asarray(PRINTED) >= LEAD_IN])
 
 

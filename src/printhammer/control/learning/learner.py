@@ -9,11 +9,13 @@ import numpy as np
 from printhammer.control.learning.belief import Belief, Evidence, believe
 from printhammer.control.learning.law import BAD, RUNS
 from printhammer.control.learning.lines import LINE
+from printhammer.support.works import translated
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.learning.law import LearningLaw
+    from printhammer.control.learning.lines import Printing
     from printhammer.control.learning.sensor import Readings
     from printhammer.support.arrays import FloatArray
 
@@ -80,12 +82,8 @@ class Learner:
 
     def see(self, ladder: Readings, line: Readings) -> None:
         """Take in the readings of a run: of the dots of the ladder, and of the line."""
-        if self.finished:
-            return
         self._ladders.append(self._scaled(ladder))
         self._line.append(self._scaled(line))
-        if len(self._line) == RUNS[self.stage]:
-            self._learn()
 
     def _scaled(self, readings: Readings) -> FloatArray:
         """Return readings in parts of the limits, (measured, dots)."""
@@ -96,7 +94,8 @@ class Learner:
             [each / limit for each, limit in zip(shown, (limits.arrival, limits.force), strict=False)]
         )
 
-    def _learn(self) -> None:
+    def learn(self) -> Printing[None]:
+        """Make of what was seen what follows for the next stage; asks for what hammers believed in print."""
         law = self.law
         noise = law.production.noise[:, None]
         line = mean(self._line, noise)
@@ -104,19 +103,20 @@ class Learner:
             self._first = line
         lines = [self._first] if not self.stage else [self._first, line]
         settings = [law.entries.open_loop, self.settings][: len(lines)]
-        self.belief = self._believe([mean(self._ladders, noise), *lines], settings)
+        self.belief = yield from self._believe([mean(self._ladders, noise), *lines], settings)
         unexplained = np.zeros((2, len(LINE)))
         if self.stage:
             shown = self.belief.modes[0].predicted.reshape(law.production.measured, -1)[:, -len(LINE) :]
             unexplained[: len(shown)] = _unexplained(
                 line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
             )
-        update = law.update(self.belief, self.corrections, unexplained)
+        update = yield from law.update(self.belief, self.corrections, unexplained)
         if update.left > BAD and self._started < _STARTED:
             self._started += 1
             other = law.started_anew(self.belief)
             if other is not None:
-                again = other.update(self.belief, np.zeros(other.entries.inputs.shape[1]), unexplained)
+                fresh = np.zeros(other.entries.inputs.shape[1])
+                again = yield from other.update(self.belief, fresh, unexplained)
                 if again.left < update.left:
                     self.law, update = other, again
         self.corrections, self._gains = update.corrections, update.gains
@@ -124,7 +124,7 @@ class Learner:
         self._line = []
         self.stage += 1
 
-    def _believe(self, means: Sequence[Mean], settings: Sequence[FloatArray]) -> Belief:
+    def _believe(self, means: Sequence[Mean], settings: Sequence[FloatArray]) -> Printing[Belief]:
         law = self.law
         measured = law.production.measured
         value = np.concatenate([each.value for each in means], axis=1)
@@ -135,8 +135,9 @@ class Learner:
         rough = np.concatenate([rough, rough[:, -len(LINE) :]], axis=1)[:, : value.shape[1]]
         evidence = Evidence(value.ravel(), noise.ravel(), rough.ravel())
 
-        def predict(rows: FloatArray) -> FloatArray:
-            return law.production.readings(rows, law.rungs, settings)
+        def predict(asked: list[FloatArray]) -> Printing[list[FloatArray]]:
+            shown = yield from law.production.readings(np.concatenate(asked), law.rungs, settings)
+            return np.split(shown, np.cumsum([len(rows) for rows in asked])[:-1])
 
         # The simulated hammers that look most like the unit, where only what is smooth counts.
         known = law.seen.shape[1] // measured
@@ -145,7 +146,8 @@ class Learner:
         apart = (off / np.hypot(noise, rough)[shown]) ** 2
         places = np.argsort(np.nan_to_num(apart, nan=1.0).sum(axis=(1, 2)), kind="stable")[:_STARTS]
         before = [] if self.belief is None else [mode.mean for mode in self.belief.modes]
-        return believe(predict, evidence, list(law.rows[places]), before)
+        search = believe(evidence, list(law.rows[places]), before)
+        return (yield from translated(search, predict))
 
 
 def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:

@@ -8,6 +8,7 @@ import numpy as np
 
 from printhammer.control.learning.ladder import Rung, candidates, choose
 from printhammer.control.learning.law import LearningLaw
+from printhammer.control.learning.lines import printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.learning.settings import Adjustable
@@ -20,6 +21,7 @@ from printhammer.errors import InputError
 from printhammer.printing.dots.limits import Limits
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.support.works import together
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,10 +103,11 @@ def _law(
     limits = np.array([task.limits.arrival, task.limits.force])[:, None, None]
     line = press.line([entries.open_loop] * members)[0]
     lines = np.stack([line.flight_time, line.peak_force / task.single.nominal.force]) / limits
+    offered = candidates(task)
+    ladders = printed(together([press.order_ladder([rung]) for rung in offered]), task)
     rungs = tuple(
         choose(
-            candidates(task),
-            lambda rung: press.ladder([rung])[0] / task.limits.arrival,
+            {rung: times / task.limits.arrival for rung, (times, _) in zip(offered, ladders, strict=True)},
             [Surrogate.of(own, each) for each in lines[0].T],
             Surrogate.of(own, press.ladder([Rung(1.0)])[1][:, 0]),
             own,

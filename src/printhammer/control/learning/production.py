@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.learning.lines import LINE, Press
+from printhammer.support.works import together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.control.learning.ladder import Rung
+    from printhammer.control.learning.lines import Printing
     from printhammer.control.learning.sensor import ImpactSensor
     from printhammer.control.table.task import Task
     from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.dots.judging import Judgement
     from printhammer.printing.rates.variability import Variability
+    from printhammer.run.ensemble import DotTable
     from printhammer.support.arrays import FloatArray
 
 SCALE: Final = 0.01
@@ -73,7 +77,9 @@ class Production:
         """Return hammers that print."""
         return Press(self.task, self.rate, hammers)
 
-    def readings(self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]) -> FloatArray:
+    def readings(
+        self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]
+    ) -> Printing[FloatArray]:
         """Return what is shown of hammers (M, size): of the ladder, and of lines printed with settings.
 
         The result, shape (M, measured * dots), is in parts of the limits; NaN where a dot is lost.
@@ -84,11 +90,11 @@ class Production:
         count = sum(rung.dots for rung in rungs) + len(LINE) * len(lines)
         shown = np.full((len(rows), 2, count), np.nan)
         if there:
-            parts = [press.ladder(rungs)] if rungs else []
-            for settings in lines:
-                dots = press.line([settings] * len(there))[0]
-                parts.append((dots.flight_time, dots.peak_force / self.task.single.nominal.force))
-            shown[there] = np.concatenate([np.stack(part, axis=1) for part in parts], axis=2)
+            single = self.task.single.nominal
+            parts = [press.order_ladder(rungs)] if rungs else []
+            parts += [_told(press.order_line([settings] * len(there)), single.force) for settings in lines]
+            told = yield from together(parts)
+            shown[there] = np.concatenate([np.stack(part, axis=1) for part in told], axis=2)
         limits = self.task.limits
         shown /= np.array([limits.arrival, limits.force])[:, None]
         own = rows[:, self.constants :]
@@ -96,3 +102,11 @@ class Production:
         if self.sensor.offset:
             shown[:, 0] += self.sensor.offset / limits.arrival * own[:, -1:]
         return np.asarray(shown[:, : self.measured].reshape(len(rows), -1))
+
+
+def _told(
+    line: Printing[tuple[DotTable, Judgement]], force: float
+) -> Printing[tuple[FloatArray, FloatArray]]:
+    """Return flight times, s, and forces, in parts of one, of a line."""
+    dots, _judgement = yield from line
+    return dots.flight_time, dots.peak_force / force
