@@ -54,7 +54,7 @@ def test_a_table_cell_moves_as_its_polynomial_says() -> None:
     y, v = np.zeros(ORDER + 1), np.zeros(ORDER + 1)
     y[0] = x0
     drive = np.zeros(ORDER + 1)
-    motion_series()(0.1, 0.0, drive, True, mass, 2, cell, np.zeros(2), 0.0, NO_CONTACT, y, v)
+    motion_series()(0.1, 0.0, drive, True, mass, 2, cell, np.zeros(4), 0.0, NO_CONTACT, y, v)
     omega = (stiffness / mass) ** 0.5
     for s in (0.5, 1.0, 3.0):
         assert horner(y, s) == pytest.approx(x0 * np.cos(omega * 0.1 * s), rel=1e-14)

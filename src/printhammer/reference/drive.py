@@ -16,6 +16,8 @@ import numpy as np
 
 from printhammer.reference.series import ORDER, Array
 
+_DEGREES = np.arange(ORDER + 1)
+
 TAIL = 27.6310211159
 """Decay constants after which a tail is defined as zero (1e-12 of its start is left)."""
 
@@ -40,21 +42,30 @@ class Piece:
         """Coefficients in (time - now)/h at ``s`` after the start."""
         out = np.zeros(ORDER + 1)
         if self.poly:
-            shifted = np.polynomial.Polynomial(self.poly)(np.polynomial.Polynomial([s, h])).coef
-            out[: shifted.size] = shifted
+            out[: len(self.poly)] = self._shifted(s, h)
         if self.exp_size:
-            term = self.exp_size * math.exp(-self.exp_rate * s)
-            for k in range(ORDER + 1):
-                out[k] += term
-                term *= -self.exp_rate * h / (k + 1)
+            out += self.exp_size * math.exp(-self.exp_rate * s) * _exponential(-self.exp_rate * h)
         if self.sin_size:
             angle = self.sin_rate * s + self.sin_phase
-            cycle = (math.sin(angle), math.cos(angle), -math.sin(angle), -math.cos(angle))
-            term = self.sin_size
-            for k in range(ORDER + 1):
-                out[k] += term * cycle[k % 4]
-                term *= self.sin_rate * h / (k + 1)
+            cycle = np.array([math.sin(angle), math.cos(angle), -math.sin(angle), -math.cos(angle)])
+            out += self.sin_size * _exponential(self.sin_rate * h) * cycle[_DEGREES % 4]
         return out
+
+    def _shifted(self, s: float, h: float) -> list[float]:
+        """Return the coefficients of poly(s + h x) in x, by Horner's rule."""
+        shifted = [0.0] * len(self.poly)
+        for coefficient in reversed(self.poly):
+            for k in range(len(shifted) - 1, 0, -1):
+                shifted[k] = shifted[k] * s + shifted[k - 1] * h
+            shifted[0] = shifted[0] * s + coefficient
+        return shifted
+
+
+def _exponential(rate: float) -> Array:
+    """Return the coefficients of exp(rate x)."""
+    factors = np.ones(ORDER + 1)
+    factors[1:] = rate / _DEGREES[1:]
+    return np.asarray(np.cumprod(factors))
 
 
 def waveform_pieces(waveform: Any) -> list[Piece]:

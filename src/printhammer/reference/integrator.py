@@ -159,8 +159,8 @@ class _Run:
             if not (np.isfinite(y).all() and np.isfinite(v).all()):
                 h *= 1e-3
                 continue
-            length = max(self.length_scale, _first_size(y[1:]))
-            speed = max(self.speed_scale, _first_size(v))
+            length = max(self.length_scale, abs(_first(y[1:])))
+            speed = max(self.speed_scale, abs(_first(v)))
             reach = min(self._reach(y, length), self._reach(v, speed))
             if reach > 1e-5 or h * reach >= limit:
                 break
@@ -235,7 +235,7 @@ class _Run:
         self._record(h, s, y, v)
         at_limit = kind == "" and h * theta >= limit
         self.t = self._clock(t_end, limit) if at_limit else self.t + h * s
-        self.y, self.v = horner(y, s), horner(v, s)
+        self.y, self.v = float(horner(y, float(s))), float(horner(v, float(s)))
         self.guess = max(h * s, 1e-3 * h * theta)
         self.length_scale = max(self.length_scale, abs(self.y - y[0]))
         self.speed_scale = max(self.speed_scale, abs(self.v))
@@ -354,7 +354,7 @@ class _Run:
         """Go on from v = 0 inside the pack: in again, out as from a new local maximum, or stay in balance."""
         self.v = 0.0
         self.mode = "load"
-        if _first_sign(self._expand(self._contact(), self.guess)[1]) > 0:
+        if _first(self._expand(self._contact(), self.guess)[1]) > 0.0:
             return
         if self.y <= 0.0:
             # A touch without velocity, pulled back at once.
@@ -362,7 +362,7 @@ class _Run:
             return
         self.mode, self.peak = "curve", self.y
         self._log("pack-peak")
-        if _first_sign(self._expand(self._contact(), self.guess)[1]) > 0:
+        if _first(self._expand(self._contact(), self.guess)[1]) > 0.0:
             self.mode = "rest"
 
     def _touch_stop(self) -> None:
@@ -381,14 +381,9 @@ class _Run:
             self._log("backstop-rebound")
 
 
-def _first_size(c: Array) -> float:
-    nonzero = np.flatnonzero(c)
-    return float(abs(c[nonzero[0]])) if nonzero.size else 0.0
-
-
-def _first_sign(c: Array) -> int:
-    nonzero = np.flatnonzero(c)
-    return 0 if nonzero.size == 0 else int(np.sign(c[nonzero[0]]))
+def _first(c: Array) -> float:
+    """Return the first coefficient that is not zero, or zero."""
+    return next((float(value) for value in c if value != 0.0), 0.0)
 
 
 def reference(

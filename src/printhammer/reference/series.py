@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import functools
 import math
-from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -46,8 +45,8 @@ class Step:
     y: Array
     v: Array
 
-    def at(self, time: float) -> tuple[float, float]:
-        """Return displacement, m, and velocity, m/s."""
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return displacements, m, and velocities, m/s."""
         s = (time - self.t) / self.h
         return self.ref + horner(self.y, s), horner(self.v, s)
 
@@ -86,14 +85,12 @@ class ReferenceRun:
     def at(self, times: ArrayLike) -> tuple[Array, Array]:
         """Displacement, m, and velocity, m/s, at any times of the run; NaN after its end."""
         wanted = np.atleast_1d(np.asarray(times, dtype=float))
-        starts = [step.t for step in self.steps]
         x, v = np.full(wanted.size, math.nan), np.full(wanted.size, math.nan)
-        end = self.end
-        for i, time in enumerate(wanted):
-            place = bisect_right(starts, time) - 1
-            if place < 0 or time > end:
-                continue
-            x[i], v[i] = self.steps[place].at(float(time))
+        places = np.searchsorted([step.t for step in self.steps], wanted, side="right") - 1
+        inside = np.flatnonzero((places >= 0) & (wanted <= self.end))
+        for place in np.unique(places[inside]).tolist():
+            own = inside[places[inside] == place]
+            x[own], v[own] = self.steps[place].at(wanted[own])
         return x, v
 
 
@@ -203,45 +200,94 @@ def _motion_series(
         y[k + 1] = h * v[k] / (k + 1)
 
 
-@functools.lru_cache(maxsize=1)
-def motion_series() -> Callable[..., None]:
-    """Compile `_motion_series` (cached on disk by numba)."""
+def _first_fall(c: Array, theta: float) -> float:
+    """Return what `first_fall` does, NaN for None."""
+
+    def root(c: Array) -> float:
+        """Return the root in [0, 1] of a falling polynomial, by Newton's rule inside a bracket."""
+        low, high, s = 0.0, 1.0, c[0] / (c[0] - c.sum())
+        for _ in range(100):
+            value, slope = 0.0, 0.0
+            for coefficient in c[::-1]:
+                slope = slope * s + value
+                value = value * s + coefficient
+            if value >= 0.0:
+                low = s
+            else:
+                high = s
+            trial = s - value / slope if slope != 0.0 else 0.5 * (low + high)
+            if not low <= trial <= high:
+                trial = 0.5 * (low + high)
+            if abs(trial - s) <= 1e-17 + 1e-16 * s:
+                return float(trial)
+            s = trial
+        return float(s)
+
+    first, last = 0, c.size
+    while first < last and c[first] == 0.0:
+        first += 1
+    while last > first and c[last - 1] == 0.0:
+        last -= 1
+    size = last - first
+    if size == 0:
+        return math.nan
+    if c[first] < 0.0:
+        return 0.0
+    # Each halving leaves one more half to look at later.
+    waiting, starts, lengths = np.empty((64, size)), np.zeros(64), np.ones(64)
+    for k in range(size):
+        waiting[0, k] = c[first + k] * theta**k
+    count = 1
+    while count > 0:
+        count -= 1
+        start, length, own = starts[count], lengths[count], waiting[count].copy()
+        if own[0] < 0.0:
+            return float(theta * start)
+        sizes, slopes, first_slope = 0.0, 0.0, 0.0
+        for k in range(1, size):
+            sizes += abs(own[k])
+            if k == 1:
+                first_slope = abs(own[k])
+            else:
+                slopes += k * abs(own[k])
+        if own[0] >= sizes:
+            continue
+        if first_slope >= slopes or length < 1e-13:
+            if own.sum() < 0.0:
+                return float(theta * (start + length * root(own)))
+            continue
+        half = 1.0
+        for k in range(size):
+            own[k] *= half
+            half *= 0.5
+        waiting[count + 1] = own
+        # The right half, by Taylor's shift.
+        for j in range(size - 1):
+            for k in range(size - 2, j - 1, -1):
+                own[k] += own[k + 1]
+        waiting[count] = own
+        starts[count], starts[count + 1] = start + 0.5 * length, start
+        lengths[count] = lengths[count + 1] = 0.5 * length
+        count += 2
+    return math.nan
+
+
+@functools.cache
+def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function (cached on disk by numba)."""
     import numba
 
     try:
-        compiled: Any = numba.njit(cache=True)(_motion_series)
+        compiled: Any = numba.njit(cache=True)(function)
     except RuntimeError:
         # No folder for machine code can be written to.
-        compiled = numba.njit(_motion_series)
+        compiled = numba.njit(function)
     return compiled  # type: ignore[no-any-return]
 
 
-@functools.lru_cache(maxsize=ORDER + 2)
-def _shift_matrix(size: int) -> Array:
-    """Return the matrix that takes a polynomial on [0, 1] to its right half, again on [0, 1]."""
-    return np.array([[math.comb(k, j) * 0.5**k for k in range(size)] for j in range(size)])
-
-
-def _root_of_monotone(c: Array) -> float:
-    """Return the root in [0, 1] of a falling polynomial, by Newton's rule inside a bracket."""
-    low, high, s = 0.0, 1.0, float(c[0] / (c[0] - c.sum()))
-    coefficients = [float(value) for value in c[::-1]]
-    for _ in range(100):
-        value, slope = 0.0, 0.0
-        for coefficient in coefficients:
-            slope = slope * s + value
-            value = value * s + coefficient
-        if value >= 0.0:
-            low = s
-        else:
-            high = s
-        trial = s - value / slope if slope != 0.0 else 0.5 * (low + high)
-        if not low <= trial <= high:
-            trial = 0.5 * (low + high)
-        if abs(trial - s) <= 1e-17 + 1e-16 * s:
-            return trial
-        s = trial
-    return s
+def motion_series() -> Callable[..., None]:
+    """Return `_motion_series`, compiled."""
+    return _compiled(_motion_series)
 
 
 def first_fall(c: Array, theta: float) -> float | None:
@@ -252,37 +298,20 @@ def first_fall(c: Array, theta: float) -> float | None:
     polynomial has no root or is monotone there, by sums of absolute coefficients, hence no pair of crossings
     inside a step is missed. A touch without a crossing is not a fall.
     """
-    nonzero = np.flatnonzero(c)
-    if nonzero.size == 0:
-        return None
-    c = c[nonzero[0] : nonzero[-1] + 1]
-    if c[0] < 0.0:
-        return 0.0
-    c = c * theta ** np.arange(c.size)
-    degree = np.arange(c.size)
-    pieces = [(0.0, 1.0, c)]
-    while pieces:
-        start, length, c = pieces.pop()
-        if c[0] < 0.0:
-            return theta * start
-        if c[0] >= np.abs(c[1:]).sum():
-            continue
-        slopes = np.abs(degree * c)
-        if slopes[1] >= slopes[2:].sum() or length < 1e-13:
-            if c.sum() < 0.0:
-                return theta * (start + length * _root_of_monotone(c))
-            continue
-        pieces.append((start + 0.5 * length, 0.5 * length, _shift_matrix(c.size) @ c))
-        pieces.append((start, 0.5 * length, c * 0.5**degree))
-    return None
+    s: float = _compiled(_first_fall)(c, float(theta))
+    return None if math.isnan(s) else s
 
 
-def horner(c: Array, s: float) -> float:
-    """Return the value of the polynomial sum c_k s**k."""
-    total, s = 0.0, float(s)
-    for coefficient in c[::-1].tolist():
+def _horner(c: Array, s: Any) -> Any:
+    total = 0.0 * s
+    for coefficient in c[::-1]:
         total = total * s + coefficient
     return total
+
+
+def horner(c: Array, s: Any) -> Any:
+    """Return the value of the polynomial sum c_k s**k at a number, or at each of an array."""
+    return _compiled(_horner)(c, s)
 
 
 def offset(c: Array, value: float) -> Array:
