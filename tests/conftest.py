@@ -28,11 +28,15 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 # Long files, and those that compile laws of their own, begin first: the workers then end together. Two that
 # compile the same laws stand far apart, so that the second one finds the machine code.
 FIRST = [
+    "test_units",
     "test_examples",
     "test_docs",
     "test_constant_flow_differences",
     "test_orbits_closed_forms",
     "test_impact_print_hammer",
+    "test_page_commands",
+    "test_fit_motion",
+    "test_fits",
     "test_ensemble",
     "test_sweep",
     "test_burst",
