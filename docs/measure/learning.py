@@ -77,6 +77,7 @@ ROOMS = (
     "control/widths",
     "printing/dots",
     "printing/rates",
+    "support/works",
 )
 CYCLE = slots_of(cycle_with_lead_in())
 

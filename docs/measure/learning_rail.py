@@ -44,6 +44,7 @@ ROOMS = (
     "control/widths",
     "printing/dots",
     "printing/rates",
+    "support/works",
 )
 
 

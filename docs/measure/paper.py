@@ -40,7 +40,7 @@ PAPERS = {
 ROOMS = (
     *MOTION,
     *("control/feedback", "control/learning", "control/coil_current", "control/table", "control/widths"),
-    *("printing/dots", "printing/rates"),
+    *("printing/dots", "printing/rates", "support/works"),
 )
 SPEED = 1.0
 """Speed of a touch, m/s, by which the front shifts times of impact."""

@@ -171,11 +171,11 @@ def _build(
             table = document[section]
             if not isinstance(table, Mapping):
                 raise InputError(f"{section} = {shown(table)}: expected a table [{section}]")
-            same = table is before.get(section)
-            if known is not None and same:
+            keys = [f"{section}.{name}" for name in table if name != selector]
+            # An option may name a file, which is read again: it may have changed.
+            if known is not None and table is before.get(section) and known.constants.keys() >= set(keys):
                 made[section] = known.parts.get(section, known.waveform)
-                keys = (f"{section}.{name}" for name in table)
-                constants |= {key: known.constants[key] for key in keys if key in known.constants}
+                constants |= {key: known.constants[key] for key in keys}
                 continue
             kind = _kind(table, section, selector)
             rest = {key: value for key, value in table.items() if key != selector}

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     import numpy.typing as npt
 
+    from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.compile.specialise import Kernel
     from printhammer.run.fired import Fired
@@ -160,7 +161,7 @@ def _posed(
         if circuit:
             full = packed.copy()
             take_supply(full, hammer, drive)
-        scales_of_own, which = _scales(hammer, static, own, fired, states)
+        scales_of_own, which = _scales(hammer, static, own, fired, drive, states)
         by[places] = len(bounds) + which
         for scales in scales_of_own:
             constants.append(full)
@@ -173,7 +174,12 @@ def _posed(
 
 
 def _scales(
-    hammer: Hammer, static: StaticForce | None, own: IntArray, fired: Fired, states: FloatArray
+    hammer: Hammer,
+    static: StaticForce | None,
+    own: IntArray,
+    fired: Fired,
+    first_drive: Drive,
+    states: FloatArray,
 ) -> tuple[list[tuple[float, float]], IntArray]:
     """Return what scales there are among members with the same hammer, and which ones a member has."""
     x, v = states[own, 1], states[own, 2]
@@ -183,7 +189,7 @@ def _scales(
         _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         posed = [((float(x[k]), float(v[k])), fired.drives[own[k]]) for k in first.tolist()]
         return [scales_of(hammer, drive, state, static) for state, drive in posed], which
-    way, typical = scales_of(hammer, fired.drives[own[0]], (float(x[0]), 0.0), static)
+    way, typical = scales_of(hammer, first_drive, (float(x[0]), 0.0), static)
     if len(own) == 1:
         return [(way, max(typical, abs(float(v[0]))))], np.zeros(1, np.int64)
     # Only what is faster than the typical speed has scales of its own.
