@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,38 +18,40 @@ class _Gauge:
         self.begun = 0.0
         self.depth = 0
         self.tell: Callable[[str], None] = lambda _sentence: None
-        self.what = ""
+        self.what = "compiling machine code (once; kept on disk)"
 
 
 _gauge = _Gauge()
 
 
 def seconds() -> float:
-    """Return the time that was spent on compiling so far in this process, s."""
+    """Return the time that was spent on compiling in this process since the first `measure`, s."""
     return _gauge.spent + (time.monotonic() - _gauge.begun if _gauge.depth else 0.0)
+
+
+@cache
+def measure() -> None:
+    """Measure from now on how long compiling takes in this process."""
+    from numba.core import event
+
+    class Listener(event.Listener):
+        def on_start(self, _event: Any) -> None:
+            _begin()
+
+        def on_end(self, _event: Any) -> None:
+            _end()
+
+    event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
 
 
 def listen(tell: Callable[[str], None]) -> None:
     """Have `tell` called with a sentence where compiling begins, and with nothing where it ends."""
-    from numba.core import event
-
     from printhammer.run.simulate import announce_compiling
 
-    first = _gauge.what == ""
     _gauge.tell = tell
-    _gauge.what = "compiling machine code (once; kept on disk)"
     # Workers compile side by side already.
     announce_compiling(_announced, helped=False)
-    if first:
-
-        class Listener(event.Listener):
-            def on_start(self, _event: Any) -> None:
-                _begin()
-
-            def on_end(self, _event: Any) -> None:
-                _end()
-
-        event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
+    measure()
 
 
 def _announced(sentence: str) -> None:

@@ -48,6 +48,7 @@ class Patience:
         self._newer = newer
         self._what = what
         self._seconds = seconds
+        compiling.measure()
         self._begun = time.monotonic() - compiling.seconds()
 
     @property
