@@ -3,6 +3,7 @@
 Helpers only; the tests that use them say what must hold.
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from printhammer.derivatives.parameters import parameters
 from printhammer.run.problem import Problem
 
 Drive = ph.PulseTrain | ph.SineForce
+WANTED = 1e-6
+"""Largest difference between derivatives and differences of runs, relative."""
 MINUTE = 1e-14
 """Tolerance of runs of which quantities are differenced."""
 
@@ -44,19 +47,34 @@ def moved(hammer: ph.Hammer, drive: Any, name: str, value: float) -> tuple[ph.Ha
     return hammer.replace(name, value), drive
 
 
-def flow_deviation(
+def far_off(
+    hammer: ph.Hammer, drive: Any, names: Iterable[str], end: float, state: tuple[float, float]
+) -> list[str]:
+    """Constants whose flow no differences of runs, with steps of several sizes, come within `WANTED` of."""
+    found = constant_map(hammer, drive, 0.0, end, list(names), state=state, tolerance=SHARP)
+    assert found.ok
+    assert found.smooth
+    return [
+        name
+        for name, column in zip(found.constants, found.matrix.T, strict=True)
+        if not any(
+            _deviation(hammer, drive, name, column, end, state, *how) < WANTED
+            for how in ((1e-5, 2), (1e-4, 3), (1e-6, 3))
+        )
+    ]
+
+
+def _deviation(
     hammer: ph.Hammer,
     drive: Any,
     name: str,
+    flow: np.ndarray,
     end: float,
     state: tuple[float, float],
-    size: float = 1e-4,
-    levels: int = 4,
+    size: float,
+    levels: int,
 ) -> float:
     """Difference between the flow of a constant and differences of runs, over the norm of the latter."""
-    found = constant_map(hammer, drive, 0.0, end, [name], state=state, tolerance=SHARP)
-    assert found.ok
-    assert found.smooth
     (parameter,) = parameters(hammer, drive, [name])
     scales = Problem(hammer, drive, state, 0.0, SHARP).scales
     units = np.array([scales[0], scales[1], scales[0]])
@@ -68,9 +86,9 @@ def flow_deviation(
             ends.append(arrive(Problem(*other, state, 0.0, SHARP), (*state, 0.0), -1, 0.0, end))
         return (ends[0] - ends[1]) / (2.0 * step)
 
-    rows = len(found.matrix)
+    rows = len(flow)
     truth = richardson(difference, size, levels, units)[:rows] / units[:rows]
-    mine = found.matrix[:, 0] * parameter.scale / units[:rows]
+    mine = flow * parameter.scale / units[:rows]
     return float(np.linalg.norm(mine - truth)) / max(float(np.linalg.norm(truth)), 1e-3)
 
 
@@ -91,10 +109,11 @@ def quantity_differences(
     state: Any = None,
     size: float = 4e-5,
     levels: int = 3,
+    typical: np.ndarray | None = None,
 ) -> np.ndarray:
     """Changes of all quantities with ``value / scale`` of a constant, extrapolated after Richardson."""
     (parameter,) = parameters(hammer, drive, [name])
-    typical = np.abs(quantities(hammer, drive, duration, state))
+    typical = np.abs(quantities(hammer, drive, duration, state) if typical is None else typical)
     units = np.where(np.isfinite(typical) & (typical > 0.0), typical, 1.0)
 
     def difference(step: float) -> np.ndarray:

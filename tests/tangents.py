@@ -104,10 +104,11 @@ def deviation(
     start: float,
     end: float,
     state: tuple[float, float] | None = None,
+    found: TangentMap | None = None,
     **how: Any,
 ) -> float:
     """Difference between tangent map and finite differences over the norm of the latter, all scaled."""
-    found = tangent_map(hammer, drive, start, end, state=state, tolerance=SHARP)
+    found = found or tangent_map(hammer, drive, start, end, state=state, tolerance=SHARP)
     assert found.ok
     assert found.smooth
     truth = differences(hammer, drive, found, **how)
