@@ -1,7 +1,7 @@
 """The current of one slot whose dot costs least work, and the current that lands the armature softly.
 
-The currents at the nodes are sought by sequential quadratic programming. It starts from the best of a few
-hundred simple profiles (brake, wait, throw), or from what did for the slot before.
+The currents at the nodes are sought by sequential quadratic programming. It starts from the best profiles of
+a few levels (brake, wait, throw), or from what did for the slot before.
 """
 
 from __future__ import annotations
@@ -11,8 +11,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.least_work.descent import best_of, descend, deviations, met, sobol
-from printhammer.control.least_work.slot import RELOADING, Outcomes, SlotState, Task, node_times
+from printhammer.control.least_work.descent import best_of, descend, deviations, met
+from printhammer.control.least_work.profiles import (
+    LANDING_SHARES,
+    PRINTING_SHARES,
+    landing_profile,
+    printing_profile,
+    refined,
+)
+from printhammer.control.least_work.slot import RELOADING, Outcomes, SlotState, Task
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.hammer.equilibrium import rest_state
@@ -29,8 +36,9 @@ _FEWEST, _MOST = 8, 96  # Least and largest number of nodes of a slot
 _OVERLAP: Final = 0.01
 _LAGS: Final = 1e-3  # Lag in the pack up to which a current does, in `RELOADING`
 _WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in parts of the loading work
-_PROFILES: Final = 512  # Number of profiles
+_WEAK: Final = 3.0  # Weight of a lack of force where profiles are compared
 _TRIES, _MOST_TRIES = 3, 12  # Number of profiles from which a search begins, and while none is found
+_LEGS: Final = 2  # Number of searches of which each begins where the one before has ended, until one does
 _ROUNDS, _ROUNDS_AGAIN = 30, 20  # Steps of a search from a profile, and from what did for the slot before
 _SEARCH_TOLERANCE: Final = 5e-7  # Tolerance with which profiles are compared
 _INSIDE: Final = 1.0 - 1e-9  # A hair inside a bound, which rounding would exceed
@@ -116,18 +124,31 @@ def printing_current(
         return bool(once and outcomes.reloading[0] < _LAGS * RELOADING and met(missed[0], above[0]))
 
     def attempt(start: FloatArray, rounds: int = _ROUNDS) -> tuple[float, FloatArray] | None:
-        cost, currents = _descend(task, measured, begin.current, start, duration, rounds, printing=True)
-        return (cost, currents) if meets(currents) else None
+        currents = start
+        for _leg in range(_LEGS):
+            cost, currents = _descend(
+                task, measured, begin.current, currents, duration, rounds, printing=True
+            )
+            if meets(currents):
+                return cost, currents
+        return None
+
+    def badness(tried: FloatArray) -> FloatArray:
+        outcomes = task.run(begin, tried, duration, _SEARCH_TOLERANCE)
+        missed, above = asked(outcomes)
+        odd = _WRONG * ((outcomes.extra_contacts > 0).astype(float) + ~outcomes.ok)
+        weak = np.where(above < 0.0, _WEAK * np.abs(above), above)
+        return np.asarray(task.cost(outcomes, duration) + np.abs(missed) + weak + odd)
+
+    def profile(shares: FloatArray) -> FloatArray:
+        wanted = printing_profile(shares, task.largest, duration, arrival, nodes)
+        return _limited(task, wanted, begin.current, duration / nodes, to_zero=False)
 
     again = None if before is None else attempt(before, _ROUNDS_AGAIN)
     if again is not None:
         return again[1]
-    tried = _profiles(task, begin.current, duration, arrival, nodes)
-    outcomes = task.run(begin, tried, duration, _SEARCH_TOLERANCE)
-    missed, above = asked(outcomes)
-    odd = _WRONG * ((outcomes.extra_contacts > 0).astype(float) + ~outcomes.ok)
-    badness = task.cost(outcomes, duration) + np.abs(missed) + np.abs(above) + odd
-    return best_of(badness, lambda row: attempt(tried[row]), _TRIES, _MOST_TRIES)
+    tried, bad = refined(profile, badness, PRINTING_SHARES)
+    return best_of(bad, lambda row: attempt(tried[row]), _TRIES, _MOST_TRIES)
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
@@ -141,12 +162,16 @@ def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -
     def measured(currents: FloatArray) -> FloatArray:
         return rated(currents, task.tolerance)[np.newaxis]
 
-    tried = _landings(task, begin.current, duration, nodes)
+    def profile(shares: FloatArray) -> FloatArray:
+        wanted = landing_profile(shares, task.largest, duration, nodes)
+        return _limited(task, wanted, begin.current, duration / nodes, to_zero=True)
+
+    tried, bad = refined(profile, lambda rows: rated(rows, _SEARCH_TOLERANCE), LANDING_SHARES)
 
     def attempt(row: int) -> tuple[float, FloatArray]:
         return _descend(task, measured, begin.current, tried[row], duration, _ROUNDS, printing=False)
 
-    best = best_of(rated(tried, _SEARCH_TOLERANCE), attempt, _TRIES)
+    best = best_of(bad, attempt, _TRIES)
     assert best is not None
     return np.append(best, 0.0)
 
@@ -193,36 +218,6 @@ def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero:
         current = float(np.clip(current, -min(task.largest, room), min(task.largest, room)))
         result[node] = current
     return result
-
-
-def _profiles(task: Task, begin: float, duration: float, arrival: float, nodes: int) -> FloatArray:
-    """Return currents that brake, wait and throw, at levels and times evenly spread, within the bounds."""
-    share = sobol(5, _PROFILES)
-    levels = task.largest * np.stack([share[:, 0], 0.6 * share[:, 1], 0.3 + 0.7 * share[:, 2]], axis=1)
-    released = 0.5 * arrival * share[:, 3]
-    thrown = released + share[:, 4] * (arrival - released)
-    times = node_times(duration, nodes)[1:]
-    wanted = np.where(
-        times < released[:, np.newaxis],
-        levels[:, :1],
-        np.where(times < thrown[:, np.newaxis], levels[:, 1:2], levels[:, 2:]),
-    )
-    return _limited(task, wanted, begin, duration / nodes, to_zero=False)
-
-
-def _landings(task: Task, begin: float, duration: float, nodes: int) -> FloatArray:
-    """Return currents that hold the armature back on its way, then a little before the backstop."""
-    share = sobol(4, _PROFILES)
-    first, second = task.largest * (1.1 * share[:, 0] - 0.1), task.largest * share[:, 1]
-    caught = 0.7 * duration * share[:, 2]
-    landed = caught + share[:, 3] * (duration - caught)
-    times = node_times(duration, nodes)[1:-1]
-    wanted = np.where(
-        times < caught[:, np.newaxis],
-        first[:, np.newaxis],
-        np.where(times < landed[:, np.newaxis], second[:, np.newaxis], 0.0),
-    )
-    return _limited(task, wanted, begin, duration / nodes, to_zero=True)
 
 
 def _limited(task: Task, wanted: FloatArray, begin: float, step: float, *, to_zero: bool) -> FloatArray:
