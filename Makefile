@@ -11,7 +11,7 @@ TESTING := $(VENV)/test.stamp
 EVERYTHING := $(VENV)/dev.stamp
 # Each worker would compile every test file anew, and each program that a test starts every module.
 unexport PYTHONDONTWRITEBYTECODE
-CODE := src tests $(wildcard benchmarks examples docs)
+CODE := src tests studies $(wildcard benchmarks examples docs)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -67,14 +67,14 @@ docs: $(EVERYTHING) ## the documentation, into build/docs; says which measured t
 	$(BIN)/sphinx-build -W --keep-going -b html docs build/docs
 
 bench: $(EVERYTHING) ## the benchmark table (PEERS=folder of another environment's programs)
-	$(PEERS)/printhammer bench --peers benchmarks/peers --out docs/benchmarks.md --force
+	$(PEERS)/python -m benchmarks.solvers --peers benchmarks/peers --out docs/benchmarks.md --force
 
 # Resolve again; the files name versions and hashes only, never an address.
 LOCK := build/lock-venv/bin/uv pip compile --quiet --universal --fork-strategy fewest --python-version 3.11 \
 	--generate-hashes --no-emit-index-url --no-emit-find-links --no-header --no-annotate
 
 # What lint, types and the fast tests need; the docs need sphinx, which nothing else does.
-TESTED := tables netcdf sweep cluster identify studio notebook pdf test lint
+TESTED := tables netcdf sweep cluster studies studio notebook pdf test lint
 
 lock: ## resolve the pinned requirements again (UPGRADE=--upgrade for the newest)
 	$(PYTHON) -m venv build/lock-venv

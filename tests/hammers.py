@@ -15,6 +15,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from tests.oracle.integrator import ReferenceRun, reference
 
 import printhammer as ph
 from printhammer.derivatives import flow
@@ -29,7 +30,6 @@ from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
-from printhammer.reference.integrator import ReferenceRun, reference
 
 CRUDE = Path(__file__).parent / "data" / "hendriks-1983.toml"
 """A first, crude reconstruction, whose numbers tests may rely on: the shipped hammer is not meant to stay."""

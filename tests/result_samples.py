@@ -117,15 +117,6 @@ def fit(hammer: Hammer) -> Result:
     )
 
 
-def front(_hammer: Hammer) -> Result:
-    from printhammer.claims import claims
-    from printhammer.reconstruction.judging.front import front
-
-    held = dict.fromkeys(claims(), True)
-    rows = [(9, {**held, "settle_out": False}), (6, held), (5, {**held, "settle_out": False})]
-    return front([{"panels": panels, "verdicts": verdicts} for panels, verdicts in rows], 3600.0)
-
-
 def not_none(result: Result | None) -> Result:
     assert result is not None
     return result
@@ -197,7 +188,6 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "EnsembleResult": ensemble,
     "Feedback": feedback,
     "Fit": fit,
-    "Front": front,
     "ImpactTime": impact_time,
     "Learning": learning,
     "LeastWork": least_work,

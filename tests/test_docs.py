@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(path for path in DOCS.rglob("*.md") if "gallery" not in path.parts)
 # A path of the repository in code quotes, possibly with the name of a test behind it.
-NAMED = re.compile(r"`((?:src|tests|docs|examples|benchmarks)/[\w./*-]+?)(?:::(\w+))?`")
+NAMED = re.compile(r"`((?:src|tests|studies|docs|examples|benchmarks)/[\w./*-]+?)(?:::(\w+))?`")
 LINKED = re.compile(r"\]\((?!https?:|#)([^)#]+)(?:#[^)]*)?\)")
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 # Scripts of the gallery that are run here; each is run on its own by another test.
@@ -80,7 +80,11 @@ def test_the_code_on_a_page_runs(page: Path, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT / "examples"), "MPLCONFIGDIR": str(tmp_path)},
+        env={
+            **os.environ,
+            "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'examples'}",
+            "MPLCONFIGDIR": str(tmp_path),
+        },
         capture_output=True,
         text=True,
         check=False,

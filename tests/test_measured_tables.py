@@ -21,6 +21,7 @@ SILENT = (
     "errors",
     "figures",
     "results",
+    "studies/reconstruction/figures",
     "support/c_code",
     "support/constants",
     "support/outputs",
@@ -53,7 +54,7 @@ def pages() -> dict[str, list[tuple[str, str]]]:
 
 @functools.cache
 def imported(path: Path) -> set[str]:
-    """Return what a file imports of the package when it runs, as paths."""
+    """Return what a file imports of the package, the oracle or a study when it runs, as paths of rooms."""
     tree = ast.parse(path.read_text("utf-8"))
     for_types = {
         id(inner)
@@ -62,12 +63,12 @@ def imported(path: Path) -> set[str]:
         for inner in ast.walk(node)
     }
     return {
-        node.module.partition(".")[2].replace(".", "/")
+        node.module.removeprefix("printhammer.").replace(".", "/")
         for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom)
         and id(node) not in for_types
-        and (node.module or "").startswith("printhammer.")
         and node.module is not None
+        and node.module.startswith(("printhammer.", "studies.", "tests.oracle"))
     }
 
 
@@ -106,12 +107,7 @@ def test_a_table_keeps_to_its_form(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_the_rooms_of_a_table_are_all_that_it_depends_on(name: str) -> None:
     table = measured.read(name)
-    rooms = [measured.SOURCES / room for room in table.rooms]
-    files = [
-        file
-        for room in rooms
-        for file in (room.rglob("*.py") if room.is_dir() else [room.with_suffix(".py")])
-    ]
+    files = [file for room in table.rooms for file in measured.files_of(room)]
     assert all(file.exists() for file in files)
     inside = (*table.rooms, *SILENT)
     outside = {
@@ -130,7 +126,7 @@ def test_a_script_names_the_rooms_that_it_uses(script: Path) -> None:
         room for table in tables if table.script == f"docs/measure/{script.name}" for room in table.rooms
     }
     # Hammers of the family are known by their fingerprints.
-    used = imported(script) - {"reconstruction/family/family"}
+    used = imported(script) - {"studies/reconstruction/family/family"}
     assert script.name == "measured.py" or rooms
     assert all(any(path.startswith(room) for room in rooms) for path in used)
 

@@ -164,7 +164,7 @@ def test_the_commands_of_the_readme_work_elsewhere(elsewhere: Path, tmp_path: Pa
 
 def test_the_readme_says_what_holds() -> None:
     from printhammer.claims.definition import claims
-    from printhammer.reconstruction.results import shipped_results
+    from printhammer.report.reconstruction.results import shipped_results
 
     search = shipped_results().search
     assert search is not None

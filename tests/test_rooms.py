@@ -1,6 +1,7 @@
 """Rooms: how the modules of the package are laid out in folders, and that no imports run in a circle."""
 
 import ast
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
@@ -124,3 +125,14 @@ def test_all_kinds_of_imports_count(code: str, expected: set[str]) -> None:
 
 def test_the_graph_sees_imports() -> None:
     assert "printhammer.hammer.hammer" in graph()["printhammer.run.simulate"]
+
+
+ORACLE = Path(__file__).parent / "oracle"
+
+
+@pytest.mark.parametrize("path", sorted(ORACLE.glob("*.py")), ids=lambda path: path.stem)
+def test_the_oracle_shares_no_code_with_the_package(path: Path) -> None:
+    """Types of arguments aside, the oracle knows arrays and numbers only."""
+    names = {name.partition(".")[0] for name in imported(ast.parse(path.read_text(encoding="utf-8")))}
+    allowed = sys.stdlib_module_names | {"numba", "numpy", "scipy", "tests"}
+    assert names <= allowed

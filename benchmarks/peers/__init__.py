@@ -1,16 +1,16 @@
-"""General-purpose solvers on the benchmark's problem, for `printhammer bench --peers benchmarks/peers`.
+"""General-purpose solvers on the benchmark's problem, for `benchmarks.solvers --peers benchmarks/peers`.
 
 Peers that are not installed are left out and named. To have them without touching the locked environment of
 the repository, give them one of their own:
 
     python3 -m venv build/peers-venv
     build/peers-venv/bin/python -m pip install --requirement benchmarks/peers/requirements.txt --editable .
-    build/peers-venv/bin/printhammer bench --peers benchmarks/peers
+    build/peers-venv/bin/python -m benchmarks.solvers --peers benchmarks/peers
     make bench PEERS=build/peers-venv/bin     (the same, into docs/benchmarks.md)
 
 Boost.Odeint and SUNDIALS are compiled on the spot from `cpp` where a C++ compiler finds their headers
-(Debian: libboost-dev, libsundials-dev). A peer is told the problem by `printhammer.bench.problem` and answers
-with `printhammer.bench.entry.Entry`, or raises `Absent`.
+(Debian: libboost-dev, libsundials-dev). A peer is told the problem by `benchmarks.solvers.problem` and
+answers with `benchmarks.solvers.entry.Entry`, or raises `Absent`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Final
 from . import cplusplus, diffrax, heyoka, numbalsoda, scipy, sundae
 
 if TYPE_CHECKING:
-    from printhammer.bench.entry import EnsembleMaker, SingleMaker
+    from benchmarks.solvers.entry import EnsembleMaker, SingleMaker
 
 SINGLE: Final[dict[str, SingleMaker]] = {
     "SciPy": scipy.entries,

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import FIRST, GRID, PERIOD
+from benchmarks.solvers.entry import Absent, Entry
+from benchmarks.solvers.problem import FIRST, GRID, PERIOD
 
 from .equations import current_pieces, hammer_constants
 
 if TYPE_CHECKING:
-    from printhammer.bench.problem import Task
+    from benchmarks.solvers.problem import Task
     from printhammer.support.arrays import FloatArray
 
 _FLAGS = ("-std=c++17", "-O3", "-march=native", "-shared", "-fPIC")

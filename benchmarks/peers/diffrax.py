@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import ENDS, FIRST, checked, ensemble_tasks
+from benchmarks.solvers.entry import Absent, Entry
+from benchmarks.solvers.problem import ENDS, FIRST, checked, ensemble_tasks
 
 from .equations import BACKSTOP, FREE, LENGTH, LOADING, TIME, UNLOADING, hammer_constants, scaled_pieces
 
 if TYPE_CHECKING:
-    from printhammer.bench.problem import Task
+    from benchmarks.solvers.problem import Task
     from printhammer.support.arrays import FloatArray
 
 _FIRST_STEP = 0.01

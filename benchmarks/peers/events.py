@@ -22,7 +22,7 @@ from .equations import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.bench.problem import Task
+    from benchmarks.solvers.problem import Task
     from printhammer.support.arrays import FloatArray
 
 

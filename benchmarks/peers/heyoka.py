@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import ENDS, FIRST, GRID, PERIOD, checked, ensemble_tasks
+from benchmarks.solvers.entry import Absent, Entry
+from benchmarks.solvers.problem import ENDS, FIRST, GRID, PERIOD, checked, ensemble_tasks
 
 from .equations import BACKSTOP, FREE, LENGTH, LOADING, TIME, UNLOADING, hammer_constants, scaled_pieces
 
 if TYPE_CHECKING:
-    from printhammer.bench.problem import Task
+    from benchmarks.solvers.problem import Task
     from printhammer.support.arrays import FloatArray
 
 _ENTRY: Final = 1e-5

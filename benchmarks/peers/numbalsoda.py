@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import FIRST, GRID, PERIOD
+from benchmarks.solvers.entry import Absent, Entry
+from benchmarks.solvers.problem import FIRST, GRID, PERIOD
 
 from .equations import (
     BACKSTOP,
@@ -28,7 +28,7 @@ from .equations import (
 )
 
 if TYPE_CHECKING:
-    from printhammer.bench.problem import Task
+    from benchmarks.solvers.problem import Task
     from printhammer.support.arrays import FloatArray
 
 _MODE, _PEAK, _PIECE, _CONSTANTS = 0, 1, 2, 7

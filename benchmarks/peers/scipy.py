@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.bench.entry import Entry
-from printhammer.bench.problem import FIRST, GRID
+from benchmarks.solvers.entry import Entry
+from benchmarks.solvers.problem import FIRST, GRID
 
 from .equations import (
     BACKSTOP,
@@ -28,7 +28,7 @@ from .events import Stretch, event_split
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.bench.problem import Task
+    from benchmarks.solvers.problem import Task
     from printhammer.support.arrays import FloatArray
 
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from printhammer.bench.entry import Absent, Entry
-from printhammer.bench.problem import FIRST, GRID
+from benchmarks.solvers.entry import Absent, Entry
+from benchmarks.solvers.problem import FIRST, GRID
 
 from .events import Stretch, event_split
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from printhammer.bench.problem import Task
+    from benchmarks.solvers.problem import Task
     from printhammer.support.arrays import FloatArray
 
 _CLOSE = 1e-13

@@ -7,16 +7,16 @@ import math
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
+from tests.oracle.integrator import horizon, reference
 
 import printhammer as ph
-from printhammer.reference.integrator import horizon, reference
 
 HAMMER = ph.load("hendriks-1983")
 SINGLE = ph.PulseTrain(HAMMER.waveform)
 GRID = np.linspace(0.0, 4e-3, 4001)
 FINEST = 1e-14
 """Tolerance of the reference; its error is about 1e-13 of the stroke."""
-ROOMS = (*MOTION, "reference")
+ROOMS = (*MOTION, "tests/oracle")
 
 
 def single_pulse() -> float:

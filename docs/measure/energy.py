@@ -5,10 +5,10 @@ rest, the settle-out included, for the shipped hammer and five of its family; th
 """
 
 from measured import MOTION, Cell, Column, write
+from studies.reconstruction.family.family import family_hammers
 
 import printhammer as ph
 from printhammer.control.least_work.burst import NoBurstError
-from printhammer.reconstruction.family.family import family_hammers
 
 FAMILY = ("02", "06", "10", "14", "18")
 FORCES = (0.9, 1.1, 1.2)

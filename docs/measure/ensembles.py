@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
+from tests.oracle.integrator import horizon, reference
 
 import printhammer as ph
-from printhammer.reference.integrator import horizon, reference
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.problem import TOLERANCE
 
@@ -55,7 +55,7 @@ def main() -> None:
         for share in ("median", "95 %")
     ]
     settings = {"members": len(drives), "pulses": PULSES, "times": GRID.size}
-    write("ensembles", columns, rows, settings, (*MOTION, "reference"))
+    write("ensembles", columns, rows, settings, (*MOTION, "tests/oracle"))
 
 
 if __name__ == "__main__":

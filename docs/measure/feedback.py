@@ -21,6 +21,7 @@ import math
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
+from studies.reconstruction.family.family import family_hammers
 
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
@@ -33,7 +34,6 @@ from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.page.page import Page
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest, safe_rate
-from printhammer.reconstruction.family.family import family_hammers
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 FIRST, FINE = 500.0, 5.0

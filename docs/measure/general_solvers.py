@@ -9,9 +9,9 @@ import math
 import numpy as np
 from measured import MOTION, Cell, Column, write
 from scipy.integrate import solve_ivp
+from tests.oracle.integrator import reference
 
 import printhammer as ph
-from printhammer.reference.integrator import reference
 
 HAMMER = ph.load("hendriks-1983")
 RUNS = (
@@ -99,7 +99,7 @@ def main() -> None:
     columns = [Column(name=name, unit="m", format=".0e") for name, _, _ in RUNS]
     settings = {name: end for name, _, end in RUNS}
     first = Column(name="solver, relative tolerance")
-    write("general-solvers", [first, *columns], rows, settings, (*MOTION, "reference"))
+    write("general-solvers", [first, *columns], rows, settings, (*MOTION, "tests/oracle"))
 
 
 if __name__ == "__main__":

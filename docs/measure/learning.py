@@ -209,7 +209,7 @@ def drivers(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
 
 def family(count: int, seed: int) -> list[list[Cell]]:
     """Return what units of two hammers of the family print at 1.5 times their safe rates."""
-    from printhammer.reconstruction.family.family import family_hammers
+    from studies.reconstruction.family.family import family_hammers
 
     rows = []
     for hammer in family_hammers():

@@ -4,7 +4,8 @@ A table is a file ``docs/measured/NAME.json``. It holds, beside columns and rows
 the fingerprints of its hammers and one of the code that the figures depend on. Where one of them is another
 today the table is stale; ``.venv/bin/python docs/measure/measured.py`` lists those, as ``make docs`` does.
 
-The fingerprint of code is that of the syntax trees of the rooms of ``src/printhammer`` that a script names.
+The fingerprint of code is that of the syntax trees of the rooms that a script names: paths in
+``src/printhammer``, or in the repository for rooms beside the package.
 File names, order, docstrings, comments, imports and the words of errors do not count, so that code may move
 within these rooms.
 """
@@ -28,8 +29,12 @@ import printhammer as ph
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "measured"
 SOURCES = ROOT / "src" / "printhammer"
+# Scripts use the oracle of the tests and the studies too.
+sys.path.insert(0, str(ROOT))
 MOTION = ("drive", "hammer", "kernel", "parts", "run", "support/roots")
 """Rooms that every motion depends on."""
+OUTSIDE = ("studies/", "tests/")
+"""How the paths of rooms begin that lie beside the package."""
 
 Cell = bool | int | float | str | None
 UNSEEN = (ast.Import, ast.ImportFrom)
@@ -153,7 +158,7 @@ def shown(cell: Cell, column: Column) -> str:
 @cache
 def hammer_fingerprint(name: str) -> str:
     """Return the fingerprint that a shipped hammer, or one of the family, has today."""
-    from printhammer.reconstruction.family.family import family_hammers
+    from studies.reconstruction.family.family import family_hammers
 
     if "-family-" in name:
         return next((hammer.fingerprint for hammer in family_hammers() if hammer.name == name), "none")
@@ -161,16 +166,20 @@ def hammer_fingerprint(name: str) -> str:
 
 
 def code_fingerprint(rooms: tuple[str, ...] | list[str]) -> str:
-    """Return the fingerprint of the code of some rooms, folders or modules of the package."""
+    """Return the fingerprint of the code of some rooms: folders or modules."""
     found = sorted(statement for room in rooms for statement in _statements(room))
     return hashlib.sha256("\n".join(found).encode()).hexdigest()[:16]
 
 
+def files_of(room: str) -> list[Path]:
+    """Return the files of a room of the package or, where its path begins so, of the repository."""
+    path = (ROOT if room.startswith(OUTSIDE) else SOURCES) / room
+    return sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
+
+
 @cache
 def _statements(room: str) -> tuple[str, ...]:
-    path = SOURCES / room
-    files = sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
-    counted = [file for file in files if file.exists() and file not in UNCOUNTED]
+    counted = [file for file in files_of(room) if file.exists() and file not in UNCOUNTED]
     trees = [ast.parse(file.read_text("utf-8")) for file in counted]
     return tuple(text for tree in trees for node in tree.body if (text := _seen(node)))
 

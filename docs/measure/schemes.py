@@ -1,14 +1,15 @@
 """Write the table of how often the schemes of 1983 change a verdict on Fig. 11, from what ships.
 
-The comparison itself takes an hour and is made by ``printhammer reconstruct schemes``; this is its table for
-the pages. Run it with ``.venv/bin/python docs/measure/schemes.py``.
+The comparison itself takes an hour and is made by ``python -m studies.reconstruction schemes``; this is its
+table for the pages. Run it with ``.venv/bin/python docs/measure/schemes.py``.
 """
 
 from measured import MOTION, Cell, Column, write
 
-from printhammer.reconstruction.results import shipped_results
+from printhammer.report.reconstruction.results import shipped_results
 
-ROOMS = (*MOTION, "chaos", "claims", "derivatives", "maps", "printing", "reconstruction")
+STUDY = tuple(f"studies/reconstruction/{room}" for room in ("family", "judging", "lines", "search"))
+ROOMS = (*MOTION, "chaos", "claims", "derivatives", "maps", "printing", "report/reconstruction", *STUDY)
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
+from studies.reconstruction.family.family import family_hammers
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
@@ -22,7 +23,6 @@ from printhammer.control.table.report import PERTURBATIONS
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import SafeRate
-from printhammer.reconstruction.family.family import family_hammers
 
 OTHERS = (1, 5, 9, 13, 17)
 """Places of the five hammers in the family."""

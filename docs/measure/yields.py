@@ -4,9 +4,9 @@ Run it with ``.venv/bin/python docs/measure/yields.py``; it takes some minutes.
 """
 
 from measured import MOTION, Cell, Column, write
+from studies.reconstruction.family.family import family_hammers
 
 import printhammer as ph
-from printhammer.reconstruction.family.family import family_hammers
 
 NUMBER = 256
 """Hammers drawn for each number."""

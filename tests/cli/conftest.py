@@ -2,7 +2,7 @@ import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import pytest
 import typer.main
@@ -22,14 +22,17 @@ class Outcome(NamedTuple):
     err: str
 
 
-@pytest.fixture
-def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
-    """Run the command line in this process."""
+def called(
+    program: Callable[[list[str]], NoReturn],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> Callable[..., Outcome]:
+    """Return a function that runs a program of verbs in this process."""
     monkeypatch.setattr(typer.main, "get_command", _commands)
 
     def call(*arguments: object) -> Outcome:
         with pytest.raises(SystemExit) as end:
-            main([str(argument) for argument in arguments])
+            program([str(argument) for argument in arguments])
         out, err = capsys.readouterr()
         # What depends on the machine is on the standard error as well.
         said = [line for line in err.splitlines() if not COMPILING.search(line)]
@@ -38,15 +41,20 @@ def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> 
     return call
 
 
+@pytest.fixture
+def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
+    """Run the command line in this process."""
+    return called(main, capsys, monkeypatch)
+
+
 def contents(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.fixture
-def refused(
+def check_refusal(
     cli: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., None]:
-    """Run a command line that cannot be used: one sentence, status 2, no file written or changed."""
+    """Return a function that runs a command line and checks that it is refused in one sentence."""
 
     def call(*arguments: object, said: str | tuple[str, ...]) -> None:
         monkeypatch.chdir(tmp_path)
@@ -64,6 +72,14 @@ def refused(
         assert sorted(tmp_path.rglob("*")) == entries
 
     return call
+
+
+@pytest.fixture
+def refused(
+    cli: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., None]:
+    """Run a command line that cannot be used: one sentence, status 2, no file written or changed."""
+    return check_refusal(cli, tmp_path, monkeypatch)
 
 
 @pytest.fixture(scope="session")

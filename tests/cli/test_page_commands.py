@@ -18,10 +18,9 @@ WRITTEN = re.compile(r"(?:--out|--into|--dots|--contacts|>) ([\w./-]+)")
 # Commands that other tests run, or that do not end, by how they begin.
 ELSEWHERE = {
     "printhammer paper": "test_paper.py writes the whole report",
-    "printhammer bench": "test_bench.py",
     "printhammer studio": "ends with Ctrl-C only, in tests/studio",
     "printhammer feedback": "takes minutes; the example of the help runs, in test_registry.py",
-    "printhammer reconstruct": "the examples of the help run, in test_registry.py",
+    "python -m ": "programs of the repository, which have tests of their own",
     "NUMBA_CACHE_DIR=": "compiles anew what test_warm.py compiles",
     "printhammer sweep spec.toml --out results.zarr --dask": "needs a cluster, in tests/sweep",
     "dask ": "the same",

@@ -29,31 +29,17 @@ NEEDED = {
     "fit pack": ("t.csv",),
     "fit motion": ("t.csv",),
     "fit coil": ("t.csv",),
-    "reconstruct search": ("new.jsonl",),
-    "reconstruct judge": ("a.jsonl", "new.jsonl"),
-    "reconstruct base-rates": ("new.json",),
-    "reconstruct schemes": ("new.json",),
-    "reconstruct front": ("a.jsonl",),
-    "reconstruct predictions": ("a.jsonl", "b.jsonl", "new.json"),
-    "reconstruct family": ("a.jsonl",),
-    "reconstruct ship": ("a.jsonl", "b.jsonl"),
 }
 # Examples that take more than a few seconds.
 LONG = {"basins", "bifurcation", "continue", "curve", "orbits", "energy", "feedback", "tune", "sweep"}
-LONG |= {f"reconstruct {verb}" for verb in ("judge", "front", "predictions", "family")}
 # Examples that are part of other tests, or take minutes.
 ELSEWHERE = {
     "paper": "takes minutes; test_paper.py writes the whole report",
     "studio": "ends with Ctrl-C only, in test_studio.py",
-    "bench": "takes minutes; test_bench.py",
     "fit solenoid": "reads a table that no other verb writes; test_fit_solenoid.py",
     "fit coil": "reads a hammer on a voltage that no other verb writes; test_fit_coil.py",
     "warm": "test_warm.py runs it",
     "learn": "chooses among 400 hammers; test_learn.py, and its page, with fewer",
-    "reconstruct schemes": "takes minutes; test_reconstruct.py, and the count in test_schemes.py",
-    "reconstruct search": "takes a minute; the other examples of reconstruct begin with a shorter one",
-    "reconstruct base-rates": "takes minutes; test_reconstruct.py, with claims at no cost",
-    "reconstruct ship": "judges all claims, which takes minutes; test_reconstruct.py, with the stated ones",
 }
 
 
@@ -109,8 +95,7 @@ def test_the_example_in_the_help_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shown = printed(cli, verb.name.split())
-    if ">" in shown or verb.name.startswith("reconstruct"):
-        # Into a file, or with processes of its own.
+    if ">" in shown:
         program = f"{shlex.quote(sys.executable)} -m printhammer "
         shell = re.sub(r"(^|&& )printhammer ", lambda found: found[1] + program, shown, flags=re.MULTILINE)
         done = subprocess.run(shell, shell=True, capture_output=True, text=True, check=False)
@@ -229,16 +214,17 @@ def test_a_file_that_is_there_is_not_written_over(
     )
 
 
-def test_what_is_gone_on_with_needs_no_force() -> None:
-    going_on = {verb.name for verb in VERBS if any(files.continued for files in verb.files.values())}
-    assert going_on == {"reconstruct search", "reconstruct judge"}
-
-
 @pytest.mark.parametrize(
     "verb", [verb for verb in VERBS if verb.files or "out" in verb.options], ids=lambda v: v.name
 )
 def test_force_is_offered_where_new_files_are_written(cli: Callable[..., Any], verb: Verb) -> None:
     shown = cli(*verb.name.split(), "--help").out
-    assert ("Write over files" in shown) == (
-        verb.name not in {"sweep", "reconstruct search", "reconstruct judge"}
-    )
+    assert ("Write over files" in shown) == (verb.name != "sweep")
+
+
+def test_the_readings_of_a_figure_are_those_of_the_library() -> None:
+    from printhammer.run.scheme_runs import READINGS
+
+    (metavar,) = (verb.options["reading"].metavar for verb in VERBS if verb.name == "figure")
+    assert metavar is not None
+    assert sorted(metavar.split("|")) == sorted(READINGS)

@@ -51,18 +51,3 @@ def test_a_report_replaces_an_earlier_one(tmp_path: Path) -> None:
     (tmp_path / "claims.json").write_text('["of another program"]', "utf-8")
     with pytest.raises(InputError, match=r"index\.html: expected a new folder or an earlier report"):
         check_place(tmp_path)
-
-
-def test_options_of_earlier_versions_are_understood(cli: Callable[..., Any], tmp_path: Path) -> None:
-    names = {
-        "--csv": "a.csv",
-        "--parquet": "b.parquet",
-        "--json": "c.json",
-        "--plot": "d.svg",
-        "--out": "e.nc",
-    }
-    words = [word for flag, name in names.items() for word in (flag, tmp_path / name)]
-    done = cli("run", *words)
-    assert done.status == 0, done.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names.values())
-    assert "--csv" not in cli("run", "--help").out

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.oracle.integrator import reference
 from tests.truth import oracles
 
 from printhammer.drive.trains import PulseTrain, SineForce
@@ -25,7 +26,6 @@ from printhammer.parts.base import ROLES
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import PreloadSpring
-from printhammer.reference.integrator import reference
 
 MASS = 4e-4
 MAGNET = InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.0931)

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from tests.hammers import TRUTH, Draw
+from tests.oracle.integrator import ReferenceRun, reference
 
 import printhammer as ph
-from printhammer.reference.integrator import ReferenceRun, reference
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble, EnsembleResult
 from printhammer.run.problem import TOLERANCE
 

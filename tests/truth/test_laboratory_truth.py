@@ -4,9 +4,9 @@ import mpmath
 import numpy as np
 import pytest
 from tests import hammers
+from tests.oracle.integrator import reference
 
 import printhammer as ph
-from printhammer.reference.integrator import reference
 
 HAMMER = hammers.crude()
 C = {key: constant.si for key, constant in HAMMER.constants.items()}

@@ -7,10 +7,10 @@ or are cut off by it, have no need of that.
 import numpy as np
 import pytest
 from tests.hammers import CRUDE
+from tests.oracle.integrator import ReferenceRun, reference
 
 import printhammer as ph
 from printhammer.chaos import Orbit, Orbits
-from printhammer.reference.integrator import ReferenceRun, reference
 
 TIGHT = 1e-14
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from tests.hammers import CRUDE, TRUTH
+from tests.oracle.integrator import reference
 
 import printhammer as ph
 from printhammer.printing.dots.slots import FIRST_SLOT
 from printhammer.printing.page.page import Page, print_page
 from printhammer.printing.page.pattern import Pattern
-from printhammer.reference.integrator import reference
 
 RATE = 1500.0
 ROWS = ("#.##.#", "######")

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from tests.oracle.integrator import ReferenceRun, reference
 
 import printhammer as ph
 from printhammer.printing.dots.buzz import BuzzTrain, find_buzz_train
-from printhammer.reference.integrator import ReferenceRun, reference
 
 INCH = 0.0254
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import RectBivariateSpline
+from tests.oracle.integrator import ReferenceRun, _Run, horizon, reference
+from tests.oracle.series import ORDER
 from tests.truth import oracles
 
 from printhammer.drive.trains import PulseTrain, SineForce
@@ -21,8 +23,6 @@ from printhammer.parts.magnet.table import TableMagnet
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import LinearSpring, PreloadSpring
-from printhammer.reference.integrator import ReferenceRun, _Run, horizon, reference
-from printhammer.reference.series import ORDER
 
 MASS = 4e-4
 MAGNET = InverseRootMagnet(F0=2.47, Am=0.437, Bm=0.0931)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from tests.hammers import crude
+from tests.oracle.integrator import reference
 
 import printhammer as ph
 from printhammer.printing.dots.slots import slot_times
-from printhammer.reference.integrator import reference
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ from tests.hammers import (
     interpreted,
     made_of,
 )
+from tests.oracle.integrator import reference
 from tests.tangents import SHARP, before_slow_touches, deviation, richardson, scaled
 
 import printhammer as ph
@@ -36,7 +37,6 @@ from printhammer.kernel.model.modes import (
     RELOADING,
     UNLOADING,
 )
-from printhammer.reference.integrator import reference
 from printhammer.run.problem import Problem
 
 WANTED = 1e-6

@@ -19,7 +19,9 @@ from printhammer.cli.terminal import allow_any_text, complain
 from printhammer.errors import PrinthammerError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from printhammer.cli.runner import Verb
 
 BAD_INPUT: Final = 2
 _COLUMNS: Final = 76
@@ -60,12 +62,14 @@ def _shown(example: str | None) -> str | None:
     return " \\\n".join(lines)
 
 
-def _built() -> typer.Typer:
-    """Return the program with the verbs of the registry."""
+def build_program(
+    name: str, text: str, example: str, verbs: Iterable[Verb], groups: Mapping[str, tuple[str, str | None]]
+) -> typer.Typer:
+    """Build a program of verbs; `groups` gives the help and the example of each group."""
     program = typer.Typer(
-        name="printhammer",
-        help=HELP,
-        epilog="Example: printhammer run hendriks-1983 --rate '1.2 kHz' --pulses 9",
+        name=name,
+        help=text,
+        epilog=f"Example: {example}",
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
@@ -73,24 +77,31 @@ def _built() -> typer.Typer:
     )
     program.callback()(_program)
     homes = {"": program}
-    for name, (text, example) in GROUPS.items():
-        homes[name] = typer.Typer(help=text, epilog=_shown(example), no_args_is_help=True)
-        program.add_typer(homes[name], name=name)
-    for verb in VERBS:
-        group, _, name = verb.name.rpartition(" ")
-        homes[group].command(name, epilog=_shown(verb.example))(verb.call)
+    for group, (what, shown) in groups.items():
+        homes[group] = typer.Typer(help=what, epilog=_shown(shown), no_args_is_help=True)
+        program.add_typer(homes[group], name=group)
+    for verb in verbs:
+        group, _, word = verb.name.rpartition(" ")
+        homes[group].command(word, epilog=_shown(verb.example))(verb.call)
     return program
 
 
-app: Final = _built()
+app: Final = build_program(
+    "printhammer", HELP, "printhammer run hendriks-1983 --rate '1.2 kHz' --pulses 9", VERBS, GROUPS
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command line, by default that of the process, and exit."""
+    run_program(app, "printhammer", arguments)
+
+
+def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run a program of verbs on arguments, by default those of the process, and exit with its status."""
     allow_any_text()
     try:
-        status = app(
-            None if arguments is None else list(arguments), prog_name="printhammer", standalone_mode=False
+        status = program(
+            None if arguments is None else list(arguments), prog_name=name, standalone_mode=False
         )
     except PrinthammerError as error:
         complain(str(error))

@@ -50,8 +50,6 @@ class Option:
     """Whether it names files that are read, which no output may be."""
     writes: bool = False
     """Whether it names a place to write new files to."""
-    hidden: bool = False
-    """Whether the help does not show it."""
     hammer: Literal["named", "loaded", "fired"] | None = None
     """Of the hammer that is worked on: "named", "loaded" with its warnings shown, or "fired", which has a
     waveform too."""
@@ -66,7 +64,6 @@ class Option:
         type_: Any = str if read else self.type
         type_ = list[type_] if self.many else type_
         texts: dict[str, Any] = {"metavar": self.metavar, "help": self.help, "rich_help_panel": self.panel}
-        texts["hidden"] = self.hidden
         if self.argument:
             entry = typer.Argument(**texts, show_default=self.hammer is not None)
         else:
@@ -92,8 +89,6 @@ class Files(Option):
     """Whether names may be those of pictures."""
     continued: bool = False
     """Whether the work goes on with a file that is there, and writes nothing over."""
-    older: tuple[str, ...] = ()
-    """Names that the option had in earlier versions, which are understood still."""
 
 
 def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:

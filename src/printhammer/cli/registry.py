@@ -11,7 +11,7 @@ from printhammer.cli.verbs.chaos.curve import curve
 from printhammer.cli.verbs.chaos.lyapunov import lyapunov
 from printhammer.cli.verbs.chaos.orbits import orbits
 from printhammer.cli.verbs.chaos.strobe import strobe
-from printhammer.cli.verbs.laboratory import fit, hammer, reconstruct
+from printhammer.cli.verbs.laboratory import fit, hammer
 from printhammer.cli.verbs.laboratory.datasheet import from_datasheet
 from printhammer.cli.verbs.laboratory.measure import measure
 from printhammer.cli.verbs.printing.dead_time import dead_time
@@ -23,7 +23,6 @@ from printhammer.cli.verbs.printing.learn import learn
 from printhammer.cli.verbs.printing.print_ import print_
 from printhammer.cli.verbs.printing.quality import quality
 from printhammer.cli.verbs.printing.tune import tune
-from printhammer.cli.verbs.runs.bench import bench
 from printhammer.cli.verbs.runs.figure import figure
 from printhammer.cli.verbs.runs.map import map_
 from printhammer.cli.verbs.runs.paper import paper
@@ -38,16 +37,13 @@ if TYPE_CHECKING:
 VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),
     *(print_, energy, feedback, quality, tune, learn, dead_time, impact_time, duty),
-    *(bench, studio, sweep, measure, warm),
+    *(studio, sweep, measure, warm),
     *(hammer.show, hammer.check, hammer.schema, hammer.list_shipped, from_datasheet),
     *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion, fit.coil),
-    *(reconstruct.search, reconstruct.judge, reconstruct.base_rates),
-    *(reconstruct.schemes, reconstruct.front, reconstruct.predictions, reconstruct.family, reconstruct.ship),
 )
 
 GROUPS: Final = {
     "hammer": (hammer.GROUP, None),
     "fit": (fit.GROUP, fit.EXAMPLE),
-    "reconstruct": (reconstruct.GROUP, reconstruct.EXAMPLE),
 }
 """What the verbs of two words have in common, by their first word: help, and an example."""

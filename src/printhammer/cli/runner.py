@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import inspect
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -230,24 +230,16 @@ def verb(
         on = dict(passed or {})
         with_parts = on.pop("part", None) is not None
         options: dict[str, Option] = {**{name: signature.parameters[name].default for name in own}, **on}
-        older = {
-            former: replace(each, flag=None, panel=None, hidden=True)
-            for each in files.values()
-            for former in each.older
-        }
         new = [
             *(each for each in files.values() if not each.continued),
             *(o for o in options.values() if o.writes),
         ]
         if with_parts or any(option.hammer or option.metavar in _WITH_PARTS for option in options.values()):
             options["part"] = PART
-        every = {**options, **files, **older, **({_FORCE: FORCE} if new else {})}
+        every = {**options, **files, **({_FORCE: FORCE} if new else {})}
 
         def call(**texts: Any) -> int:
-            wanted = {
-                option: [path for name in (option, *each.older) for path in _listed(texts.pop(name))]
-                for option, each in files.items()
-            }
+            wanted = {option: _listed(texts.pop(option)) for option in files}
             job = Job(files, wanted, force=texts.pop(_FORCE, False))
             values = _values(job, options, texts)
             words = {name: values[name] for name in own}

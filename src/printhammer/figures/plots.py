@@ -22,7 +22,6 @@ PLOTS: Final = {
     "Feedback.run": "control.feedback.plot_run",
     "FiniteTime": "chaos.finite_time.plot",
     "Fit": "fit.plot",
-    "Front": "front.plot",
     "ImpactTime": "control.impact_time.plot",
     "ImpactTrain": "chaos.impact_train.plot",
     "Learning": "control.learning.plot",

@@ -15,10 +15,10 @@ from printhammer.claims import Context, JudgedClaim, buzz_search, judge_all
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
-from printhammer.reconstruction.results import BaseRates, Results, shipped_results
 from printhammer.report.citations import cited_figures
 from printhammer.report.contents import Drawing, Report
 from printhammer.report.publish import CLAIMS, PAGE, PDF, PICTURES, staged
+from printhammer.report.reconstruction.results import BaseRates, Results, shipped_results
 from printhammer.support.outputs import write_file
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from printhammer.claims import JudgedClaim
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.results import Family, Results, Search
+    from printhammer.report.reconstruction.results import Family, Results, Search
 
 
 class Drawing(Declared):

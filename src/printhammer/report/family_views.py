@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import printed_verdicts
-from printhammer.reconstruction.family.robustness import STATEMENTS
 from printhammer.report.quantities import split_name, value_text
 from printhammer.report.views import SAME
 
@@ -15,8 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.results import Family, FamilyMember
     from printhammer.report.contents import Report
+    from printhammer.report.reconstruction.results import Family, FamilyMember
 
 _ROOM: Final = 4.0
 """Free part of a track at each end, in percent."""
@@ -44,8 +43,9 @@ def _conclusions(family: Family) -> list[dict[str, Any]]:
     for name, conclusion in family.conclusions.items():
         words, unit = split_name(name)
         values = [member.conclusions.get(name) for member in family.hammers]
-        # The range of a statement is that of its margins, which tell a reader nothing.
-        ends = ("", "") if name in STATEMENTS else (conclusion.low, conclusion.high)
+        # Members have no value of a statement; its range is that of margins, which mean nothing to a reader.
+        is_statement = not any(name in member.conclusions for member in family.hammers)
+        ends = ("", "") if is_statement else (conclusion.low, conclusion.high)
         low, high = (value_text(end, unit, other=False) for end in ends)
         dots = _dots([value for value in values if value is not None])
         rows.append(

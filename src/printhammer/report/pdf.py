@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.claims import JudgedClaim
 from printhammer.errors import missing_extra
-from printhammer.reconstruction.judging.shares import Share
 from printhammer.report.page import view
 from printhammer.report.quantities import percent, typeset
+from printhammer.report.reconstruction.shares import Share
 from printhammer.support.constants import Constant
 from printhammer.support.outputs import write_file
 

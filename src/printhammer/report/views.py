@@ -13,9 +13,9 @@ from printhammer.report.quantities import band_text, percent, split_name, value_
 if TYPE_CHECKING:
     from printhammer.claims import Claim
     from printhammer.hammer.hammer import Hammer
-    from printhammer.reconstruction.judging.shares import Share
-    from printhammer.reconstruction.results import BestFor
     from printhammer.report.contents import Report
+    from printhammer.report.reconstruction.results import BestFor
+    from printhammer.report.reconstruction.shares import Share
 
 SAME: Final = 1e-9
 """Relative difference up to which two constants are the same."""

@@ -8,8 +8,8 @@ from printhammer import report
 from printhammer.claims import claims
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.figures import PaperFigure
-from printhammer.reconstruction.results import results_in
 from printhammer.report import build
+from printhammer.report.reconstruction.results import results_in
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ def test_a_rate_alone_is_one_drive_wherever_it_is_said(
     (tmp_path / "drive.toml").write_text(f'format = 1\n[train]\n{name} = "{text}"\n')
     for number, options in enumerate([(f"--{name}", text), ("--drive", str(tmp_path / "drive.toml"))]):
         out = tmp_path / f"{number}.json"
-        assert cli("run", "hendriks-1983", *options, "--json", str(out)).status == 0
+        assert cli("run", "hendriks-1983", *options, "--out", str(out)).status == 0
         told = json.loads(out.read_text())
         assert told["provenance"]["drive_fingerprint"] == drive.fingerprint
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from tests import hammers
 from tests.hammers import FRONT, MASS, STOP, STROKE
+from tests.oracle.integrator import reference
 from tests.truth import oracles
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
-from printhammer.reference.integrator import reference
 from printhammer.run.contacts import Contact
 
 PULL = 1e4

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from tests import hammers
 from tests.hammers import FRONT, MASS, STOP, STROKE
+from tests.oracle.integrator import reference
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import Rectangle, Trapezoid
 from printhammer.kernel.methods.landing import step_factor
-from printhammer.reference.integrator import reference
 from printhammer.run.contacts import Contact
 
 PULL = 1e4

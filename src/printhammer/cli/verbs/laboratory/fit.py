@@ -32,7 +32,6 @@ _FILES: Final = {
         " .pdf); may be given repeatedly.",
         ".toml",
         panel=_RESULTS,
-        older=("plot",),
     ),
     "covariance": opt.file("Covariance of the constants, CSV.", panel=_RESULTS),
     "into": opt.file("The hammer of --hammer with the constants replaced.", panel=_RESULTS),

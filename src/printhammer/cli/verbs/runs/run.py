@@ -46,7 +46,6 @@ _record = partial(opt.file, panel=_FILES)
     out=opt.results(
         "Motion, as .json its dots, contacts and energies",
         panel=_FILES,
-        older=("csv", "parquet", "json", "plot"),
     ),
     dots=_record("Dots, .csv or .parquet.", ".csv", ".parquet"),
     contacts=_record("Contacts, .csv or .parquet.", ".csv", ".parquet"),

@@ -1,0 +1,1 @@
+"""Benchmarks; they stay in the repository and are no part of the wheel."""

@@ -1,0 +1,137 @@
+"""The table of solvers: who is there, how exact, how fast, and by how much this program is ahead."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from benchmarks.solvers import exact, own
+from benchmarks.solvers.entry import Absent, Entry, Peers, Say
+from printhammer.results import Declared, part, scalar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from benchmarks.solvers.problem import Task
+
+_SHORTEST: Final = 0.02
+"""Processor time of a turn, s; shorter work is repeated within it."""
+_SLOW: Final = 1.0
+"""A solver whose turn takes longer has two turns only, s."""
+
+
+class Line(Declared):
+    """One solver of the table."""
+
+    solver: str = part("solver, version, method, tolerance")
+    ours: bool = part("whether it is this program")
+    members: int = part("1 for a single run")
+    error: float = scalar(
+        "m",
+        "largest deviation from the reference over the first 3 ms",
+        more="NaN where the solver ended before",
+    )
+    speed: float = part("hammer-seconds per second of processor time")
+    first: float = part("time of the first call, s, in which things are compiled")
+    duration: float = part("hammer-seconds of one call timed")
+    match: str = part(
+        "for a peer: the fastest of our lines of its kind that is at least as exact", default=""
+    )
+    ratio: float = part("how many times faster that line is; NaN where there is none", default=math.nan)
+
+
+def measure(
+    task: Task, quick: bool, members: int, peers: Peers, say: Say
+) -> tuple[list[Line], dict[str, str]]:
+    """Measure all solvers that are there.
+
+    Short runs and one round if `quick`; ensembles of so many members; `say` is called before each step.
+    Return the lines of the table, and why each peer that is absent is.
+    """
+    absent: dict[str, str] = {}
+    solvers: list[Entry] = []
+    building: dict[int, float] = {}
+    makers: list[tuple[str, Callable[[], list[Entry]]]] = [
+        ("printhammer", partial(own.singles, task, quick)),
+        ("1983", partial(own.schemes, task, quick)),
+        *((name, partial(make, task, quick)) for name, make in peers.single.items()),
+        ("printhammer", partial(own.ensembles, task, quick, members)),
+        *((name, partial(make, task, quick, members)) for name, make in peers.ensembles.items()),
+    ]
+    for name, make_entries in makers:
+        began = time.perf_counter()
+        try:
+            made = make_entries()
+        except Absent as reason:
+            absent[name] = str(reason)
+            continue
+        if made:
+            building[len(solvers)] = time.perf_counter() - began
+        solvers += made
+    lines, kept = [], []
+    for i, solver in enumerate(solvers):
+        say(solver.name)
+        began = time.perf_counter()
+        try:
+            x = solver.positions()
+            first = time.perf_counter() - began + building.get(i, 0.0)
+            # What is compiled for the work that is timed must not be timed.
+            solver.integrate()
+        except Exception as failure:
+            # A peer that breaks here says nothing about the others.
+            if solver.ours:
+                raise
+            absent[solver.name] = f"failed: {type(failure).__name__}: {failure}".splitlines()[0]
+            continue
+        true = exact.single(task) if solver.members == 1 else exact.ensemble(task, solver.members)
+        error = _largest(x, true)
+        lines.append(Line(solver.name, solver.ours, solver.members, error, 0.0, first, solver.duration))
+        kept.append(solver)
+    seconds = _rounds(kept, 1 if quick else 7, say)
+    timed = [replace(line, speed=line.duration / best) for line, best in zip(lines, seconds, strict=True)]
+    return with_ratios(timed), absent
+
+
+def _largest(x: np.ndarray, true: np.ndarray) -> float:
+    """Return the largest deviation where there is a value to compare; NaN where a run was lost."""
+    wanted = np.ones(true.shape, bool)
+    if true.ndim == 2:
+        # An ensemble may be compared at some of the times only.
+        wanted &= ~np.isnan(x).all(axis=1, keepdims=True)
+    return float(np.abs(x - true)[wanted].max()) if wanted.any() else math.nan
+
+
+def _rounds(solvers: list[Entry], rounds: int, say: Say) -> list[float]:
+    """Return the best processor time of one call of each, s; all have their turn in each round."""
+    best = [math.inf] * len(solvers)
+    repeats = [1] * len(solvers)
+    for turn in range(rounds):
+        say(f"round {turn + 1} of {rounds}")
+        for i, solver in enumerate(solvers):
+            if turn >= 2 and best[i] > _SLOW:
+                continue
+            began = time.process_time()
+            for _ in range(repeats[i]):
+                solver.integrate()
+            best[i] = min(best[i], (time.process_time() - began) / repeats[i])
+            repeats[i] = max(1, min(1000, int(_SHORTEST / max(best[i], 1e-6))))
+    return best
+
+
+def with_ratios(lines: list[Line]) -> list[Line]:
+    """Return the lines with, for each peer, the fastest of ours of its kind that is at least as exact."""
+    return [line if line.ours or math.isnan(line.error) else _rated(line, lines) for line in lines]
+
+
+def _rated(line: Line, lines: list[Line]) -> Line:
+    single = line.members == 1
+    rivals = [o for o in lines if o.ours and (o.members == 1) == single and o.error <= line.error]
+    if not rivals:
+        return line
+    rival = max(rivals, key=lambda own: own.speed)
+    return replace(line, match=rival.solver, ratio=rival.speed / line.speed)

@@ -1,0 +1,92 @@
+"""Fixtures and settings shared by all tests."""
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+from hypothesis import settings
+from tests.hammers import CRUDE
+
+import printhammer as ph
+
+os.environ["MPLBACKEND"] = "Agg"
+
+# A job in the background ignores Ctrl-C, and so would every program that a test starts and interrupts.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Compilation makes first examples slow; the same examples on every run make a failure somebody else's too.
+settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)
+settings.register_profile("explore", deadline=None, max_examples=1000)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+
+
+# Long files, and those that compile laws of their own, begin first: the workers then end together. Two that
+# compile the same laws stand far apart, so that the second one finds the machine code.
+FIRST = [
+    "test_units",
+    "test_examples",
+    "test_docs",
+    "test_constant_flow_differences",
+    "test_orbits_closed_forms",
+    "test_impact_print_hammer",
+    "test_page_commands",
+    "test_fit_motion",
+    "test_fits",
+    "test_ensemble",
+    "test_sweep",
+    "test_burst",
+    "test_registry",
+    "test_tangent_finite_differences",
+    "test_results",
+    "test_report",
+    "test_motion",
+    "test_pulses",
+    "test_strobe",
+    "test_backstop",
+]
+
+
+# Six thousand tests and the compiler are a heap that the garbage collector would search over and over: a
+# quarter of the time.
+gc.set_threshold(50_000, 20, 20)
+
+
+def pytest_collection_finish() -> None:
+    """Take what stays anyway out of the collector's sight."""
+    gc.freeze()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile what most tests need once, before workers of their own do it side by side."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput") and not compiled():
+        subprocess.run([sys.executable, "-m", "printhammer", "warm", CRUDE], check=True, capture_output=True)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files in order: those named above, then the ones with most tests."""
+    count = Counter(item.path for item in items)
+    rank = {name: place for place, name in enumerate(FIRST)}
+    items.sort(key=lambda item: (rank.get(item.path.stem, len(FIRST)), -count[item.path]))
+
+
+def compiled() -> bool:
+    """Tell whether the machine code for the hammer of most tests is on disk."""
+    from printhammer.kernel.compile.specialise import is_ready, specialise
+    from printhammer.run.problem import laws_of
+
+    hammer = ph.load(CRUDE)
+    assert hammer.waveform is not None
+    return is_ready(specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).run)
+
+
+@pytest.fixture(scope="session")
+def hammer() -> "ph.Hammer":
+    """Return a hammer that stays as it is; frozen, so that all tests can share it."""
+    return ph.load(CRUDE)

@@ -1,0 +1,307 @@
+"""What the reconstruction found, as it ships with the package: base rates, search, family, schemes of 1983.
+
+Five JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
+All values are SI.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from printhammer.claims.definition import KINDS, claims
+from printhammer.errors import InputError
+from printhammer.report.reconstruction.shares import Share
+from printhammer.support.constants import shown
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
+
+_Count = Annotated[int, Field(ge=0)]
+_Some = Annotated[int, Field(ge=1)]
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _known(name: str) -> str:
+    if name not in claims():
+        raise ValueError("expected the name of a claim of the paper")
+    return name
+
+
+_ClaimName = Annotated[str, AfterValidator(_known)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class _Counted(_Table):
+    measured: _Count = Field(description="the number of hammers")
+    holds: _Count = Field(description="the number of those for which the claim holds")
+
+    @model_validator(mode="after")
+    def _possible(self) -> _Counted:
+        if self.holds > self.measured:
+            raise ValueError("expected no more hammers for which it holds than were measured")
+        return self
+
+
+class _Predicted(_Counted):
+    kind: Literal["stated", "typical", "shape"] = Field(description=f"one of {', '.join(KINDS)}")
+
+
+class _Panel(_Counted):
+    holds: _Count = Field(alias="as_printed", description="the number of those with the verdict of the paper")
+
+
+class BaseRates(_Table):
+    """How often each claim holds among random plausible hammers."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    hammers: _Some = Field(description="the number of random hammers")
+    seed: int = Field(description="the seed of the random hammers")
+    space: dict[str, Annotated[list[Any], Field(min_length=3, max_length=3)]] = Field(
+        description="for each constant its lowest and highest value and their unit"
+    )
+    claims: dict[_ClaimName, _Counted] = Field(description="for each claim how often it holds")
+    poincare_panels: dict[str, _Panel] = Field({}, description="for each panel of Fig. 11 the same")
+
+    def share(self, name: str) -> Share | None:
+        """Return how often a claim holds; None where that was not measured."""
+        return _share(self.claims.get(name))
+
+    @property
+    def panels(self) -> dict[str, Share]:
+        """How often each panel of Fig. 11 is as printed."""
+        shares = {name: _share(panel) for name, panel in self.poincare_panels.items()}
+        return {name: share for name, share in shares.items() if share is not None}
+
+
+class Predictions(_Table):
+    """Hammers found by searching on the stated claims alone, and the claims that did not steer."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    seed: int = Field(description="the seed of the search")
+    candidates: _Some = Field(description="the number of hammers tried")
+    hammers: _Count = Field(description="the number of hammers kept")
+    stated_held: list[_ClaimName] = Field(description="the stated claims that all of them satisfy")
+    claims: dict[_ClaimName, _Predicted] = Field(description="for each claim how often it holds")
+
+    def share(self, name: str) -> Share | None:
+        """Return for how many of the hammers a claim holds; None where that was not measured."""
+        return _share(self.claims.get(name))
+
+
+class Searched(_Table):
+    """One search, by what decides on it and how far it came."""
+
+    aim: Literal["stated", "all", "panels", "buzz", "claims"] = Field(description="the claims that led")
+    seed: int = Field(description="the seed of the search")
+    candidates: _Count = Field(description="the number of hammers tried")
+
+
+class BestFor(_Table):
+    """The hammer that comes closest to one claim."""
+
+    value: dict[str, Any] = Field(description="what was measured with it")
+    holds: bool = Field(description="whether the claim holds for it")
+    constants: dict[str, _Number] = Field(description="its constants by file key, SI")
+    costs: list[_ClaimName] = Field(description="the claims that it loses")
+
+
+class Failing(_Table):
+    """A claim that fails for the shipped hammer."""
+
+    value: dict[str, Any] = Field(description="what was measured with the shipped hammer")
+    why: str = Field(description="why it fails")
+    best: BestFor | None = Field(None, description="the best hammer for this claim")
+
+
+class Search(_Table):
+    """The searches that found the shipped hammer."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    shipped: str = Field(description="the fingerprint of the shipped hammer")
+    searches: list[Searched] = Field(min_length=1, description="each search, in the order of their logs")
+    core_hours: Annotated[_Number, Field(ge=0.0)] = Field(description="the hours of one core that they took")
+    tolerance: Annotated[_Number, Field(gt=0.0)] = Field(description="the tolerance of their runs")
+    waveform: str = Field(description="the shape of their waveforms")
+    gauge: str = Field(description="how the common scale of masses and forces was fixed")
+    failing: dict[_ClaimName, Failing] = Field(description="the claims that fail for the shipped hammer")
+
+
+class FamilyMember(_Table):
+    """One hammer of the family."""
+
+    name: str = Field(description="its name")
+    constants: dict[str, _Number] = Field(description="its constants by file key, SI")
+    verdicts: dict[_ClaimName, Literal["holds", "fails"]] = Field(description="its verdict on each claim")
+    panels: Annotated[int, Field(ge=0)] = Field(description="the number of panels of Fig. 11 as printed")
+    conclusions: dict[str, _Number | None] = Field(description="what follows for it, by name, SI")
+
+
+class Conclusion(_Table):
+    """What follows for all hammers of the family."""
+
+    low: _Number | None = Field(description="the lowest value in the family")
+    high: _Number | None = Field(description="the highest value in the family")
+    robust: bool = Field(description="whether it holds for all of them")
+    text: str = Field(description="a sentence about it")
+
+
+class Family(_Table):
+    """Clearly different hammers that satisfy the claims about as well as the shipped one."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    hammers: list[FamilyMember] = Field(min_length=1, description="the hammers")
+    conclusions: dict[str, Conclusion] = Field(description="what holds for all of them, and what does not")
+
+
+class FamilyPanels(_Table):
+    """Panels of Fig. 11 of one hammer of the family, of twelve."""
+
+    exact: _Count = Field(description="the number with the verdict of the paper, exactly")
+    computed: _Count = Field(description="the same as the Runge-Kutta method of 1983 computes them")
+    same: _Count = Field(description="the number whose two verdicts are the same")
+
+
+class Change(_Table):
+    """How often one way of computing gives another verdict on a panel than another way."""
+
+    first: str = Field(description="one way of computing")
+    second: str = Field(description="the other")
+    panels: _Some = Field(description="the number of panels")
+    differ: _Count = Field(description="the number of those with another verdict")
+    share: _Number = Field(description="their share")
+    share_error: _Number | None = Field(description="two standard errors of it, panels of a hammer as one")
+    periodic_to_strange: _Count = Field(description="periodic the first way, strange the second")
+    strange_to_periodic: _Count = Field(description="strange the first way, periodic the second")
+
+
+class Schemes(_Table):
+    """What the integrators of 1983 do to verdicts."""
+
+    format: Literal[1] = Field(description="1, the version of the format")
+    shipped: str = Field(description="the fingerprint of the hammer of panels and claims")
+    panels: dict[str, list[str]] = Field(description="for each way of computing the verdicts on Fig. 11")
+    claims: dict[_ClaimName, Literal["holds", "fails"]] = Field(
+        description="for each claim that a scheme can compute its verdict from the Runge-Kutta method of 1983"
+    )
+    family: dict[str, FamilyPanels] = Field(description="panels of Fig. 11 of each hammer of the family")
+    hammers: _Some = Field(description="the number of random hammers")
+    seed: int = Field(description="the seed of the random hammers")
+    changes: list[Change] = Field(description="how often verdicts change over their panels")
+
+
+FILES: Final[dict[str, type[_Table]]] = {
+    "base_rates": BaseRates,
+    "predictions": Predictions,
+    "search": Search,
+    "family": Family,
+    "schemes": Schemes,
+}
+"""Name of each file, less ".json", to what it holds."""
+
+_Model = TypeVar("_Model", bound=_Table)
+
+
+def _file(name: str, model: type[_Model], meaning: str) -> cached_property[_Model | None]:
+    def read(results: Results) -> _Model | None:
+        return results.read(name, model)
+
+    read.__doc__ = meaning
+    return cached_property(read)
+
+
+@dataclass(frozen=True)
+class Results:
+    """The results in a folder; each is None where its file is absent."""
+
+    folder: Path | Traversable
+    base_rates = _file("base_rates", BaseRates, "How often each claim holds among random plausible hammers.")
+    predictions = _file("predictions", Predictions, "What the search on the stated claims alone predicts.")
+    search = _file("search", Search, "The search that found the shipped hammer.")
+    family = _file("family", Family, "Different hammers for which the claims hold as well.")
+    schemes = _file("schemes", Schemes, "What the integrators of 1983 do to verdicts.")
+
+    def check(self) -> None:
+        """Read all files.
+
+        Raises
+        ------
+        InputError
+            A file is not what it should be.
+        """
+        for name in FILES:
+            getattr(self, name)
+
+    def read(self, name: str, model: type[_Model]) -> _Model | None:
+        """Read one of `FILES`; errors as for `check`."""
+        path = self.folder / f"{name}.json"
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "not UTF-8"
+            raise InputError(f"{path}: the file cannot be read ({reason})") from None
+        try:
+            document = json.loads(text, parse_constant=_refuse)
+        except ValueError as error:
+            raise InputError(f"{path}: expected JSON ({error})") from None
+        try:
+            return model.model_validate(document)
+        except ValidationError as error:
+            raise InputError(f"{path}: {_sentence(error, model)}") from None
+
+
+def shipped_results() -> Results:
+    """Return the results that ship with the package."""
+    return Results(files("printhammer").joinpath("report", "reconstruction", "data"))
+
+
+def results_in(folder: str | Path) -> Results:
+    """Return the results in a folder.
+
+    Raises
+    ------
+    InputError
+        There is no such folder.
+    """
+    path = Path(folder)
+    if not path.is_dir():
+        raise InputError(f"{path}: expected a folder with the results of a reconstruction")
+    return Results(path)
+
+
+def _share(counted: _Counted | None) -> Share | None:
+    return Share(counted.measured, counted.holds) if counted is not None and counted.measured else None
+
+
+def _refuse(text: str) -> None:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _sentence(error: ValidationError, model: type[_Table]) -> str:
+    """Tell the first fault: key, value and what was expected."""
+    fault = error.errors(include_url=False)[0]
+    steps = [step for step in fault["loc"] if step != "[key]"]
+    key = "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
+    if fault["type"] == "missing":
+        return f"{key} is missing"
+    if fault["type"] == "extra_forbidden":
+        place = f", expected one of {', '.join(model.model_fields)}" if len(steps) == 1 else ""
+        return f"the key {shown(key, quotes=False)} is not known{place}"
+    wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    wanted = wanted if wanted.startswith("expected") else f"expected {wanted}"
+    if fault["type"] == "model_type":
+        return f"expected an object for {key or 'the whole file'}"
+    if isinstance(fault["input"], dict | list):
+        return f"{key}: {wanted}"
+    return f"{key} = {shown(fault['input'])}: {wanted}"

@@ -1,0 +1,1 @@
+"""Studies made with the package; they stay in the repository and are no part of the wheel."""

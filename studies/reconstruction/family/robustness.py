@@ -1,0 +1,206 @@
+"""What holds for all hammers of a family, and what depends on constants that the paper did not print.
+
+A conclusion is robust if its values differ by less than a tenth of their median over the whole family, or if
+no member has it; a statement, if it is true of every member or of none. For a conclusion that is not robust,
+the rank correlations with the constants tell which of them decide. The family was chosen to differ, it is no
+random sample: ranges are those of its members, and correlations hold among them.
+"""
+
+from __future__ import annotations
+
+import math
+from statistics import median
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.claims.definition import claims
+from printhammer.claims.shapes import rank_correlation
+from printhammer.results import Declared, part
+from studies.reconstruction.family.conclusions import QUANTITIES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+Values = dict[str, Any]
+
+ROBUST: Final = 0.1  # Spread over median below which a conclusion is robust
+
+SIGNIFICANT: Final = 0.05  # Probability with which any constant would seem to decide a conclusion by chance
+
+_FEWEST: Final = 4
+_SCALING: Final = ("J", "N")
+
+
+class Statement(Declared):
+    """Something that the paper says in general, as a margin by which it is true of a hammer."""
+
+    text: str = part("the statement")
+    source: str = part("where the paper says it")
+    unit: str = part("SI unit of the margin")
+    margin: Callable[[Values], float] = part(
+        "conclusions of a hammer to the margin", more="the statement is true where it is positive"
+    )
+
+
+def _tolerated(name: str) -> float:
+    """Return a spread of flight times that the paper calls tolerable, s."""
+    return float(claims()["flight_time_spread"].settings[name])
+
+
+STATEMENTS: Final[dict[str, Statement]] = {
+    "prints_badly_before_chaos": Statement(
+        "the safe rate lies below the rate at which trains turn strange",
+        "abstract: interaction first shows as flight-time and print-force variations",
+        "Hz",
+        lambda known: 1.0 / known["chaos_onset_s"] - known["safe_rate_Hz"],
+    ),
+    "not_settled_at_1_kHz": Statement(
+        "at 1 kHz the armature is fired before it has settled",
+        "introduction: 1 kHz and faster only without waiting for complete settle-out",
+        "s",
+        lambda known: known["settle_out_s"] - 1e-3,
+    ),
+    "looks_settled_but_is_not": Statement(
+        "patterns print badly already at rates at which each firing finds the armature settled to the eye",
+        "single-shot response: the impression that the hammer is ready for another firing",
+        "Hz",
+        lambda known: 1.0 / known["settle_out_s"] - known["safe_rate_Hz"],
+    ),
+    "too_much_for_engraved_type": Statement(
+        "flight times of bursts spread by more than 30 us, what engraved characters tolerate",
+        "introduction: a few tens of microseconds",
+        "s",
+        lambda known: known["flight_time_spread_s"] - _tolerated("engraved_s"),
+    ),
+    "too_much_for_dot_matrix": Statement(
+        "flight times of bursts spread by more than 200 us, what dot-matrix printing tolerates",
+        "introduction: of the order of 200 us",
+        "s",
+        lambda known: known["flight_time_spread_s"] - _tolerated("dot_matrix_s"),
+    ),
+    "backstop_takes_more_than_pack": Statement(
+        "the backstop takes more energy of a dot than the pack",
+        "discussion: in the limit, only what the pack absorbs need be expended",
+        "J",
+        lambda known: known["backstop_loss_J"] - known["pack_loss_J"],
+    ),
+}
+"""What is asked of every member, by name."""
+
+
+def robustness(
+    conclusions: Sequence[Values], constants: Sequence[Mapping[str, float]]
+) -> dict[str, dict[str, Any]]:
+    """Return range, spread and robustness of every conclusion and statement.
+
+    Parameters
+    ----------
+    conclusions : sequence of dict
+        Of each member, as `Conclusions.as_dict` gives them.
+    constants : sequence of mapping
+        Of each member at the common gauge, key to value, SI.
+
+    Returns
+    -------
+    dict
+        By name of the conclusion or statement: `kind` ("quantity" or "statement"), `title`, `unit`, `known`
+        (number of members that have it), `low`, `high`, `median` (None where no member has it), `robust`,
+        and `text`, one sentence; of a quantity also `spread` (of the median) and `correlations` (constant to
+        rank correlation), of a statement `held` (number of members of which it is true) and `source`. The
+        values of a statement are its margins.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    for name, quantity in QUANTITIES.items():
+        values = [row[name] for row in conclusions]
+        rows[name] = {
+            "kind": "quantity",
+            "title": quantity.name,
+            "unit": quantity.unit,
+            **_quantity(values, constants, quantity.unit in _SCALING),
+        }
+    for name, statement in STATEMENTS.items():
+        rows[name] = {
+            "kind": "statement",
+            "title": statement.text,
+            "unit": statement.unit,
+            **_statement(statement, conclusions),
+        }
+    return rows
+
+
+def _range(values: Sequence[float]) -> dict[str, Any]:
+    return {
+        "known": len(values),
+        "low": min(values, default=None),
+        "high": max(values, default=None),
+        "median": median(values) if values else None,
+    }
+
+
+def _quantity(
+    values: Sequence[float | None], constants: Sequence[Mapping[str, float]], scaling: bool
+) -> dict[str, Any]:
+    rows = [i for i, value in enumerate(values) if value is not None]
+    known = [value for value in values if value is not None]
+    ends = _range(known)
+    spread = (ends["high"] - ends["low"]) / abs(ends["median"]) if ends["median"] else None
+    close = len(known) == len(values) and spread is not None and spread < ROBUST
+    robust = bool(values) and (close or not known)
+    correlations = {
+        key: correlation
+        for key in constants[0]
+        if (correlation := rank_correlation([constants[i][key] for i in rows], known)) is not None
+    }
+    decisive = list(decisive_constants(correlations, len(known)).items())[:3]
+    named = ", ".join(f"{key} (rank correlation {value:+.2f})" for key, value in decisive)
+    if not known:
+        text = "Robust: no member of the family has it."
+    elif robust:
+        text = f"Robust: within {spread:.1%} over the family."
+    else:
+        share = f"varies by {spread:.0%} of its median" if spread is not None else "varies"
+        deciding = f"most with {named}" if named else "no single constant decides"
+        missing = (
+            f" and {len(values) - len(known)} members do not have it" if len(known) < len(values) else ""
+        )
+        text = f"Depends on what the paper did not print: it {share}{missing}; {deciding}."
+    if scaling:
+        text += " It scales with the print force, which is the same for all members by choice."
+    return {**ends, "spread": spread, "robust": robust, "text": text, "correlations": correlations}
+
+
+def decisive_constants(correlations: Mapping[str, float], count: int) -> dict[str, float]:
+    """Return the rank correlations that are significant among all that were looked at, strongest first.
+
+    By Student's t of a rank correlation over `count` members, two-sided, each at the level `SIGNIFICANT`
+    over the number of constants (Bonferroni).
+    """
+    from scipy.stats import t as student
+
+    if count < _FEWEST or not correlations:
+        return {}
+    bound = float(student.isf(0.5 * SIGNIFICANT / len(correlations), count - 2))
+    least = bound / math.sqrt(count - 2 + bound * bound)
+    strong = {key: value for key, value in correlations.items() if abs(value) > least}
+    return dict(sorted(strong.items(), key=lambda item: -abs(item[1])))
+
+
+def _statement(statement: Statement, conclusions: Sequence[Values]) -> dict[str, Any]:
+    values = []
+    for row in conclusions:
+        try:
+            values.append(statement.margin(row))
+        except TypeError:
+            # One of the conclusions compared is None: the statement is not true of this member.
+            continue
+    held = sum(value > 0.0 for value in values)
+    count = len(conclusions)
+    robust = count > 0 and (held == count or (held == 0 and len(values) == count))
+    share = f"all {held} members" if held == count else f"{held} of {count} members" if held else "no member"
+    said = statement.text[:1].upper() + statement.text[1:]
+    return {
+        **_range(values),
+        "robust": robust,
+        "text": f"{said}: true of {share}.",
+        "held": held,
+        "source": statement.source,
+    }

@@ -1,0 +1,33 @@
+"""What hammers found on the stated claims alone say about the others, which did not steer: predictions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from printhammer.claims import claims
+from studies.reconstruction.judging.judged import FIGURE_11, STATED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+def predictions(rows: Sequence[dict[str, Any]], seed: int, candidates: int) -> dict[str, Any]:
+    """Count for how many hammers each claim of kind "shape" holds: what `predictions.json` holds.
+
+    Rows are judged candidates of a search on the stated claims alone; those count for which all stated claims
+    outside Fig. 11 hold. `seed` and `candidates` say which search it was and how many it tried.
+    """
+    kept = [row for row in rows if all(row["verdicts"].get(name) for name in STATED)]
+    counts: dict[str, dict[str, Any]] = {}
+    for name, claim in claims().items():
+        judged = [row["verdicts"][name] for row in kept if name in row["verdicts"]]
+        if claim.kind == "shape" or name == FIGURE_11:
+            counts[name] = {"kind": claim.kind, "measured": len(judged), "holds": sum(map(bool, judged))}
+    return {
+        "format": 1,
+        "seed": seed,
+        "candidates": candidates,
+        "hammers": len(kept),
+        "stated_held": list(STATED),
+        "claims": counts,
+    }

@@ -1,0 +1,162 @@
+"""Scores of many points: the stages one after the other, in as many processes as there are."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from itertools import repeat
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+from studies.reconstruction.search.buzz_losses import buzz
+from studies.reconstruction.search.candidates import candidates
+from studies.reconstruction.search.losses import Score, hung, pairs, single_pulse, statics
+from studies.reconstruction.search.map_losses import sensitivity
+from studies.reconstruction.search.panel_losses import panels
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from concurrent.futures import Executor
+
+    from printhammer.support.arrays import FloatArray
+    from studies.reconstruction.search.candidates import Candidate
+    from studies.reconstruction.search.space import Shape
+
+Aim = Literal["stated", "all", "panels", "buzz", "claims"]
+"""Which claims lead a search: those of kind "stated" alone; those of kind "shape" too; with these, a panel of
+Fig. 11 as much as a claim; with these, buzz printing before all; or all of these and what Figs. 8, 9 and 11
+look like."""
+
+AIMS: Final[tuple[Aim, ...]] = get_args(Aim)
+
+STATED: Final = {
+    "return_from_everywhere": 4.0,
+    "single_pulse_stroke": 2.0,
+    "two_pulses_660us": 6.0,
+    "two_pulses_700us": 15.0,
+    "second_dot_lost": 6.0,
+    "integrator_comparison": 4.0,
+    "poincare": 4.0,
+}
+SHAPE: Final = {
+    "release_margin": 1.0,
+    "settle_out": 1.0,
+    "low_restitution": 1.0,
+    "backstop_force_dominates": 1.0,
+    "poincare_window": 1.0,
+    "hang_up_at_high_rate": 0.5,
+    "weak_prints_when_hung_up": 1.0,
+}
+_FIRMER: Final = {name: 1.5 * weight for name, weight in SHAPE.items()}
+WEIGHTS: Final[dict[str, dict[str, float]]] = {
+    "stated": STATED,
+    "all": {**STATED, **SHAPE},
+    "panels": {**STATED, **_FIRMER, "poincare": 9.0},
+    "buzz": {**STATED, **_FIRMER, "poincare": 6.0, "buzz_printing": 8.0},
+    "claims": {
+        **STATED,
+        **_FIRMER,
+        "poincare": 9.0,
+        "buzz_printing": 3.0,
+        "successive_points_apart": 1.5,
+        "map_sensitivity": 1.5,
+    },
+}
+"""Weights of the losses: first come the stated claims outside Fig. 11, which are conditions of all else; a
+claim of kind "shape" counts for as much as three panels of Fig. 11, or two where the panels lead. Buzz
+printing counts for the two claims that are about it."""
+
+STEPS: Final[dict[Aim, float]] = {"stated": 0.0, "all": 0.0, "panels": 0.0, "buzz": 0.0, "claims": 0.4}
+"""What a claim that just fails counts, in parts of its weight: where the number of claims is to be large, two
+that nearly hold are worth less than one that does."""
+
+PIECE: Final = 64
+"""Points that one process looks at together."""
+
+_WORST_SINGLE: Final = 1.6
+_WORST_PAIRS: Final = 3.0
+_WORST_BUZZ: Final = 4.0
+_FEWEST_PANELS: Final = 5
+"""Panels of Fig. 11 as printed from which on a map is looked at."""
+
+
+@cache
+def losses_digest() -> str:
+    """Return a digest of the sources that decide on the losses, so that logs of different ones do not mix."""
+    digest = hashlib.sha256()
+    for name in ("space", "candidates", "losses", "buzz_losses", "panel_losses", "map_losses", "evaluation"):
+        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def evaluate(
+    points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle"
+) -> list[tuple[Candidate | None, Score]]:
+    """Score points, shares of the ranges of the variables, by the claims of an aim in this thread."""
+    weights = WEIGHTS[aim]
+    found = candidates(points, shape)
+    scores = [Score() for _ in points]
+    chosen = [i for i, candidate in enumerate(found) if candidate is not None]
+
+    def look(stage: Any) -> None:
+        stage([found[i] for i in chosen], [scores[i] for i in chosen])
+
+    def keep(limit: float, names: Sequence[str]) -> list[int]:
+        return [
+            i
+            for i in chosen
+            if sum(weights.get(name, 0.0) * scores[i].losses.get(name, 1.0) for name in names) < limit
+        ]
+
+    for i in chosen:
+        candidate = found[i]
+        assert candidate is not None
+        statics(candidate, scores[i])
+    look(single_pulse)
+    chosen = keep(
+        _WORST_SINGLE,
+        [
+            "return_from_everywhere",
+            "single_pulse_stroke",
+            "integrator_comparison",
+            "release_margin",
+            "settle_out",
+        ],
+    )
+    look(pairs)
+    chosen = keep(_WORST_PAIRS, ["two_pulses_660us", "two_pulses_700us", "second_dot_lost"])
+    if "buzz_printing" in weights:
+        look(buzz)
+        chosen = keep(_WORST_BUZZ, ["buzz_printing"])
+    look(panels)
+    if aim != "stated":
+        look(hung)
+    if "map_sensitivity" in weights:
+        chosen = [i for i in chosen if scores[i].measured["panels"] >= _FEWEST_PANELS]
+        look(sensitivity)
+    return list(zip(found, scores, strict=True))
+
+
+def rows(points: Sequence[FloatArray], aim: Aim, shape: Shape = "rectangle") -> list[dict[str, Any]]:
+    """Score points, each as a row of the log."""
+    found = []
+    for point, (candidate, score) in zip(points, evaluate(points, aim, shape), strict=True):
+        found.append(
+            {
+                "point": [float(share) for share in point],
+                "total": score.total(WEIGHTS[aim], STEPS[aim]),
+                "losses": {name: round(loss, 6) for name, loss in score.losses.items()},
+                "measured": score.measured,
+                "constants": None if candidate is None else candidate.constants,
+            }
+        )
+    return found
+
+
+def scored(
+    points: Sequence[FloatArray], aim: Aim, pool: Executor | None, shape: Shape = "rectangle"
+) -> list[dict[str, Any]]:
+    """Score points, each as a row of the log, in the order given, whatever the number of processes."""
+    pieces = [points[start : start + PIECE] for start in range(0, len(points), PIECE)]
+    pieced = map if pool is None else pool.map
+    return [row for piece in pieced(rows, pieces, repeat(aim), repeat(shape)) for row in piece]

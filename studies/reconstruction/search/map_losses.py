@@ -1,0 +1,58 @@
+"""How far candidates are from the frequency-time map of Figs. 8 and 9: erratic between two calm regions."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.claims.definition import claims
+from printhammer.claims.shapes import spread
+from printhammer.drive.trains import PulseTrain
+from printhammer.maps.frequency import TAIL
+from studies.reconstruction.search.losses import hinge, run_all
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from studies.reconstruction.search.candidates import Candidate
+    from studies.reconstruction.search.losses import Score
+
+_GRID: Final = 10.0
+"""Difference of neighbouring rates, Hz; the claim takes half of it."""
+
+_SPACING: Final = 20e-6
+"""Time between samples of a displacement record, s."""
+
+
+def sensitivity(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
+    """Look at how much more the record changes per hertz in the erratic band than in the slow one."""
+    settings = claims()["map_sensitivity"].settings
+    wanted = claims()["map_sensitivity"].band["erratic_over_low"]["at_least"]
+    onset = claims()["order_of_onset"].settings["flight_time_spread_s"]
+    for candidate, score in zip(chosen, scores, strict=True):
+        slower = np.arange(settings["first_rate_Hz"], score.measured["hang_up"], _GRID)
+        rates = np.stack([slower, slower + settings["rate_step_Hz"]], axis=1).ravel().tolist()
+        drives = [PulseTrain(candidate.waveform, rate=rate, pulses=settings["pulses"]) for rate in rates]
+        ends = np.repeat([drive.times[-1] + TAIL for drive in drives[::2]], 2)
+        times = np.arange(0.0, ends[0], _SPACING)
+        result = run_all([candidate], drives, ends.tolist(), len(drives), times=times, dots=True)
+        assert result.x is not None
+        assert result.dots is not None
+        changes = (np.diff(result.x.reshape(len(slower), 2, -1).astype(np.float64), axis=1)[:, 0]) ** 2
+        varies = np.array(
+            [
+                spread(flights[struck].tolist()) > onset if np.count_nonzero(struck) > 1 else False
+                for flights, struck in zip(result.dots.flight_time[::2], result.dots.struck[::2], strict=True)
+            ]
+        )
+        ratio = math.nan
+        if varies.any() and (slower < settings["low_rate_Hz"]).any():
+            low = float(np.nanmean(changes[slower < settings["low_rate_Hz"]]))
+            erratic = float(np.nanmean(changes[int(np.argmax(varies)) :]))
+            ratio = math.sqrt(erratic / low) if low > 0.0 else math.nan
+        score.losses["map_sensitivity"] = (
+            1.0 if ratio == 0.0 else hinge(math.log(wanted / ratio), math.log(wanted))
+        )
+        score.measured["sensitivity"] = None if math.isnan(ratio) else ratio

@@ -1,0 +1,220 @@
+"""The search: a wide sample, then evolution strategies from its best points, and steps over what is feasible.
+
+Everything follows from the seed. Each candidate is a line of the log, so that a search that was stopped goes
+on where it was: what the log holds is not computed again.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.errors import InputError, missing_extra
+from printhammer.hammer.hammer import load
+from printhammer.results import Declared, part
+from studies.reconstruction.search.evaluation import AIMS, WEIGHTS, Aim, losses_digest, scored
+from studies.reconstruction.search.explorer import Explorer
+from studies.reconstruction.search.log import Log, read_search
+from studies.reconstruction.search.space import SHAPES, VARIABLES, Shape, point_of, values_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from concurrent.futures import Executor
+    from pathlib import Path
+
+    from printhammer.support.arrays import FloatArray
+
+FORMAT: Final = 1
+SAMPLE: Final = 16384
+"""Points of the wide sample."""
+
+ISLANDS: Final = 4
+EXPLORED: Final = 64
+"""Points of each round that explore, beside those of the islands."""
+
+POPULATION: Final = 16
+SIGMA: Final = 0.08
+"""Largest first step length of an island, in shares of the ranges."""
+
+PATIENCE: Final = 30  # Generations without gain after which an island begins anew
+
+_SEEDS: Final = 200  # Best points known from which islands begin
+
+_FAVOUR: Final = 2.0
+_TOGETHER: Final = 128
+_GAIN: Final = 1e-3
+_APART: Final = 0.03
+STARTS: Final = 64
+"""Points taken over from another search."""
+
+
+class Plan(Declared):
+    """What decides on a search."""
+
+    aim: Aim = part("which claims lead, one of `AIMS`")
+    seed: int = part("of everything random")
+    sample: int = part("points of the wide sample", default=SAMPLE)
+    starts: tuple[tuple[float, ...], ...] = part(
+        "further points from which islands may begin, such as the best of another search", default=()
+    )
+    shape: Shape = part("waveform of the hammers", default="rectangle")
+
+    def heading(self) -> dict[str, Any]:
+        """Return the first line of the log."""
+        return {
+            "format": FORMAT,
+            "aim": self.aim,
+            "shape": self.shape,
+            "seed": self.seed,
+            "sample": self.sample,
+            "starts": [list(point) for point in self.starts],
+            "islands": ISLANDS,
+            "explored": EXPLORED,
+            "population": POPULATION,
+            "weights": WEIGHTS[self.aim],
+            "losses": losses_digest(),
+            "variables": [[v.name, v.low, v.high, v.logarithmic] for v in VARIABLES],
+        }
+
+
+def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
+    """Return the best points of another search for one with this aim, not next to each other.
+
+    Raises
+    ------
+    InputError
+        The file is not the log of a search, or a search on the stated claims would be led by others through
+        its starts.
+    """
+    from studies.reconstruction.judging.shortlist import shortlist
+
+    heading, rows = read_search(path)
+    if aim == "stated" and heading["aim"] != "stated":
+        raise InputError(f"{path}: aim = {heading['aim']!r}, expected the log of a search on stated claims")
+    return tuple(tuple(row["point"]) for row in shortlist(rows, count, _APART))
+
+
+def known_starts(aim: Aim) -> tuple[tuple[float, ...], ...]:
+    """Return the points of the shipped hammer and of its family.
+
+    Raises
+    ------
+    InputError
+        A search on the stated claims would be led by others through them.
+    """
+    from printhammer.report.reconstruction.results import shipped_results
+
+    if aim == "stated":
+        raise InputError("aim = 'stated', expected no start at hammers that other claims have led to")
+    family = shipped_results().family
+    shipped = {key: constant.si for key, constant in load("hendriks-1983").constants.items()}
+    constants = [shipped, *(member.constants for member in (family.hammers if family else ()))]
+    return tuple(tuple(np.clip(point_of(values_of(each)), 0.0, 1.0).tolist()) for each in constants)
+
+
+def search(
+    plan: Plan,
+    path: Path,
+    *,
+    pool: Executor | None = None,
+    tell: Callable[[int, float, dict[str, Any]], None] | None = None,
+) -> Iterator[dict[str, Any]]:
+    """Search without end; every candidate is yielded, as a row of the log, after it was noted.
+
+    A search begun in the log goes on. `tell` is called after each batch with the number of candidates, the
+    least total loss, and its row.
+
+    Raises
+    ------
+    InputError
+        The log is that of another search, or the package that searches is not installed.
+    """
+    from scipy.stats import qmc
+
+    _strategies()
+    log = Log(path, plan.heading())
+    place, best = 0, None
+
+    def batch(points: list[FloatArray]) -> list[dict[str, Any]]:
+        nonlocal place, best
+        there = log.known(place, points)
+        fresh = scored(points[len(there) :], plan.aim, pool, plan.shape) if len(there) < len(points) else []
+        log.append(fresh)
+        rows = [*there, *fresh]
+        place += len(rows)
+        for row in rows:
+            if best is None or row["total"] < best["total"]:
+                best = row
+        if tell is not None and best is not None:
+            tell(place, best["total"], best)
+        return rows
+
+    rng = np.random.default_rng([plan.seed, AIMS.index(plan.aim), SHAPES.index(plan.shape)])
+    start: list[dict[str, Any]] = []
+    points = [
+        *(np.array(point) for point in plan.starts),
+        *qmc.Sobol(len(VARIABLES), seed=rng).random(plan.sample),
+    ]
+    for first in range(0, len(points), _TOGETHER):
+        for row in batch(points[first : first + _TOGETHER]):
+            start.append(row)
+            yield row
+    start.sort(key=lambda row: row["total"])
+    explorer = Explorer(WEIGHTS[plan.aim], rng)
+    explorer.note(start)
+    islands = [_Island(start, rng) for _ in range(ISLANDS)]
+    while True:
+        asked = [point for island in islands for point in island.ask()]
+        rows = batch(asked + explorer.ask(EXPLORED))
+        yield from rows
+        explorer.note(rows)
+        for number, island in enumerate(islands):
+            own = rows[number * POPULATION : (number + 1) * POPULATION]
+            island.tell(own)
+            if island.done:
+                # What it found may be where another begins.
+                start.append(island.best)
+                start.sort(key=lambda row: row["total"])
+                islands[number] = _Island(start, rng)
+
+
+def _strategies() -> Any:
+    """Return the evolution strategy of the optional package."""
+    try:
+        from cmaes import CMA
+    except ImportError:
+        raise missing_extra("the search needs cmaes", "studies") from None
+    return CMA
+
+
+class _Island:
+    """One evolution strategy, from one of the best points known."""
+
+    def __init__(self, start: list[dict[str, Any]], rng: np.random.Generator) -> None:
+        # Good ones are taken more often.
+        pick = int(min(_SEEDS, len(start)) * rng.random() ** _FAVOUR)
+        self._strategy = _strategies()(
+            mean=np.clip(np.array(start[pick]["point"]), 0.02, 0.98),
+            sigma=SIGMA * 2.0 ** -rng.integers(4),
+            bounds=np.array([[0.0, 1.0]] * len(VARIABLES)),
+            seed=int(rng.integers(2**31)),
+            population_size=POPULATION,
+        )
+        self.best = start[pick]
+        self._least, self._since = np.inf, 0
+
+    def ask(self) -> list[FloatArray]:
+        return [self._strategy.ask() for _ in range(POPULATION)]
+
+    def tell(self, rows: list[dict[str, Any]]) -> None:
+        self._strategy.tell([(np.array(row["point"]), row["total"]) for row in rows])
+        best = min(rows, key=lambda row: float(row["total"]))
+        self._since = 0 if best["total"] < self._least - _GAIN else self._since + 1
+        if best["total"] < self._least:
+            self._least, self.best = best["total"], best
+
+    @property
+    def done(self) -> bool:
+        """Whether it gains no more."""
+        return self._since > PATIENCE or self._strategy.should_stop()

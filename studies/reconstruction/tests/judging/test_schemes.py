@@ -1,0 +1,58 @@
+"""How verdicts of two ways of computing are compared."""
+
+import math
+
+import pytest
+from studies.reconstruction.judging import schemes as module
+from studies.reconstruction.judging.schemes import EXACT, PAIRS, PLAIN, changes, named, schemes_json
+
+from printhammer.claims import schemes_1983 as claims_of_1983
+from printhammer.claims.schemes_1983 import COMPUTED
+from printhammer.claims.verdicts import printed_verdicts
+from printhammer.report.reconstruction.results import Schemes, shipped_results
+
+
+def test_changes_are_counted_with_panels_of_a_hammer_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {0: ["period-1"] * 12, 1: ["strange"] * 12}
+    other = {0: ["period-1"] * 6 + ["strange"] * 6, 1: ["strange"] * 12}
+    monkeypatch.setattr(module, "drawn_workable", lambda count, seed: list(range(count)))
+    monkeypatch.setattr(module, "hammer_of", lambda number: number)
+    monkeypatch.setattr(
+        module, "panel_verdicts", lambda which, way: (names if way == EXACT else other)[which]
+    )
+    told: list[tuple[int, int]] = []
+    rows = changes(2, 1, tell=lambda done, of: told.append((done, of)))
+    assert told == [(1, 2), (2, 2)]
+    assert [(row["first"], row["second"]) for row in rows] == [(named(a), named(b)) for a, b in PAIRS]
+    first = rows[0]
+    assert (first["panels"], first["differ"]) == (24, 6)
+    assert (first["periodic_to_strange"], first["strange_to_periodic"]) == (6, 0)
+    # Shares of the hammers: a half and none; the error of their mean is a quarter.
+    assert first["share"] == pytest.approx(0.25)
+    assert first["share_error"] == pytest.approx(2.0 * math.sqrt(0.125) / math.sqrt(2.0))
+    assert rows[-1]["differ"] == 0
+
+
+@pytest.mark.slow
+def test_what_ships_can_be_made_again_and_is_about_all_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    import printhammer as ph
+
+    monkeypatch.setattr(module, "family_hammers", list)
+    monkeypatch.setattr(module, "changes", lambda *_, **__: [])
+    # Those that take whole scans of rates are left out.
+    quick = [name for name in COMPUTED if name not in ("order_of_onset", "second_dot_lost")]
+    monkeypatch.setattr(claims_of_1983, "COMPUTED", quick)
+    hammer = ph.load("hendriks-1983")
+    made = Schemes.model_validate(schemes_json(hammer, 1, 1))
+    assert set(made.panels) == {named(way) for way in (EXACT, *PLAIN)}
+    assert list(made.claims) == quick
+    assert made.panels["exact"] != made.panels[named(PLAIN[1])]
+    assert all(len(names) == len(printed_verdicts()) for names in made.panels.values())
+    shipped = shipped_results().schemes
+    assert shipped is not None
+    assert shipped.shipped == hammer.fingerprint
+    assert list(shipped.panels) == list(made.panels)
+    # Last bits decide when a train that a scheme computes locks, so that only exact verdicts are the same.
+    assert sum(map(str.__eq__, made.panels["exact"], shipped.panels["exact"])) >= 11
+    assert {name: shipped.claims[name] for name in quick} == made.claims
+    assert set(shipped.claims) == set(COMPUTED)
