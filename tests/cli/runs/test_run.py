@@ -87,18 +87,13 @@ def test_a_run_that_stops_early_ends_with_status_1(cli, hammer: "ph.Hammer", tmp
 def test_files(cli, hammer: "ph.Hammer", tmp_path: Path) -> None:
     import pandas as pd
 
-    names = {
-        "csv": "m.csv",
-        "parquet": "m.parquet",
-        "dots": "dots.csv",
-        "contacts": "contacts.parquet",
-        "json": "m.json",
-        "plot": "m.svg",
-    }
-    options = [text for kind, name in names.items() for text in (f"--{kind}", tmp_path / name)]
+    names = {"dots": ["dots.csv"], "contacts": ["contacts.parquet"]}
+    names["out"] = ["m.csv", "m.parquet", "m.json", "m.svg"]
+    written = [(kind, name) for kind, many in names.items() for name in many]
+    options = [text for kind, name in written for text in (f"--{kind}", tmp_path / name)]
     outcome = cli("run", "--at", "0 us, 660 us", "--points", "101", *options)
     assert outcome.status == 0
-    assert {path.name for path in tmp_path.iterdir()} == set(names.values())
+    assert {path.name for path in tmp_path.iterdir()} == {name for _, name in written}
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform, at=[0.0, 660e-6]), points=101)
     record = pd.read_csv(tmp_path / "m.csv", comment="#")
     assert record["x [m]"].to_numpy() == pytest.approx(motion.x, rel=1e-15)
