@@ -1,5 +1,6 @@
 """The program of the study: help, examples, commands on the pages, bad options."""
 
+import os
 import re
 import shlex
 import subprocess
@@ -79,7 +80,7 @@ def test_the_commands_on_a_page_can_be_read(page: Path) -> None:
 @pytest.mark.parametrize("verb", [verb for verb in VERBS if verb.name not in ELSEWHERE], ids=lambda v: v.name)
 def test_the_example_in_the_help_runs(verb: Verb, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PYTHONPATH", str(ROOT), prepend=":")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)
     shell = verb.example.replace("python -m", f"{shlex.quote(sys.executable)} -m")
     done = subprocess.run(shell, shell=True, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -257,7 +257,8 @@ def test_a_family_needs_a_folder(cli: Callable) -> None:
 
 
 @pytest.mark.slow
-def test_ctrl_c_leaves_a_log_that_is_gone_on_with(tmp_path: Path) -> None:
+def test_ctrl_c_leaves_a_log_that_is_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]), prepend=os.pathsep)
     program = [sys.executable, "-m", "studies.reconstruction", "search", "all.jsonl", "--workers", "2"]
     log = tmp_path / "all.jsonl"
     run = subprocess.Popen(
