@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from tests.constant_maps import constant_map
 from tests.tangents import SHARP, arrive, richardson
 
 import printhammer as ph
-from printhammer.derivatives.constants import constant_map
 from printhammer.derivatives.dots import RUN_QUANTITIES, dot_values
 from printhammer.derivatives.parameters import parameters
 from printhammer.run.problem import Problem

@@ -1,6 +1,7 @@
 """Rooms: how the modules of the package are laid out in folders, and that no imports run in a circle."""
 
 import ast
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -121,6 +122,54 @@ def test_circles_are_found(edges: Graph, expected: list[set[str]]) -> None:
 )
 def test_all_kinds_of_imports_count(code: str, expected: set[str]) -> None:
     assert set(imported(ast.parse(code))) == expected
+
+
+STUB = PACKAGE / "__init__.pyi"
+ENTRIES = {"printhammer", "printhammer.__main__", "printhammer.cli.main"}
+ENTRIES |= {
+    f"printhammer.{name}" for name in re.findall(r"^from \.(\S+) import", STUB.read_text("utf-8"), re.M)
+}
+WORD = re.compile(r"\.?[a-z_][\w.]*")
+
+
+def packages_of(name: str) -> list[str]:
+    steps = name.split(".")
+    return [".".join(steps[:count]) for count in range(1, len(steps))]
+
+
+def named(name: str) -> set[str]:
+    """Return the modules named in texts, seen from the package of a module, folders of f-strings, or above.
+
+    A word alone is the name of a module there; with dots it may end in the name of a function.
+    """
+    path = MODULES[name]
+    text = path.read_text(encoding="utf-8")
+    home = name if path.stem == "__init__" else name.rpartition(".")[0]
+    if "walk_packages" in text:
+        return {module for module in MODULES if module.startswith(f"{home}.")}
+    words = {
+        node.value
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and WORD.fullmatch(node.value)
+    }
+    above = [*packages_of(home), home]
+    folders = {f"{base}.{word.strip('.')}" for base in above for word in words if word.endswith(".")}
+    near = {home, *(folders & set(MODULES))}
+    found = set(words)
+    for word in words:
+        found |= {f"{base}.{word}" for base in ({*near, *above} if "." in word else near)}
+    return {part for word in found for part in (word, word.rpartition(".")[0]) if part in MODULES} - {home}
+
+
+def test_every_module_is_reached_from_a_verb_or_a_public_name() -> None:
+    reached: set[str] = set()
+    waiting = list(ENTRIES)
+    while waiting:
+        name = waiting.pop()
+        if name not in reached:
+            reached.add(name)
+            waiting += {*graph()[name], *packages_of(name), *named(name)} - reached
+    assert set(MODULES) - reached == set()
 
 
 def test_the_graph_sees_imports() -> None:

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 from measured import MOTION, ROOT, Cell, Column, write
 from scipy.stats import beta
+from studies.recovery import true_value
 
 import printhammer as ph
-from printhammer.identify.bench.recovery import true_value
 from printhammer.identify.result import CONFIDENCE, student
 
 PAGE = ROOT / "docs" / "howto" / "fitting.md"

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
+from studies.recovery import Recovery, recover
 
 import printhammer as ph
-from printhammer.identify.bench.recovery import Recovery, recover
 
 SPREAD = 0.2
 """Range of the constants of random hammers about the shipped one, both ways."""
@@ -82,7 +82,7 @@ def main() -> None:
         Column(name="mean error in standard errors", format="+.2f"),
     ]
     settings = {"laboratories": options.labs, "random": options.random}
-    write("recovery", columns, table(found), settings, (*MOTION, "identify"))
+    write("recovery", columns, table(found), settings, (*MOTION, "identify", "studies/recovery"))
     print("\n".join(["", f"{len(failed)} of {options.labs} laboratories without a result", *failed]))
 
 

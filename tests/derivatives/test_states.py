@@ -13,7 +13,7 @@ from tests.tangents import scaled
 
 import printhammer as ph
 from printhammer.derivatives import states
-from printhammer.derivatives.states import standard_error, strobe_exponent, strobe_exponents, tangent_map
+from printhammer.derivatives.states import standard_error, strobe_exponent, tangent_map
 from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.kernel.model.modes import BACKSTOP, LOADING, UNLOADING
 
@@ -140,23 +140,6 @@ def _static_force(hammer: ph.Hammer, x: float, v: float) -> float:
     return magnet + spring + (c["backstop.stiffness"] - c["backstop.damping"] * v) * delta**1.5
 
 
-def test_the_number_of_threads_changes_nothing() -> None:
-    periods = [0.8e-3, 1.05e-3, 1.3e-3]
-    one, two = (
-        strobe_exponents(crude(), crude().waveform, periods, first=5, last=30, threads=n) for n in (1, 2)
-    )
-    seen = []
-    three = strobe_exponents(
-        [crude()] * 3, crude().waveform, periods, first=5, last=30, progress=lambda *p: seen.append(p)
-    )
-    for a, b, c, period in zip(one, two, three, periods, strict=True):
-        alone = strobe_exponent(crude(), crude().waveform, period, first=5, last=30)
-        for other in (b, c, alone):
-            np.testing.assert_array_equal(a.factors, other.factors)
-            assert (a.value, a.standard_error, a.period) == (other.value, other.standard_error, period)
-    assert seen[-1] == (3, 3)
-
-
 def test_a_run_that_does_not_get_there_says_so() -> None:
     push = ph.PulseTrain(Rectangle(amplitude=50.0, width=1.0, rise=0.0, decay=0.0, quantity="force"))
     mass = made_of(spring=hammers.preload(1.0))
@@ -211,7 +194,6 @@ def test_the_standard_error_of_an_autocorrelated_series() -> None:
         (lambda h: strobe_exponent(h, h.waveform, 1e-3, first=20, last=20), "numbers of firings"),
         (lambda h: strobe_exponent(h, h.waveform, 1e-3, first=0, last=20), "numbers of firings"),
         (lambda h: strobe_exponent(h, train(1e-3, 5), last=20), "at most 5"),
-        (lambda h: strobe_exponents([h, h], h.waveform, [1e-3], last=20), "2 are given, expected 1 or 1"),
     ],
 )
 def test_bad_arguments(call: object, told: str) -> None:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from studies.recovery import true_value
 from tests.hammers import CRUDE
 
 import printhammer as ph
-from printhammer.identify.bench.recovery import true_value
 
 HAMMER = ph.load(CRUDE)
 

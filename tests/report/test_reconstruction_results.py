@@ -8,12 +8,12 @@ from scipy.stats import binomtest
 from tests.report.reconstruction_files import changed, write
 
 from printhammer.errors import InputError
-from printhammer.report.reconstruction.results import FILES, results_in, shipped_results
+from printhammer.report.reconstruction.results import FILES, Results, shipped_results
 from printhammer.report.reconstruction.shares import Share
 
 
 def test_all_that_is_there_is_read(tmp_path: Path) -> None:
-    found = results_in(write(tmp_path))
+    found = Results(write(tmp_path))
     found.check()
     assert found.base_rates is not None
     assert found.base_rates.share("settle_out") == Share(900, 9)
@@ -34,7 +34,7 @@ def test_all_that_is_there_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", FILES)
 def test_what_is_absent_is_none(tmp_path: Path, name: str) -> None:
-    found = results_in(write(tmp_path, **{name: None}))
+    found = Results(write(tmp_path, **{name: None}))
     found.check()
     assert [key for key in FILES if getattr(found, key) is None] == [name]
 
@@ -79,7 +79,7 @@ def test_what_ships_can_be_read() -> None:
 def test_corrupt_files_are_told_in_one_sentence(tmp_path: Path, fault: dict[str, Any], told: str) -> None:
     (name,) = fault
     with pytest.raises(InputError, match=told) as error:
-        results_in(write(tmp_path, **fault)).check()
+        Results(write(tmp_path, **fault)).check()
     assert f"{name}.json: " in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -95,12 +95,7 @@ def test_corrupt_files_are_told_in_one_sentence(tmp_path: Path, fault: dict[str,
 def test_files_that_are_no_json(tmp_path: Path, content: bytes, told: str) -> None:
     (tmp_path / "search.json").write_bytes(content)
     with pytest.raises(InputError, match=f"search.json: .*{told}"):
-        results_in(tmp_path).check()
-
-
-def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="expected a folder"):
-        results_in(tmp_path / "none")
+        Results(tmp_path).check()
 
 
 @given(st.integers(1, 10**6).flatmap(lambda n: st.tuples(st.just(n), st.integers(0, n))))

@@ -15,7 +15,7 @@ from printhammer.report import build, pdf, write_report
 from printhammer.report.citations import cited_figures
 from printhammer.report.misses import distance, misses
 from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text
-from printhammer.report.reconstruction.results import Results, results_in
+from printhammer.report.reconstruction.results import Results
 
 if TYPE_CHECKING:
     import printhammer as ph
@@ -74,7 +74,7 @@ def results_of(hammer: "ph.Hammer", folder: Path, **changes: object) -> Results:
     place.mkdir(parents=True)
     search = {**reconstruction_files.SAMPLE["search"], "shipped": hammer.fingerprint}
     schemes = {**reconstruction_files.SAMPLE["schemes"], "shipped": hammer.fingerprint}
-    return results_in(reconstruction_files.write(place, **{"search": search, "schemes": schemes, **changes}))
+    return Results(reconstruction_files.write(place, **{"search": search, "schemes": schemes, **changes}))
 
 
 @pytest.fixture
@@ -200,9 +200,7 @@ def test_results_about_another_hammer_are_left_out(hammer: "ph.Hammer", tmp_path
 def test_without_results_the_report_says_so(hammer: "ph.Hammer", tmp_path: Path) -> None:
     empty = tmp_path / "results"
     empty.mkdir()
-    write_report(
-        hammer, tmp_path / "out", claims=CLAIMS, figures=[], reconstruction=results_in(empty), pdf=True
-    )
+    write_report(hammer, tmp_path / "out", claims=CLAIMS, figures=[], reconstruction=Results(empty), pdf=True)
     shown = Page((tmp_path / "out" / "index.html").read_text("utf-8"))
     assert "No results of a search for the constants ship with this version." in shown.text
     assert "No family of hammers ships with this version." in shown.text

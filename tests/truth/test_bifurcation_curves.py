@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.strobe_maps import strobe_map
 from tests.truth.damped_impacts import Array, DampedImpacts, newton
 
 import printhammer as ph
 from printhammer.chaos import BifurcationCurve, Branch
 from printhammer.chaos.continuation.fixed_points import MapValue
 from printhammer.chaos.curves.touches import ImpactSystem
-from printhammer.chaos.strobe.map import strobe_map
 from printhammer.errors import InputError
 from printhammer.run.regime import Regime
 

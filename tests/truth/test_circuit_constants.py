@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.circuit_tangents import changed, deviations
+from tests.constant_maps import constant_map
 from tests.truth.test_circuit import TIGHT
 from tests.truth.test_circuit_tangent import DRIVERS, PLAIN, TURN, WANTED, behind
 
 import printhammer as ph
-from printhammer.derivatives.constants import constant_map
 from printhammer.derivatives.states import tangent_map
 from printhammer.drive.waveforms.drivers import Rail
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests import hammers
+from tests.constant_maps import constant_map
 from tests.hammers import FRONT, MASS, STOP, THICKNESS, Draw, crude, idle, interpreted, made_of
 from tests.tangents import SHARP
 from tests.truth import oracles
 
 import printhammer as ph
-from printhammer.derivatives.constants import constant_map, flow, rest_columns
+from printhammer.derivatives.constants import flow, rest_columns
 from printhammer.derivatives.dots import DOT_QUANTITIES
 from printhammer.derivatives.parameters import parameters
 from printhammer.derivatives.states import tangent_map

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from tests.strobe_maps import strobe_map
 from tests.truth.damped_impacts import Array, newton
 
 import printhammer as ph
 from printhammer.chaos import BifurcationCurve, Branch
-from printhammer.chaos.strobe.map import strobe_map
 from printhammer.run.regime import Regime
 
 SIGN = {"fold": -1.0, "period doubling": 1.0}

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from tests.strobe_maps import strobe_map
 
 import printhammer as ph
-from printhammer.chaos.strobe.map import CURRENT, Image, strobe_map
+from printhammer.chaos.strobe.map import CURRENT, Image
 from printhammer.drive.waveforms.drivers import Capacitor, Rail
 from printhammer.run.regime import Regime
 

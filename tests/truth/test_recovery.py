@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2
+from studies.recovery import Recovery, measured_stiffness, recover, true_value
 from tests import hammers
 
 import printhammer as ph
-from printhammer.identify.bench.recovery import Recovery, measured_stiffness, recover, true_value
 from printhammer.identify.result import Fit
 from printhammer.identify.static.backstop import fit_backstop
 from printhammer.identify.static.magnet import fit_magnet

@@ -44,6 +44,3 @@ __all__ = [
     "two_pulses",
     "verdicts",
 ]
-
-Result = JudgedClaim
-"""Former name of `JudgedClaim`."""

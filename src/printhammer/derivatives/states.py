@@ -15,13 +15,11 @@ import numpy as np
 from printhammer.derivatives.flow import Flow, carry_columns
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.errors import InputError
-from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.layout import CAPACITANCE, TURN_RESISTANCE
 from printhammer.kernel.model.modes import HELD_UNLOADING, OK, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state, state_beyond
-from printhammer.support.threads import Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,6 +27,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
 _NODES: Final = 4096
@@ -288,60 +287,6 @@ def strobe_exponent(
         second_factors=growth[:, 1].copy(),
         states=followed.states[first - 1 - before :].copy(),
     )
-
-
-def strobe_exponents(
-    hammers: Hammer | Sequence[Hammer],
-    waveform: Waveform,
-    periods: npt.ArrayLike,
-    *,
-    first: int = 1,
-    last: int,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> list[Exponent]:
-    """Return the exponents of many trains, computed on all cores; see `strobe_exponent`.
-
-    Parameters
-    ----------
-    hammers : Hammer or sequence of Hammer
-        One for all trains, or one for each; all start from rest.
-    waveform : Waveform
-        What every firing does.
-    periods : array
-        Times between firings, s.
-    first, last, tolerance
-        As for `strobe_exponent`.
-    threads : int, optional
-        Number of threads; by default that of the cores.
-    progress : callable, optional
-        Called now and then with the number of trains that are done and their number.
-
-    Returns
-    -------
-    list of Exponent
-        One for each period; they do not depend on the number of threads.
-
-    Raises
-    ------
-    InputError
-        As for `strobe_exponent`, or numbers of hammers and periods that do not fit together.
-    """
-    spacings = np.atleast_1d(np.asarray(periods, dtype=np.float64))
-    many = [hammers] * len(spacings) if isinstance(hammers, Hammer) else list(hammers)
-    if len(many) != len(spacings):
-        raise InputError(f"hammers: {len(many)} are given, expected 1 or {len(spacings)}")
-    exponents: dict[int, Exponent] = {}
-
-    def work(begin: int, stop: int) -> None:
-        for i in range(begin, stop):
-            exponents[i] = strobe_exponent(
-                many[i], waveform, float(spacings[i]), first=first, last=last, tolerance=tolerance
-            )
-
-    in_threads([work], [len(many)], thread_count(threads), progress)
-    return [exponents[i] for i in range(len(many))]
 
 
 def standard_error(series: npt.ArrayLike) -> float:

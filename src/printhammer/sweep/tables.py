@@ -11,9 +11,6 @@ from printhammer.run.problem import LARGEST_TOLERANCE, LEAST_TOLERANCE, TOLERANC
 from printhammer.support.constants import shown
 from printhammer.sweep.quantities import ManyQuantities, OneQuantity
 
-FORMAT: Final = 1
-"""Version of the spec format."""
-
 Design = Literal["grid", "latin-hypercube"]
 Spacing = Literal["linear", "geometric"]
 

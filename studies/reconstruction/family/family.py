@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -25,7 +26,6 @@ from printhammer.report.reconstruction.results import (
     Family,
     FamilyMember,
     Results,
-    results_in,
     shipped_results,
 )
 from printhammer.run.ensemble import Ensemble
@@ -40,7 +40,6 @@ from studies.reconstruction.search.space import hammer_of, template
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
-    from pathlib import Path
 
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
@@ -70,7 +69,7 @@ def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
     InputError
         There is no table, or it is not one.
     """
-    results = shipped_results() if folder is None else results_in(folder)
+    results = shipped_results() if folder is None else Results(Path(folder))
     table = family_table(results)
     return [
         hammer_of(

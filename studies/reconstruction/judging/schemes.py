@@ -17,11 +17,11 @@ import numpy as np
 from printhammer.chaos import strobes
 from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
 from printhammer.claims import Context, claims, judge
-from printhammer.claims.schemes_1983 import judge_as_in_1983
 from printhammer.claims.verdicts import changed, printed_verdicts
 from printhammer.run.scheme_runs import READINGS, Reading
 from studies.reconstruction.family.family import family_hammers
 from studies.reconstruction.judging.base_rates import draw
+from studies.reconstruction.judging.claims_1983 import judge_as_in_1983
 from studies.reconstruction.search.space import hammer_of
 
 if TYPE_CHECKING:

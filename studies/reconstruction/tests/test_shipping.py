@@ -17,7 +17,7 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.claims import JudgedClaim, claims
-from printhammer.report.reconstruction.results import results_in
+from printhammer.report.reconstruction.results import Results
 
 FAILING = ("settle_out", FIGURE_11, "release_margin")
 
@@ -102,7 +102,7 @@ def test_what_the_report_tells_can_be_read(some_fail: None, tmp_path: Path) -> N
     )
     assert told == list(claims())
     (tmp_path / "search.json").write_text(json.dumps(table, allow_nan=False))
-    found = results_in(tmp_path).search
+    found = Results(tmp_path).search
     assert found is not None
     assert found.shipped == hammer.fingerprint
     assert [(one.aim, one.seed, one.candidates) for one in found.searches] == [

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.strobe_maps import strobe_map
 
 import printhammer as ph
 from printhammer.chaos import Branch, BranchEvent
@@ -14,7 +15,6 @@ from printhammer.chaos.continuation.branch_points import BranchPoint
 from printhammer.chaos.continuation.events import event_of
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, Touch
 from printhammer.chaos.continuation.regimes import InterruptedBranches
-from printhammer.chaos.strobe.map import strobe_map
 from printhammer.run.regime import Regime
 
 SLOW = 3e-3

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 import xarray as xr
 from tests.hammers import CRUDE
+from tests.strobe_maps import strobe_map
 
 import printhammer as ph
 from printhammer.chaos import Orbits, orbit
 from printhammer.chaos.orbits.orbit import KINDS
-from printhammer.chaos.strobe.map import strobe_map
 from printhammer.run.regime import Regime
 
 PERIOD = 1.3e-3

@@ -3,9 +3,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.strobe_maps import strobe_map
 
 import printhammer as ph
-from printhammer.chaos.strobe.map import strobe_map
 from printhammer.chaos.strobe.quiet import quiet_section
 from printhammer.run.regime import Regime
 

@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.hammers import CRUDE
+from tests.strobe_maps import strobe_map
 
 import printhammer as ph
-from printhammer.chaos.strobe.map import strobe_map, strobe_maps, strobe_slope
 from printhammer.run.regime import Regime
 
 PERIODS = (0.6e-3, 1.05e-3, 1.3e-3)
@@ -72,35 +72,10 @@ def test_the_derivative_is_that_of_neighbouring_images(hammer: ph.Hammer, period
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("name", ["period", "backstop.damping", "waveform.amplitude", "pack.front"])
-def test_the_slope_is_that_of_neighbouring_hammers(hammer: ph.Hammer, name: str) -> None:
-    regime = Regime.of(hammer, period=1.3e-3)
-    state, value = (60e-6, 0.2), regime.value(name)
-    scales = regime.window.half_widths
-    step = 3e-5 * value
-    ends = [strobe_map(regime.with_(name, value + sign * step), state).state for sign in (1.0, -1.0)]
-    expected = (ends[0] - ends[1]) / (2.0 * step)
-    found = strobe_slope(regime, name, state)
-    size = max(1.0, float(np.abs(expected * value / scales).max()))
-    np.testing.assert_allclose(found * value / scales, expected * value / scales, atol=1e-5 * size)
-
-
-def test_many_are_as_one_whatever_the_threads(hammer: ph.Hammer) -> None:
-    regimes = [Regime.of(hammer, period=period) for period in PERIODS for _ in range(2)]
-    states = np.column_stack([np.linspace(45e-6, 80e-6, 6), np.linspace(-0.3, 0.3, 6)])
-    seen: list[tuple[int, int]] = []
-    one = strobe_maps(regimes, states, threads=1, progress=lambda *at: seen.append(at))
-    two = strobe_maps(regimes, states, threads=2)
-    for regime, state, mine, other in zip(regimes, states, one, two, strict=True):
-        alone = strobe_map(regime, state)
-        for image in (mine, other):
-            assert np.array_equal(image.state, alone.state)
-            assert np.array_equal(image.jacobian, alone.jacobian)
-            assert image.contacts == alone.contacts
-            assert image.margin == alone.margin
-    assert seen[-1] == (6, 6)
-    bare = strobe_map(regimes[0], states[0], contacts=False)
-    assert np.array_equal(bare.state, one[0].state)
+def test_contacts_are_left_out_where_not_wanted(hammer: ph.Hammer) -> None:
+    regime, state = Regime.of(hammer, period=PERIODS[0]), (45e-6, -0.3)
+    bare = strobe_map(regime, state, contacts=False)
+    assert np.array_equal(bare.state, strobe_map(regime, state).state)
     assert bare.contacts == ()
     assert np.isnan(bare.margin)
 
@@ -142,29 +117,3 @@ def test_no_image_has_a_status(hammer: ph.Hammer) -> None:
     assert not inside.ok
     assert np.isnan(inside.state).all()
     assert np.isnan(inside.jacobian).all()
-
-
-@pytest.mark.parametrize(
-    ("state", "options", "said"),
-    [
-        ((1e-4,), {}, "state"),
-        ((1e-4, float("nan")), {}, "state"),
-        ((1e-4, 0.0), {"firings": 0}, "firings"),
-        ((1e-4, 0.0), {"phase": 1.0}, "phase"),
-        ((1e-4, 0.0), {"phase": -0.1}, "phase"),
-        ((1e-4, 0.0), {"tolerance": 0.0}, "tolerance"),
-    ],
-)
-def test_bad_input(hammer: ph.Hammer, state: tuple, options: dict, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
-        strobe_map(Regime.of(hammer, period=1e-3), state, **options)
-
-
-def test_bad_input_of_many(hammer: ph.Hammer) -> None:
-    regime = Regime.of(hammer, period=1e-3)
-    with pytest.raises(ph.InputError, match="states"):
-        strobe_maps(regime, [1e-4, 0.0])
-    with pytest.raises(ph.InputError, match="regimes: 1 are given, expected 1 or 2"):
-        strobe_maps([regime], [[1e-4, 0.0], [1e-4, 0.1]])
-    with pytest.raises(ph.InputError, match="not known"):
-        strobe_slope(regime, "backstop.colour", (1e-4, 0.0))

@@ -9,7 +9,7 @@ from printhammer.claims import claims
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.figures import PaperFigure
 from printhammer.report import build
-from printhammer.report.reconstruction.results import results_in
+from printhammer.report.reconstruction.results import Results
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def test_pdf(cli, tmp_path: Path) -> None:
 def test_corrupt_results_end_with_status_2(cli, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "base_rates.json").write_text('{"format": 2}')
-    monkeypatch.setattr(build, "shipped_results", lambda: results_in(tmp_path / "data"))
+    monkeypatch.setattr(build, "shipped_results", lambda: Results(tmp_path / "data"))
     outcome = cli("paper", "--out", tmp_path / "paper")
     assert outcome.status == 2
     assert outcome.err.startswith("printhammer: ")

@@ -19,23 +19,19 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.derivatives.states import follow
-from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
 from printhammer.run.ensemble import MODE_NAMES
-from printhammer.run.problem import Problem, Record, check_tolerance
-from printhammer.run.regime import Regime
+from printhammer.run.problem import Problem, Record
 from printhammer.run.start import initial_state
 from printhammer.run.supply import emf, linkage
-from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import numpy.typing as npt
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray
 
 MAP_TOLERANCE: Final = 1e-13
@@ -59,8 +55,6 @@ _STILL: Final = 1e-9
 """Speed, in units of the typical one, below which an extremum is found: its place is exact to the square."""
 STILL_COIL: Final = 1e-9
 """Current, or flux linkage of one, in units of the typical one, that counts as none."""
-_SPACING: Final = 1e-4
-"""Relative change of a constant by which a slope is taken."""
 
 
 class Image(Declared):
@@ -98,49 +92,6 @@ class Image(Declared):
         return self.status == _OK
 
 
-def strobe_map(
-    regime: Regime,
-    state: npt.ArrayLike,
-    *,
-    firings: int = 1,
-    phase: float | None = None,
-    tolerance: float = MAP_TOLERANCE,
-    contacts: bool = True,
-) -> Image:
-    """Return the image of a state under the strobe map, iterated, with its derivative.
-
-    The pulses fired before the start are under way at it, as in a train that has always been fired.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    state : array, shape (2,)
-        Displacement, m, and velocity, m/s, at a section.
-    firings : int, optional
-        Number of periods.
-    phase : float, optional
-        Instead of that of the regime.
-    tolerance : float, optional
-        Error allowed in one step of the run.
-    contacts : bool, optional
-        Whether to keep the contacts and the margin, which takes about a third of the time.
-
-    Returns
-    -------
-    Image
-        With a status; a run that could not go on, or a state where no force law holds, is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above.
-    """
-    regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
-    check_tolerance(tolerance)
-    return image_of(regime, read_state(state), count, tolerance, contacts=contacts)
-
-
 def read_state(state: npt.ArrayLike) -> FloatArray:
     """Read displacement, m, and velocity, m/s; InputError where it is not two finite numbers."""
     pair = np.asarray(state, dtype=np.float64)
@@ -149,103 +100,6 @@ def read_state(state: npt.ArrayLike) -> FloatArray:
             f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
         )
     return pair
-
-
-def strobe_maps(
-    regimes: Regime | Sequence[Regime],
-    states: npt.ArrayLike,
-    *,
-    firings: int = 1,
-    phase: float | None = None,
-    tolerance: float = MAP_TOLERANCE,
-    contacts: bool = True,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> list[Image]:
-    """Return the images of many states, computed on all cores; see `strobe_map`.
-
-    Parameters
-    ----------
-    regimes : Regime or sequence of Regime
-        One for all states, or one for each.
-    states : array, shape (M, 2)
-        Displacements, m, and velocities, m/s.
-    firings, phase, tolerance, contacts
-        As for `strobe_map`, for all.
-    threads, progress
-        As for `printhammer.chaos.strobes`.
-
-    Raises
-    ------
-    InputError
-        As for `strobe_map`, or numbers of regimes and states that do not fit together.
-    """
-    count = read_count(firings, "firings")
-    check_tolerance(tolerance)
-    rows = np.asarray(states, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != 2 or not np.isfinite(rows).all():
-        raise InputError(f"states: shape {rows.shape}, expected rows of two finite numbers")
-    many = [regimes] * len(rows) if isinstance(regimes, Regime) else list(regimes)
-    if len(many) != len(rows):
-        raise InputError(f"regimes: {len(many)} are given, expected 1 or {len(rows)}")
-    many = [Regime.of(regime, phase=phase) for regime in many]
-    return mapped(
-        lambda i: image_of(many[i], rows[i], count, tolerance, contacts=contacts),
-        range(len(rows)),
-        threads,
-        progress,
-    )
-
-
-def strobe_slope(
-    regime: Regime,
-    name: str,
-    state: npt.ArrayLike,
-    *,
-    firings: int = 1,
-    phase: float | None = None,
-    tolerance: float = MAP_TOLERANCE,
-) -> FloatArray:
-    """Return the derivative of the image of a state with respect to one constant, shape (2,), SI.
-
-    From the images at four neighbouring values, a difference of fourth order.
-
-    Parameters
-    ----------
-    regime : Regime
-        Hammer and periodic drive.
-    name : str
-        Of the constant, see `Regime.with_`.
-    state, firings, phase, tolerance
-        As for `strobe_map`.
-
-    Returns
-    -------
-    array
-        NaN where one of the four runs ended early.
-
-    Raises
-    ------
-    InputError
-        As for `strobe_map`, or there is no such constant.
-    """
-    value = regime.value(name)
-    spacing = _SPACING * abs(value) or _SPACING
-    near, far = (
-        [
-            strobe_map(
-                regime.with_(name, value + sign * k * spacing),
-                state,
-                firings=firings,
-                phase=phase,
-                tolerance=tolerance,
-                contacts=False,
-            ).state
-            for sign in (-1.0, 1.0)
-        ]
-        for k in (1.0, 2.0)
-    )
-    return np.asarray((8.0 * (near[1] - near[0]) - (far[1] - far[0])) / (12.0 * spacing))
 
 
 def image_of(

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 COLUMNS: Final = {"voltage": "V", "ambient": "degC", "rate": "Hz"}
 """Columns of a file of rates, and their SI units."""
 
-_CHANGE: Final = 1e-12
-_MOST: Final = 200
 _HIGHEST: Final = 1e4  # Above the hottest ambient temperature, K
 
 

@@ -1,1 +1,1 @@
-"""The synthetic laboratory: benches, sensors, recovery."""
+"""The synthetic laboratory: benches and sensors."""

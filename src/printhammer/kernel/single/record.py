@@ -21,8 +21,6 @@ from printhammer.kernel.compile.compiling import compiled
 from printhammer.kernel.model.layout import ELECTRIC
 from printhammer.kernel.model.modes import FREE
 
-CONTACT_WIDTH = 7
-
 Rows = Any
 
 

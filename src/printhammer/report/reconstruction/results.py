@@ -10,7 +10,6 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -22,6 +21,7 @@ from printhammer.support.constants import shown
 
 if TYPE_CHECKING:
     from importlib.resources.abc import Traversable
+    from pathlib import Path
 
 _Count = Annotated[int, Field(ge=0)]
 _Some = Annotated[int, Field(ge=1)]
@@ -264,20 +264,6 @@ class Results:
 def shipped_results() -> Results:
     """Return the results that ship with the package."""
     return Results(files("printhammer").joinpath("report", "reconstruction", "data"))
-
-
-def results_in(folder: str | Path) -> Results:
-    """Return the results in a folder.
-
-    Raises
-    ------
-    InputError
-        There is no such folder.
-    """
-    path = Path(folder)
-    if not path.is_dir():
-        raise InputError(f"{path}: expected a folder with the results of a reconstruction")
-    return Results(path)
 
 
 def _share(counted: _Counted | None) -> Share | None:

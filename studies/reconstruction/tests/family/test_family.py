@@ -13,7 +13,7 @@ from studies.reconstruction.search.space import hammer_of, template
 
 import printhammer as ph
 from printhammer.errors import InputError
-from printhammer.report.reconstruction.results import FamilyMember, results_in
+from printhammer.report.reconstruction.results import FamilyMember, Results
 from printhammer.units import to_si
 
 VARIED = ("waveform.rise", "waveform.decay", "backstop.damping", "backstop.stiffness")
@@ -207,7 +207,7 @@ def test_the_picture_has_a_dot_for_each_member_in_each_row(
     hammer: ph.Hammer, log: Path, tmp_path: Path, calls: list[str]
 ) -> None:
     members = write_family([log], tmp_path, least=2)
-    figure = family_picture(hammer, results_in(tmp_path))
+    figure = family_picture(hammer, Results(tmp_path))
     rows = {
         found.get_gid(): found.get_offsets()
         for ax in figure.findobj(lambda artist: hasattr(artist, "collections"))
@@ -217,6 +217,6 @@ def test_the_picture_has_a_dot_for_each_member_in_each_row(
     for key in VARIED:
         assert len(rows[key]) == len(members)
     with pytest.raises(InputError, match=r"the key 'magnet\.F0' is missing"):
-        family_picture(hammer.replace({"magnet": None}), results_in(tmp_path))
+        family_picture(hammer.replace({"magnet": None}), Results(tmp_path))
     with pytest.raises(InputError, match="the hammer does not print"):
-        family_picture(hammer.replace("waveform.amplitude", "0.01 A"), results_in(tmp_path))
+        family_picture(hammer.replace("waveform.amplitude", "0.01 A"), Results(tmp_path))

@@ -3,11 +3,11 @@
 import math
 
 import pytest
+from studies.reconstruction.judging import claims_1983 as claims_of_1983
 from studies.reconstruction.judging import schemes as module
+from studies.reconstruction.judging.claims_1983 import COMPUTED
 from studies.reconstruction.judging.schemes import EXACT, PAIRS, PLAIN, changes, named, schemes_json
 
-from printhammer.claims import schemes_1983 as claims_of_1983
-from printhammer.claims.schemes_1983 import COMPUTED
 from printhammer.claims.verdicts import printed_verdicts
 from printhammer.report.reconstruction.results import Schemes, shipped_results
 
