@@ -15,7 +15,7 @@ import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.bench.laboratory import SENSORS, measure
-from printhammer.identify.bench.sensor_settings import applicable
+from printhammer.identify.bench.sensor import applicable
 from printhammer.identify.shots.motion import fit_motion
 from printhammer.identify.static.backstop import Stiffness, fit_backstop
 from printhammer.identify.static.magnet import fit_magnet

@@ -31,8 +31,7 @@ def tolerance_yield(hammer: Hammer) -> Result:
 
 
 def damping_study(hammer: Hammer) -> Result:
-    from printhammer.printing.rates.damping import damping_study
-    from printhammer.printing.rates.materials import Material
+    from printhammer.printing.rates.damping import Material, damping_study
 
     tried = [Material("as it is", "as it is", {}), Material("hard", "none", {"backstop.stiffness": -1.0})]
     return damping_study(hammer, tried, first=600.0, last=700.0, step=100.0)
@@ -54,7 +53,7 @@ def table_report(hammer: Hammer) -> Result:
     from tests.control.table.by_hand import by_hand
 
     from printhammer.control.table.report import judge_table
-    from printhammer.printing.rates.perturbation import Perturbation
+    from printhammer.printing.rates.variability import Perturbation
 
     return judge_table(hammer, by_hand(hammer), rates=[900.0], perturbations=[Perturbation()])
 
@@ -62,9 +61,9 @@ def table_report(hammer: Hammer) -> Result:
 def learning(hammer: Hammer) -> Result:
     from tests.control.table.by_hand import by_hand
 
-    from printhammer.control.learning.result import Learning
+    from printhammer.control.learning.learn import Learning
     from printhammer.control.learning.sensor import ImpactSensor
-    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.judging import Limits
     from printhammer.printing.rates.variability import Variability
 
     off = np.array([[0.0, 0.2, np.nan], [0.01, 0.02, 0.0]])

@@ -43,7 +43,7 @@ def solvers(
     """Measure speed and error against a slow reference and other solvers, single runs and ensembles."""
     from benchmarks.solvers.entry import load_peers
     from benchmarks.solvers.run import run
-    from printhammer.support.outputs import write_file
+    from printhammer.support.files import write_file
 
     others = None if peers is None else load_peers(Path(peers))
     announce_compiling()

@@ -26,14 +26,14 @@ from studies.reconstruction.family.family import family_hammers
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.driver import driver_of
 from printhammer.control.feedback.estimator.sensor import PositionSensor
-from printhammer.printing.dots.limits import Limits
+from printhammer.control.feedback.plant import driver_of
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.strategy import Strategy, open_loop
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.page.page import Page
-from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest, safe_rate
+from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 FIRST, FINE = 500.0, 5.0

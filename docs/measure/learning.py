@@ -28,16 +28,15 @@ from measured import MOTION, Cell, Column, read, write
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.driver import driver_of
-from printhammer.control.learning.calibrate import calibrate
+from printhammer.control.feedback.plant import driver_of
 from printhammer.control.learning.law import LearningLaw
+from printhammer.control.learning.learn import calibrate
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.sensor import ImpactSensor
-from printhammer.control.table.drivers import DRIVERS, driven_by, with_pulse
-from printhammer.printing.dots.limits import Limits
+from printhammer.control.table.drive import DRIVERS, driven_by, with_pulse
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
-from printhammer.printing.dots.strategy import Strategy, open_loop
+from printhammer.printing.dots.strategy import LEAD_IN, Strategy, cycle_with_lead_in, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE

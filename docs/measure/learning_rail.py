@@ -12,12 +12,12 @@ import numpy as np
 from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
-from printhammer.control.learning.calibrate import calibrate
+from printhammer.control.learning.learn import calibrate
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.table.drive import LARGEST_CURRENT
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE

@@ -19,12 +19,11 @@ from measured import MOTION, Cell, Column, write
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.driver import driver_of
-from printhammer.control.learning.calibrate import calibrate
+from printhammer.control.feedback.plant import driver_of
+from printhammer.control.learning.learn import calibrate
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.sensor import ImpactSensor
-from printhammer.control.table.drive import COLUMNS
-from printhammer.control.table.drivers import driven_by, with_pulse
+from printhammer.control.table.drive import COLUMNS, driven_by, with_pulse
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import OpenLoop, Strategy
 from printhammer.printing.rates.variability import Variability

@@ -21,8 +21,8 @@ import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.report import PERTURBATIONS
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import SafeRate
+from printhammer.printing.rates.variability import Perturbation, perturbed
 
 OTHERS = (1, 5, 9, 13, 17)
 """Places of the five hammers in the family."""

@@ -18,9 +18,9 @@ from measured import MOTION, Cell, Column, read, write
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slots_of
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE

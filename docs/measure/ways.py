@@ -17,7 +17,7 @@ import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.comparison import Feedback
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.driver import driver_of
+from printhammer.control.feedback.plant import driver_of
 from printhammer.printing.dots.strategy import Strategy, open_loop
 from printhammer.printing.page.page import Page
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
 from printhammer.cli.screen import Column, table
-from printhammer.cli.units import Units
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -310,7 +310,7 @@ def ship(
 ) -> Answer:
     """Write the best judged candidate as a hammer file, and for each claim that fails the best for it."""
     from printhammer.claims import claims
-    from printhammer.support.outputs import check_outputs, make_folder, write_file
+    from printhammer.support.files import check_outputs, make_folder, write_file
     from studies.reconstruction.judging.log import read_judged
     from studies.reconstruction.search.log import read_search
     from studies.reconstruction.shipping import best_of, search_json, shipped_hammer

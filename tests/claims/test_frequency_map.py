@@ -5,8 +5,7 @@ import pytest
 
 import printhammer as ph
 from printhammer.claims import Context, NotMeasurableError, claims, judge
-from printhammer.claims.bursts import _exceeds, onsets, spreads
-from printhammer.claims.frequency_map import sensitivity
+from printhammer.claims.bursts import _exceeds, onsets, sensitivity, spreads
 
 
 def test_the_change_per_hertz_is_that_of_two_records(context: Context) -> None:

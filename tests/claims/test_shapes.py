@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import spearmanr
 
-from printhammer.claims.shapes import falling, largest, rank_correlation
-from printhammer.claims.two_pulses import half_rise
+from printhammer.claims.judging import falling, largest, rank_correlation
+from printhammer.claims.pulses import half_rise
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from printhammer.cli.units import Units, shown, with_unit
+from printhammer.cli.options import Units, shown, with_unit
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,7 @@ import re
 
 import pytest
 
-from printhammer.cli.progress import counting, pace_of, telling
-from printhammer.cli.terminal import say
+from printhammer.cli.terminal import counting, pace_of, say, telling
 
 
 @pytest.fixture

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from printhammer.cli.options import files
+from printhammer.cli.options import Units, files
 from printhammer.cli.runner import PICTURES, Answer, Content, Job, check_endings
 from printhammer.cli.screen import Column, table
-from printhammer.cli.units import Units
 from printhammer.errors import InputError
 
 

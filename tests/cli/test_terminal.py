@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from printhammer.cli.main import main
+from printhammer.cli.options import Units
 from printhammer.cli.screen import Column, facts, table
-from printhammer.cli.units import Units
 
 COLUMNS: tuple[Column[float], ...] = (
     Column("dot", int),

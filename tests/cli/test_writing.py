@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from printhammer.errors import InputError
-from printhammer.report.publish import check_place
+from printhammer.report.build import check_place
 
 THERE = "expected a new file, this one is there; --force writes over it"
 

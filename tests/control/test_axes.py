@@ -13,7 +13,7 @@ from printhammer.control.axes import AxisTables, tune_along
 from printhammer.control.table.compensation import JUMP
 from printhammer.control.table.drive import COLUMNS
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.rates.perturbation import Perturbation, perturbed
+from printhammer.printing.rates.variability import Perturbation, perturbed
 
 RATE = 1275.0
 GAPS = ("-10 um", "0 um", "10 um")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.control.dead_time.table import DeadTime
-from printhammer.control.widths import of_width
+from printhammer.control.dead_time import DeadTime
+from printhammer.control.pulses import of_width
 from printhammer.run.contacts import Dot
 
 RAILS, WARM = ["34 V", "38 V", "42 V"], ["20 degC", "90 degC"]

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.drive.batch import firings_of, joined
-from printhammer.drive.ragged import Ragged
+from printhammer.drive.batch import Ragged, firings_of, joined
 from printhammer.drive.waveforms.shapes import HalfSine, Sine
 
 PULSE = HalfSine(amplitude=1.0, width=3e-4)

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 
 import printhammer as ph
 from printhammer.figures import FIGURES
-from printhammer.figures.motion import plot
+from printhammer.figures.paper.motion import plot
 from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain, delayed_train, longest_run
 
 OPPOSITE = {"µm": ("10⁻³ in", 25.4), "N": ("lbf", 4.4482216152605), "m/s": ("in/s", 0.0254)}

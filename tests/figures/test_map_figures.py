@@ -13,8 +13,7 @@ from matplotlib.lines import Line2D
 import printhammer as ph
 from printhammer.figures import FIGURES, save
 from printhammer.figures.elements.map_marks import edges
-from printhammer.figures.map_comparison import compare_maps
-from printhammer.figures.paper.surface import thinned
+from printhammer.figures.paper.maps import compare_maps, thinned
 
 RATES = np.linspace(500.0, 2300.0, 37)
 

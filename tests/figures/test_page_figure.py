@@ -11,9 +11,18 @@ from matplotlib.figure import Figure
 
 import printhammer as ph
 from printhammer.drive.trains import Drive
-from printhammer.figures.elements import ink
-from printhammer.figures.elements.ink import INK, PAPER, Sheet, coloured, inked
-from printhammer.figures.printing.page import summary, whole_sheet, zoom_slots, zoomed_sheet
+from printhammer.figures import page as drawn
+from printhammer.figures.page import (
+    INK,
+    PAPER,
+    Sheet,
+    coloured,
+    inked,
+    summary,
+    whole_sheet,
+    zoom_slots,
+    zoomed_sheet,
+)
 from printhammer.printing.dots.strategy import open_loop
 from printhammer.printing.page.page import Page, print_page
 from printhammer.printing.page.pattern import Pattern
@@ -71,13 +80,13 @@ def test_densities_add_and_what_is_off_the_sheet_is_left_out(monkeypatch: pytest
     np.testing.assert_allclose(wide[100:200, 100:300], whole, atol=1e-9)
     far = inked(sheet, across + 1.0, down, density, 0.35 * MM, 0.02 * MM)
     assert not far.any()
-    monkeypatch.setattr(ink, "_TOGETHER", 1)
+    monkeypatch.setattr(drawn, "_TOGETHER", 1)
     np.testing.assert_allclose(inked(sheet, across, down, density, 0.35 * MM, 0.02 * MM), whole, atol=1e-12)
 
 
 def test_a_large_sheet_is_drawn_more_coarsely() -> None:
     size, rows, columns = Sheet(0.0, 10.0, 0.0, 10.0).pixels(1e-6)
-    assert rows * columns <= 1.01 * ink.MOST_PIXELS
+    assert rows * columns <= 1.01 * drawn.MOST_PIXELS
     assert rows * size == pytest.approx(10.0, rel=1e-3)
 
 

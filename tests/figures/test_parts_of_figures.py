@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from printhammer.figures.elements.curves import fired, places, settled_at, shown_until, times_of
-from printhammer.figures.elements.room import freest
+from printhammer.figures.elements.marks import freest
 from printhammer.figures.elements.scales import scale
 
 if TYPE_CHECKING:

@@ -8,12 +8,10 @@ import pytest
 from matplotlib.figure import Figure
 
 import printhammer as ph
-from printhammer.figures.printing.quality import plot_safe_rate
-from printhammer.printing.dots.judging import FAULTS
-from printhammer.printing.dots.limits import Limits
+from printhammer.figures.quality import plot_safe_rate
+from printhammer.printing.dots.judging import FAULTS, Limits
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.rates.damping import DampingStudy
-from printhammer.printing.rates.materials import Material
+from printhammer.printing.rates.damping import DampingStudy, Material
 from printhammer.printing.rates.quality import Quality
 from printhammer.printing.rates.safe_rate import SafeRate
 from printhammer.printing.rates.tolerance import ToleranceYield

@@ -11,8 +11,7 @@ from tests import hammers
 
 import printhammer as ph
 from printhammer.identify.bench.laboratory import KINDS, SENSORS, SI, UNITS
-from printhammer.identify.bench.sensor import Amount, Channel, Sensor, wrong_rows
-from printhammer.identify.bench.sensor_settings import by_quantity
+from printhammer.identify.bench.sensor import Amount, Channel, Sensor, by_quantity, wrong_rows
 from printhammer.identify.tables import read_table
 
 HAMMER = hammers.crude()

@@ -13,7 +13,7 @@ import pytest
 from IPython.core.formatters import DisplayFormatter
 
 import printhammer as ph
-from printhammer.results.notebook import MOST_ROWS
+from printhammer.results.declare import MOST_ROWS
 from printhammer.results.rows import Rows
 from printhammer.run.contacts import Contact, Dot
 

@@ -11,8 +11,8 @@ from tests.hammers import interpreted
 import printhammer as ph
 from printhammer.chaos import strobes
 from printhammer.chaos.bifurcation.columns import run_columns
-from printhammer.chaos.strobe.handing import FROM_REST
-from printhammer.cli.units import Units
+from printhammer.chaos.strobe.train import FROM_REST
+from printhammer.cli.options import Units
 from printhammer.cli.verbs.chaos.strobe import summary
 from printhammer.control.least_work.burst import least_work
 from printhammer.drive.waveforms.drivers import Capacitor, Chopper, Rail

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from printhammer.errors import InputError
-from printhammer.support.outputs import check_outputs, make_folder, write_file
+from printhammer.support.files import check_outputs, make_folder, write_file
 
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """Works that ask: together, translated, answered."""
 
-from printhammer.support.works import Work, answered, together, translated
+from printhammer.support.threads import Work, answered, together, translated
 
 ASKED: list[list[int]] = []
 

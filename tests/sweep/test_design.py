@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from printhammer.sweep.design import Blocks, between, latin_hypercube
+from printhammer.sweep.plan import Blocks, between, latin_hypercube
 
 shapes = st.lists(st.integers(1, 7), min_size=1, max_size=4)
 

@@ -15,7 +15,7 @@ from tests.truth.damped_impacts import Array, DampedImpacts, newton
 import printhammer as ph
 from printhammer.chaos import BifurcationCurve, Branch
 from printhammer.chaos.continuation.fixed_points import MapValue
-from printhammer.chaos.curves.touches import ImpactSystem
+from printhammer.chaos.curves.systems import ImpactSystem
 from printhammer.errors import InputError
 from printhammer.run.regime import Regime
 

@@ -8,7 +8,7 @@ from tests import hammers
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Waveform
-from printhammer.run.energy.coil_work import coil_power, squared_current
+from printhammer.run.energy import coil_power, squared_current
 
 
 def burst() -> ph.PulseTrain:

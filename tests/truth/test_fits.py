@@ -9,10 +9,9 @@ from tests import measurements as lab
 from tests.measurements import write
 
 from printhammer.identify.result import Fit
-from printhammer.identify.static.backstop import RATIO, Stiffness, fit_backstop
+from printhammer.identify.static.backstop import RATIO, Stiffness, fit_backstop, rebound
 from printhammer.identify.static.magnet import fit_magnet
 from printhammer.identify.static.pack import fit_pack
-from printhammer.identify.static.restitution import rebound
 from printhammer.identify.static.spring import fit_spring
 
 FIVE = {

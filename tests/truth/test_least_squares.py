@@ -7,7 +7,7 @@ import pytest
 
 from printhammer.identify.least_squares import sandwich, variance_of
 from printhammer.identify.result import FittedConstant, student
-from printhammer.identify.static.checks import runs_p_value
+from printhammer.identify.static.assemble import runs_p_value
 
 
 def test_the_sandwich_of_a_mean() -> None:

@@ -9,13 +9,13 @@ from tests import hammers
 
 import printhammer as ph
 from printhammer.control.least_work.bound import bound
-from printhammer.control.least_work.coil_force import CoilForce
+from printhammer.control.least_work.slot import CoilForce
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.parts.spring.linear import LinearSpring
 from printhammer.printing.dots.nominal import nominal
-from printhammer.run.energy.coil_work import coil_power
+from printhammer.run.energy import coil_power
 
 
 @pytest.mark.parametrize("softer", [1.0, 2.0])

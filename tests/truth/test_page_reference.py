@@ -6,7 +6,7 @@ from tests.hammers import CRUDE, TRUTH
 from tests.oracle.integrator import reference
 
 import printhammer as ph
-from printhammer.printing.dots.slots import FIRST_SLOT
+from printhammer.printing.dots.strategy import FIRST_SLOT
 from printhammer.printing.page.page import Page, print_page
 from printhammer.printing.page.pattern import Pattern
 

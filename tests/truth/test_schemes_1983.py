@@ -7,7 +7,7 @@ import pytest
 from tests.truth.plain_schemes import constants_of, strobed
 
 import printhammer as ph
-from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
+from printhammer.chaos.strobe.points import SCHEMES, scheme_strobes
 from printhammer.chaos.strobe.verdict import repeats
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.run.scheme_runs import READINGS, Reading, Scheme

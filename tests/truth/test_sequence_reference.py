@@ -14,7 +14,7 @@ import printhammer as ph
 from printhammer.derivatives.parameters import parameter_names
 from printhammer.drive.waveforms.shapes import Chain, HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.run.fired import closed_form
+from printhammer.run.ensemble_group import closed_form
 
 BOUND = 1e-8
 """Largest error at the default tolerance before the horizon, of the stroke."""

@@ -6,7 +6,7 @@ from tests.hammers import crude
 from tests.oracle.integrator import reference
 
 import printhammer as ph
-from printhammer.printing.dots.slots import slot_times
+from printhammer.printing.dots.strategy import slot_times
 
 
 @pytest.mark.slow

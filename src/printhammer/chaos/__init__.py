@@ -1,26 +1,21 @@
 """Nonsmooth dynamics of trains: stroboscopic maps, orbits, continuation, exponents, diagrams, basins."""
 
-from printhammer.chaos.basins.basins import Basins, basins
-from printhammer.chaos.basins.entropy import BasinEntropy, basin_entropy
+from printhammer.chaos.basins.basins import BasinEntropy, Basins, basin_entropy, basins
 from printhammer.chaos.basins.quench import QuenchMap, quench_map
 from printhammer.chaos.bifurcation.bifurcation import bifurcation
 from printhammer.chaos.bifurcation.diagram import Bifurcation
-from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.branch import Branch, BranchEvent
 from printhammer.chaos.continuation.continuation import continuation
-from printhammer.chaos.continuation.events import BranchEvent
 from printhammer.chaos.continuation.regimes import Branches, regimes
-from printhammer.chaos.curves.bifurcation_curve import bifurcation_curve
+from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve, bifurcation_curve
 from printhammer.chaos.curves.codimension import CodimensionTwo
-from printhammer.chaos.curves.curve import BifurcationCurve
 from printhammer.chaos.curves.stability_chart import StabilityChart, stability_chart
-from printhammer.chaos.exponents.chart import LyapunovChart, lyapunovs
+from printhammer.chaos.exponents.chart import FiniteTime, LyapunovChart, finite_time, lyapunovs
 from printhammer.chaos.exponents.correlation import CorrelationDimension, correlation_dimension
-from printhammer.chaos.exponents.finite_time import FiniteTime, finite_time
 from printhammer.chaos.exponents.lyapunov import Lyapunov, lyapunov
 from printhammer.chaos.exponents.recurrence import Recurrence, recurrence
 from printhammer.chaos.exponents.zero_one import ZeroOne, zero_one
-from printhammer.chaos.impacts.sections import Section, section, sections
-from printhammer.chaos.impacts.train import ImpactTrain, impact_train
+from printhammer.chaos.impacts import ImpactTrain, Section, impact_train, section, sections
 from printhammer.chaos.orbits.collection import Orbits
 from printhammer.chaos.orbits.manifolds import Manifolds, manifolds
 from printhammer.chaos.orbits.orbit import Orbit

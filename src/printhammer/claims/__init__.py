@@ -3,22 +3,12 @@
 `claims.toml` puts each into numbers; one module for each family measures them; `judge_all` compares.
 """
 
-from printhammer.claims import (
-    bursts,
-    buzz,
-    elastomer,
-    frequency_map,
-    integrators,
-    single_pulse,
-    statics,
-    strobes,
-    two_pulses,
-    verdicts,
-)
-from printhammer.claims.buzz import buzz_search
+from printhammer.claims import bursts, integrators, statics, strobes, verdicts
+from printhammer.claims import pulses as pulses
 from printhammer.claims.context import Context, NotMeasurableError
 from printhammer.claims.definition import KINDS, Claim, claims
 from printhammer.claims.judging import JUDGES, PENDING, JudgedClaim, Measured, judge, judge_all
+from printhammer.claims.pulses import buzz_search
 
 __all__ = [
     "JUDGES",
@@ -30,17 +20,13 @@ __all__ = [
     "Measured",
     "NotMeasurableError",
     "bursts",
-    "buzz",
     "buzz_search",
     "claims",
-    "elastomer",
-    "frequency_map",
     "integrators",
     "judge",
     "judge_all",
-    "single_pulse",
+    "pulses",
     "statics",
     "strobes",
-    "two_pulses",
     "verdicts",
 ]

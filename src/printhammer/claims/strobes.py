@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.claims.definition import Claim, claims
-from printhammer.claims.judging import WHOLE, Measured, measures
-from printhammer.claims.shapes import rank_correlation
+from printhammer.claims.judging import WHOLE, Measured, measures, rank_correlation
 from printhammer.claims.verdicts import panel_name, printed_verdicts
 
 if TYPE_CHECKING:

@@ -4,11 +4,14 @@ A verb is a function of its options, and of a `Job` where it asks for one, decla
 reads the options, checks before any work that every file can be written and writes over none, loads the
 hammer, and has compiling announced; the verb computes and returns an `Answer`; the runner shows it, writes
 the files, complains, and sets the exit status.
+
+How the verbs of chaos are told what is fired for ever: by period or rate, or by a drive file.
 """
 
 from __future__ import annotations
 
 import inspect
+import math
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +20,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from rich.markup import escape
 
-from printhammer.cli import progress
+from printhammer.cli import options as opt
+from printhammer.cli import terminal
 from printhammer.cli.options import FORCE, PART, Files, Option
 from printhammer.cli.screen import heading
 from printhammer.cli.terminal import complain, console, say, warn
@@ -25,10 +29,12 @@ from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from rich.console import RenderableType
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.run.regime import Firing
 
 Shown = TypeVar("Shown")
 
@@ -52,7 +58,7 @@ class Content:
     @classmethod
     def text(cls, content: Callable[[], str]) -> Content:
         """Return content that is a text, made when it is written."""
-        from printhammer.support.outputs import write_file
+        from printhammer.support.files import write_file
 
         return cls(lambda path: write_file(path, content()))
 
@@ -63,7 +69,7 @@ class Content:
 
     def write(self, path: Path) -> None:
         """Write a file; InputError if it cannot be written."""
-        from printhammer.support.outputs import write_file
+        from printhammer.support.files import write_file
 
         ending = path.suffix.lower()
         if self.plot is not None and ending in PICTURES:
@@ -123,7 +129,7 @@ class Job:
         Errors as for `check_endings`, `check_outputs` and `check_new`.
         """
         from printhammer.results.files import need_for
-        from printhammer.support.outputs import check_outputs
+        from printhammer.support.files import check_outputs
 
         for name, paths in self.wanted.items():
             option = self.declared[name]
@@ -149,13 +155,13 @@ class Job:
             if not self.force and (path.exists() or path.is_symlink()):
                 raise InputError(f"{path}: expected a new file, this one is there; --force writes over it")
 
-    def counting(self, name: str, *, remaining: bool = True) -> AbstractContextManager[progress.Counted]:
+    def counting(self, name: str, *, remaining: bool = True) -> AbstractContextManager[terminal.Counted]:
         """Show a bar during work that is counted, and note its time; see `progress.counting`."""
-        return self._timed(progress.counting(name, remaining=remaining))
+        return self._timed(terminal.counting(name, remaining=remaining))
 
     def telling(self, first: str = "…") -> AbstractContextManager[Callable[[str], None]]:
         """Show a line during work whose end is not known, and note its time; see `progress.telling`."""
-        return self._timed(progress.telling(first))
+        return self._timed(terminal.telling(first))
 
     @contextmanager
     def _timed(self, shown: AbstractContextManager[Shown]) -> Iterator[Shown]:
@@ -339,3 +345,38 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
     failed = [status for status in every if status != "ok"]
     kinds = ", ".join(sorted(set(failed)))
     return [f"{len(failed)} of {total or len(every)} runs ended early: {kinds}"] if failed else []
+
+
+def firing_of(
+    job: Job, hammer: Hammer, passed: dict[str, Any], example: str = "", *, timed: bool = True
+) -> Firing:
+    """Take the options that say how a hammer is fired out of those that are passed, for `Regime.of`.
+
+    One of period and rate is asked for, with an example, where `timed`; a drive file stands instead: an
+    endless force, or pulses at a constant rate. InputError where the hammer has nothing to fire, the file
+    holds anything else, or more is given than is asked for.
+    """
+    file: Path | None = passed.pop("drive", None)
+    train = {name: passed.pop(name, None) for name in ("period", "rate", "overlap")}
+    if file is None:
+        if hammer.waveform is None:
+            raise InputError(
+                f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE"
+            )
+        if timed:
+            opt.need_one(train, f"{example}, or --drive FILE")
+        firing: Firing = opt.given(**train)  # type: ignore[assignment]
+        return firing
+    from printhammer.drive.file import load_drive
+    from printhammer.drive.trains import PulseTrain
+
+    opt.refuse(train, f"none beside --drive {file}")
+    drive = load_drive(file, hammer.waveform)
+    job.check(*tables_beside(file, drive.waveform))
+    if math.isinf(drive.waveform.support) and drive.period is not None:
+        return {"drive": drive}
+    if not isinstance(drive, PulseTrain) or drive.period is None:
+        raise InputError(
+            f"{file}: expected a force without end, [sine], or pulses at a constant rate, [train]"
+        )
+    return {"waveform": drive.waveform, "period": drive.period, "overlap": drive.overlap}

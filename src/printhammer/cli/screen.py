@@ -11,7 +11,7 @@ from rich.cells import cell_len
 from rich.markup import escape
 from rich.table import Table
 
-from printhammer.cli.units import Units, shown, unit
+from printhammer.cli.options import Units, shown, unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

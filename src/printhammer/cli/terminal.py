@@ -1,4 +1,7 @@
-"""What the command line prints, and where."""
+"""What the command line prints, and where.
+
+How far a verb is: on the standard error, and only where somebody looks.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,15 @@ import io
 import sys
 import unicodedata
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 from rich.console import Console
 from rich.markup import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+
+    from rich.progress import Progress, ProgressColumn, Task
 
 _WIDTH: Final = 120
 _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°": "deg", "→": "->"}
@@ -74,3 +79,73 @@ def say(sentence: str) -> None:
 def warn(sentence: str) -> None:
     """Print a warning on the standard error."""
     _print(f"[yellow]warning:[/yellow] {escape(sentence)}")
+
+
+class Counted(Protocol):
+    """Takes steps done and of all, and perhaps what is being done."""
+
+    def __call__(self, done: int, total: int, what: str = "", /) -> None:
+        """Show them."""
+
+
+@contextmanager
+def counting(name: str, *, remaining: bool = True) -> Iterator[Counted]:
+    """Show count, rate and time left while something, called `name`, is counted; yield what takes the count.
+
+    The time that went by is shown instead of that left unless `remaining`: the latter says nothing where most
+    steps may not be needed.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.text import Text
+
+    class Pace(ProgressColumn):
+        """Rate, and the time left at that rate."""
+
+        def render(self, task: Task) -> Text:
+            return Text(pace_of(task.completed, task.total if remaining else None, task.elapsed), style="dim")
+
+    columns = [TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Pace()]
+    with _shown(*columns, *(() if remaining else (TimeElapsedColumn(),))) as bar:
+        task = bar.add_task(name, total=None)
+
+        def count(done: int, total: int, what: str = "", /) -> None:
+            bar.update(task, completed=done, total=total, description=f"{name} {what}" if what else name)
+
+        yield count
+
+
+def pace_of(done: float, total: float | None, seconds: float | None) -> str:
+    """Return how fast steps were done, and how long the others take at that rate; empty before the first.
+
+    The rate is that since the beginning: steps that are done in parallel come in bursts.
+    """
+    if not done or not seconds:
+        return ""
+    rate = done / seconds
+    said = f"{rate:.3g}/s" if rate >= 1.0 else f"{1.0 / rate:.3g} s each"
+    if total is None:
+        return said
+    minutes, rest = divmod(round((total - done) / rate), 60)
+    return f"{said}, {minutes}:{rest:02d} left"
+
+
+@contextmanager
+def telling(first: str = "…") -> Iterator[Callable[[str], None]]:
+    """Show a line while something is done whose end is not known; yield a function of what it says next."""
+    from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    with _shown(SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()) as line:
+        task = line.add_task(first, total=None)
+        yield lambda text: line.update(task, description=text)
+
+
+@contextmanager
+def _shown(*columns: ProgressColumn) -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True, highlight=False, emoji=False)
+    # Where it is no terminal, the library would end with an empty line.
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    with above(console), bar:
+        yield bar

@@ -49,7 +49,7 @@ from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
 from printhammer.errors import InputError, located
 from printhammer.support.constants import options, quantities, sentence, shown
-from printhammer.support.texts import read_text
+from printhammer.support.files import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

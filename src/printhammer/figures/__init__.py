@@ -31,8 +31,8 @@ class PaperFigure:
 
     number: int
     """Its number in the paper."""
-    name: str
-    """Name of the function that draws it, and of its module in `printhammer.figures.paper`."""
+    place: str
+    """Module in `printhammer.figures.paper` and name of the function that draws it, with a dot between."""
     title: str
     """A few words."""
     caption: str
@@ -41,7 +41,8 @@ class PaperFigure:
     @property
     def function(self) -> Callable[..., Figure]:
         """The function that draws it: a hammer and options to a matplotlib figure."""
-        function: Callable[..., Figure] = getattr(import_module(f"{__name__}.paper.{self.name}"), self.name)
+        module, _, name = self.place.partition(".")
+        function: Callable[..., Figure] = getattr(import_module(f"{__name__}.paper.{module}"), name)
         return function
 
     def draw(self, hammer: Hammer, **options: Any) -> Figure:
@@ -60,7 +61,7 @@ FIGURES: Final[dict[int, PaperFigure]] = {
     for entry in (
         PaperFigure(
             2,
-            "statics",
+            "statics.statics",
             "Magnetic force and spring force",
             "Net magnetic force against displacement at coil currents of 0, 0.5, 1, 1.5 and 2 A, the spring"
             " force and its reflection (dashed). Double lines: backstop, front of the ribbon and paper pack,"
@@ -68,60 +69,60 @@ FIGURES: Final[dict[int, PaperFigure]] = {
         ),
         PaperFigure(
             3,
-            "single_pulse",
+            "motion.single_pulse",
             "A single pulse: motion",
             "Displacement of the armature after a single current pulse, and the current.",
         ),
         PaperFigure(
             4,
-            "total_force",
+            "forces.total_force",
             "A single pulse: total force",
             "Total force on the armature after a single current pulse; tinted where it touches pack or"
             " backstop.",
         ),
         PaperFigure(
             5,
-            "force_loops",
+            "forces.force_loops",
             "A single pulse: force and displacement",
             "Total force against displacement over one cycle. Clockwise loops are energy given to the"
             " armature, counter-clockwise loops energy lost; the insert shows the loops of settle-out.",
         ),
         PaperFigure(
             6,
-            "two_pulses",
+            "motion.two_pulses",
             "Two pulses",
             "The response to a second pulse 660 and 700 µs after the first: quenched, or caught on the rise.",
         ),
         PaperFigure(
             7,
-            "buzz",
+            "motion.buzz",
             "Buzz printing",
             "A train of the same waveform, found by search, that prints while the armature stays clear of the"
             " backstop; numbers are peak forces in units of that of a single pulse.",
         ),
         PaperFigure(
             8,
-            "surface",
+            "maps.surface",
             "Nine pulses: displacement against time and rate",
             "Displacement under nine pulses at gradually rising rates, one curve for each, hiding those"
             " behind it; blue inside the ribbon and paper pack.",
         ),
         PaperFigure(
             9,
-            "frequency_map",
+            "maps.frequency_map",
             "Nine pulses: frequency-time map",
             "The same in colours, at more rates. Thin lines are firings, orange lost dots; backstop, pack and"
             " platen are marked on the scale.",
         ),
         PaperFigure(
             10,
-            "phase_plane",
+            "forces.phase_plane",
             "A single pulse: phase plane",
             "Velocity against displacement after a single current pulse; arrows point to later times.",
         ),
         PaperFigure(
             11,
-            "poincare",
+            "poincare.poincare",
             "Poincaré plots",
             "Displacement and velocity at the first 200 firings of trains, a panel for each strobe time, with"
             " the verdict on firings 1001 to 2000, and that of the paper where it is another. Vertical line:"

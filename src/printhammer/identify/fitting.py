@@ -46,7 +46,7 @@ def fit(
         `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
         `printhammer.identify.static.backstop.Stiffness`. "motion": as
         `printhammer.identify.shots.motion.fit_motion`. "coil": as
-        `printhammer.identify.coil.fit.fit_coil`.
+        `printhammer.identify.coil.fit_coil`.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def fit(
         raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
     many = [path] if isinstance(path, str) or not hasattr(path, "__iter__") else list(path)
     if kind in ("motion", "coil"):
-        from printhammer.identify.coil.fit import fit_coil
+        from printhammer.identify.coil import fit_coil
         from printhammer.identify.shots.motion import fit_motion
 
         if hammer is None:

@@ -10,6 +10,8 @@ Methodology 28 (2002) 169; G. W. Imbens and M. Kolesar, Rev. Econ. Stat. 98 (201
 
 An error in the abscissa enters as a column of `spread` that is the squared slope of the law (effective
 variance: J. Orear, Am. J. Phys. 50 (1982) 912).
+
+What residuals and records say of their noise: its size, its outliers, its memory.
 """
 
 from __future__ import annotations
@@ -19,11 +21,81 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from printhammer.identify.residuals import robust_scale
 from printhammer.results import Declared, part
 
 if TYPE_CHECKING:
     from printhammer.support.arrays import BoolArray, FloatArray
+
+_MAD: Final = 1.482602218505602
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+_SPIKE: Final = 10.0
+_FAR: Final = 4.5
+"""Residuals of more standard deviations are outliers: of 100 000 normal ones, less than one."""
+_LONGEST_MEMORY: Final = 8
+
+
+def robust_scale(values: FloatArray) -> float:
+    """Return the standard deviation of normal noise about 0 from its median absolute value."""
+    return _MAD * float(np.median(np.abs(values)))
+
+
+def noise_of_record(values: FloatArray) -> float:
+    """Return the standard deviation of the white noise in evenly spaced samples of something smoother.
+
+    From third differences, which leave no parabola; their median does not see outliers or contacts.
+    """
+    if len(values) < 8:
+        return 0.0
+    return robust_scale(np.diff(values, 3)) / float(np.sqrt(20.0))
+
+
+def running_median(values: FloatArray, width: int) -> FloatArray:
+    """Return the running median over an odd number of samples; at the ends that of the outermost ones."""
+    half = width // 2
+    windows = np.lib.stride_tricks.sliding_window_view(values, width)
+    first, last = np.median(values[:width]), np.median(values[-width:])
+    return np.concatenate([np.full(half, first), np.median(windows, axis=1), np.full(half, last)])
+
+
+def spikes_of(values: FloatArray, noise: float) -> BoolArray:
+    """Return which samples of a record stand out of their neighbours, more than noise and slope explain."""
+    middle = running_median(values, 5)
+    padded = np.pad(middle, 2, mode="edge")
+    return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
+
+
+def outliers_of(residuals: FloatArray, floor: float) -> BoolArray:
+    """Return which residuals of mostly good data are larger than normal noise, or the floor, has them."""
+    return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
+
+
+def memory_factor(residuals: FloatArray) -> float:
+    """Return by how much the variance of a slow average exceeds that of independent residuals.
+
+    An autoregressive process is fitted (Yule and Walker), its order by the Bayes criterion; the factor is its
+    spectrum at frequency 0 over its variance. 1 for white noise.
+    """
+    count = len(residuals)
+    centred = residuals - residuals.mean() if count else residuals
+    longest = min(_LONGEST_MEMORY, count // 20)
+    if longest < 1 or not centred.any():
+        return 1.0
+    r = np.array([float(centred[: count - k] @ centred[k:]) for k in range(longest + 1)]) / count
+    best, factor = count * np.log(r[0]), 1.0
+    error = r[0]
+    a = np.zeros(0)
+    for order in range(1, longest + 1):
+        # Levinson's recursion.
+        reflection = (r[order] - a @ r[order - 1 : 0 : -1]) / error if order > 1 else r[1] / error
+        a = np.append(a - reflection * a[::-1], reflection)
+        error *= 1.0 - reflection * reflection
+        if error <= 0.0:
+            break
+        criterion = count * np.log(error) + order * np.log(count)
+        if criterion < best:
+            best, factor = criterion, error / (1.0 - a.sum()) ** 2 / r[0]
+    return float(factor)
+
 
 _FALSE_OUTLIERS: Final = 0.01
 """How many rows of good data with normal noise are left out, on average, in one fit."""

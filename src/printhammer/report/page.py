@@ -8,7 +8,7 @@ from collections import Counter
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
-from printhammer.report.citations import linked_source
+from printhammer.report.contents import linked_source
 from printhammer.report.family_views import family_view
 from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text, words_of
 from printhammer.report.views import (

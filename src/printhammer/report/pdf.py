@@ -17,7 +17,7 @@ from printhammer.report.page import view
 from printhammer.report.quantities import percent, typeset
 from printhammer.report.reconstruction.shares import Share
 from printhammer.support.constants import Constant
-from printhammer.support.outputs import write_file
+from printhammer.support.files import write_file
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import panel_name, printed_verdicts
-from printhammer.report.misses import Miss, misses
+from printhammer.report.contents import Miss, misses
 from printhammer.report.quantities import band_text, percent, split_name, value_text, words_of
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ import numpy as np
 from printhammer.errors import InputError, missing_extra
 from printhammer.results.declare import Column, Declared, heading, part
 from printhammer.results.provenance import KEYS
-from printhammer.support.outputs import write_file
+from printhammer.support.files import write_file
 from printhammer.support.sheets import read_sheet
 
 if TYPE_CHECKING:

@@ -11,11 +11,13 @@
 makes a frozen dataclass whose Dataset, table, files, docstring and HTML repr follow from the declaration, and
 whose picture `printhammer.figures.plots` knows by the name of the class. Units that depend on the instance,
 and arrays that are no fields, come from a class's own `entries`; further attributes from its `notes`.
+
+Many results of one class as one: their arrays stacked along a new dimension.
 """
 
 from __future__ import annotations
 
-from dataclasses import Field, dataclass
+from dataclasses import Field, dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
@@ -27,12 +29,15 @@ from printhammer.results.declare import (
     column,
     columns_of,
     coordinate,
+    extent,
+    html_table,
     part,
     public_names,
     scalar,
+    span,
+    titled,
     with_attributes,
 )
-from printhammer.results.notebook import extent, html_table, span, titled
 from printhammer.results.provenance import provenance
 
 if TYPE_CHECKING:
@@ -43,6 +48,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     Entries = dict[str, tuple[Column, Any]]
+    from collections.abc import Sequence
 
 RESULTS: dict[str, type[Result]] = {}
 """All classes of results that were imported, by name."""
@@ -201,3 +207,45 @@ def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, A
         return values
     names = np.array([*note.codes, ""])
     return names[np.where((values >= 0) & (values < len(note.codes)), values, len(note.codes))]
+
+
+def stacked(results: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
+    """Return the arrays of results, stacked; ragged ones are filled up with NaN, -1 or no text.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        The results, all of one class; possibly none.
+    dim : str
+        Name of the new dimension, the first one of every array.
+    kind : type
+        The class, which alone says what arrays there are where there are no results.
+
+    Returns
+    -------
+    dict
+        As `Result.entries` returns it; of a coordinate the longest is kept as it is.
+    """
+    declared = (note for note in kind.COLUMNS.values() if note.kind in ("column", "coordinate"))
+    none: Entries = {note.name: (note, np.zeros((0,) * len(note.dims))) for note in declared}
+    every = [result.entries() for result in results]
+    entries: Entries = {}
+    for name, (note, nothing) in (every[0] if every else none).items():
+        arrays = [np.asarray(entry[name][1], dtype=note.dtype) for entry in every]
+        if note.kind == "coordinate":
+            entries[name] = (note, max(arrays, key=len, default=nothing))
+            continue
+        entries[name] = (replace(note, dims=(dim, *note.dims)), _filled_up(arrays, len(note.dims)))
+    return entries
+
+
+def _filled_up(arrays: list[Any], dims: int) -> Any:
+    if not arrays:
+        return np.zeros((0,) * (dims + 1))
+    shape = [max(array.shape[axis] for array in arrays) for axis in range(dims)]
+    dtype = np.result_type(*arrays)
+    nothing: Any = {"U": "", "i": -1, "b": False}.get(dtype.kind, np.nan)
+    table: Any = np.full((len(arrays), *shape), nothing, dtype=dtype)
+    for k, array in enumerate(arrays):
+        table[(k, *(slice(length) for length in array.shape))] = array
+    return table

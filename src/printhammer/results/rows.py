@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Self, SupportsIndex, TypeVar, overload
 
 import numpy as np
 
-from printhammer.results.declare import Declared, columns_of
-from printhammer.results.notebook import cell, html_table, shortened
+from printhammer.results.declare import Declared, cell, columns_of, html_table, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -93,7 +93,7 @@ def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]
 def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> list[Contact]:
     """Put the recorded contacts together with their peaks and losses.
 
-    The increments are those of `printhammer.run.energy.ledger.increments_of`; `rigid` tells whether the
+    The increments are those of `printhammer.run.energy.increments_of`; `rigid` tells whether the
     backstop is.
     """
     if len(record.contacts) == 0:

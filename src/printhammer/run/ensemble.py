@@ -13,15 +13,13 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
-from printhammer.drive.batch import PulseTrains, firings_of
+from printhammer.drive.batch import PulseTrains, Ragged, firings_of
 from printhammer.drive.input import read_array
-from printhammer.drive.ragged import Ragged
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.results import Result, column, part
-from printhammer.run.ensemble_group import MOST_COLUMNS, Group, Job
-from printhammer.run.fired import Fired
+from printhammer.run.ensemble_group import MOST_COLUMNS, Fired, Group, Job
 from printhammer.run.problem import MAX_STEPS, TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import AT_REST, FORMS, check_branch, initial_state
 from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count

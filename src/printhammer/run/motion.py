@@ -13,8 +13,7 @@ from printhammer.errors import InputError
 from printhammer.results import Column, Result, Rows, derived, provenance
 from printhammer.results.files import write_csv, write_parquet
 from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading_works
-from printhammer.run.energy.coil_work import CoilWork, coil_work_of
-from printhammer.run.energy.ledger import Ledger, increments_of, ledger_of
+from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
 

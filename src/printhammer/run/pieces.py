@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.run.energy.ledger import Ledger
+from printhammer.run.energy import Ledger
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
 from printhammer.run.start import initial_state

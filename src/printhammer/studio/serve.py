@@ -86,7 +86,7 @@ def serve(
 
 def _read(path: Path, shelf: Shelf) -> Told:
     from printhammer.studio.states.links import read_file
-    from printhammer.support.texts import read_text
+    from printhammer.support.files import read_text
 
     return read_file(read_text(path, "the state"), str(path), shelf)
 

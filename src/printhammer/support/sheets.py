@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError
-from printhammer.support.texts import read_text
+from printhammer.support.files import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from printhammer.results.files import need_for
 from printhammer.results.store import Store, open_store
 from printhammer.support.threads import thread_count
-from printhammer.sweep.local import Index, run_local
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
+from printhammer.sweep.work import Index, run_local
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -15,7 +15,7 @@ from printhammer.hammer.file import kinds_of, model_of
 from printhammer.hammer.names import FORCE, PERIOD, RATE, TIMING, in_unit_of_drive, quantity_of
 from printhammer.results import Declared, part
 from printhammer.support.constants import Quantity, expected, quantities, shown
-from printhammer.sweep.quantities import read_quantities, read_quantity
+from printhammer.sweep.tables import read_quantities, read_quantity
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from printhammer.support.arrays import FloatArray
-    from printhammer.sweep.local import Index
     from printhammer.sweep.members import Base
     from printhammer.sweep.plan import Plan
+    from printhammer.sweep.work import Index
 
 ANSWER: Final = 5.0
 """Seconds in which a scheduler must answer."""

@@ -10,7 +10,7 @@ import numpy as np
 from printhammer.errors import InputError, nearest
 from printhammer.results import Declared, part
 from printhammer.support.constants import shown
-from printhammer.sweep.quantities import read_quantity
+from printhammer.sweep.tables import read_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

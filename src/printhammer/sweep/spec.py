@@ -25,12 +25,11 @@ from printhammer.hammer.hammer import Hammer, load, shipped
 from printhammer.hammer.names import quantity_of
 from printhammer.results import Declared, part
 from printhammer.support.constants import shown
-from printhammer.support.texts import read_text
+from printhammer.support.files import read_text
 from printhammer.sweep.axes import COUNTS, Axis, read_axis
 from printhammer.sweep.members import KINDS, Base
 from printhammer.sweep.outputs import Outputs, read_outputs
-from printhammer.sweep.quantities import read_quantity
-from printhammer.sweep.tables import read_tables
+from printhammer.sweep.tables import read_quantity, read_tables
 
 
 class Spec(Declared):

@@ -1,9 +1,13 @@
-"""The work of a block: its members integrated together, and what is kept of them."""
+"""The work of a block: its members integrated together, and what is kept of them.
+
+Sweeps on this machine: blocks of work in threads.
+"""
 
 from __future__ import annotations
 
 import math
 import threading
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,7 +15,7 @@ import numpy as np
 from printhammer.drive.batch import firings_of
 from printhammer.errors import InputError
 from printhammer.run.ensemble import DotTable, Ensemble
-from printhammer.support.threads import in_threads
+from printhammer.support.threads import in_threads, thread_count
 from printhammer.sweep.members import Base, Maker
 from printhammer.sweep.outputs import (
     DISPLACEMENT,
@@ -25,12 +29,13 @@ from printhammer.sweep.outputs import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterable
 
     from printhammer.run.motion import Motion
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.sweep.members import Members
     from printhammer.sweep.outputs import Outputs
+    from printhammer.sweep.plan import Plan
 
 Results = dict[str, Any]
 """Arrays by name, of shape (members of the block, ...)."""
@@ -186,3 +191,73 @@ def _from_motion(motion: Motion, row: int, results: Results) -> None:
     for name, value in scalars.items():
         if name in results:
             results[name][row] = value
+
+
+Index = tuple[int, ...]
+
+_INTERVAL: Final = 0.1
+
+
+class _StopError(Exception):
+    """Ends the work of a block that is no longer wanted."""
+
+
+def run_local(
+    plan: Plan,
+    todo: Iterable[Index],
+    write: Callable[[Index, Results], None],
+    tell: Callable[[float], None],
+    threads: int | None = None,
+) -> None:
+    """Do blocks of work in threads, by default as many as there are cores, and write each when it is done.
+
+    `write` takes the place of a block in the chunk grid and its results, in this thread; `tell` is called now
+    and then with the number of members of blocks under way that are done, possibly not whole.
+
+    Raises
+    ------
+    InputError
+        As `run_chunk`, or from `write`.
+    KeyboardInterrupt
+        Where it is interrupted; blocks under way are dropped.
+    """
+    blocks = list(todo)
+    workers = thread_count(threads)
+    at_once = max(1, min(workers, len(blocks)))
+    stop = threading.Event()
+    shares: dict[Index, float] = {}
+
+    def work(index: Index) -> Results:
+        members = plan.blocks.members(index)
+
+        def progress(share: float) -> None:
+            shares[index] = share * len(members)
+            if stop.is_set():
+                raise _StopError
+
+        progress(0.0)
+        rows = plan.rows(members)
+        return run_chunk(
+            plan.spec.base, plan.spec.outputs, rows, threads=workers // at_once, progress=progress
+        )
+
+    left = iter(blocks)
+    under_way: dict[Future[Results], Index] = {}
+    with ThreadPoolExecutor(at_once) as pool:
+        try:
+            while True:
+                # One more than can be under way, so that no thread waits for the disk.
+                while len(under_way) <= at_once and (index := next(left, None)) is not None:
+                    under_way[pool.submit(work, index)] = index
+                if not under_way:
+                    return
+                finished, _ = wait(under_way, timeout=_INTERVAL, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    index = under_way.pop(future)
+                    write(index, future.result())
+                    shares.pop(index, None)
+                tell(sum(list(shares.values())))
+        finally:
+            stop.set()
+            for future in under_way:
+                future.cancel()

@@ -14,7 +14,7 @@ from printhammer.chaos.strobe.scan import scan
 from printhammer.claims import Context
 from printhammer.claims.context import NotMeasurableError
 from printhammer.claims.definition import claims
-from printhammer.claims.shapes import spread
+from printhammer.claims.judging import spread
 from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.settling import SETTLED, rebounds

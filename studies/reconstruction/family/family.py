@@ -29,7 +29,7 @@ from printhammer.report.reconstruction.results import (
     shipped_results,
 )
 from printhammer.run.ensemble import Ensemble
-from printhammer.support.outputs import make_folder, write_file
+from printhammer.support.files import make_folder, write_file
 from studies.reconstruction.family.choice import at_gauge, choose
 from studies.reconstruction.family.conclusions import conclude
 from studies.reconstruction.family.log import LEAST_PANELS, Logged, read_logs

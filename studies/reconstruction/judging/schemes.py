@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos import strobes
-from printhammer.chaos.strobe.schemes_1983 import SCHEMES, scheme_strobes
+from printhammer.chaos.strobe.points import SCHEMES, scheme_strobes
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.verdicts import changed, printed_verdicts
 from printhammer.run.scheme_runs import READINGS, Reading

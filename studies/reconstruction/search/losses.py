@@ -16,8 +16,8 @@ import numpy as np
 
 from printhammer.claims.context import TAIL
 from printhammer.claims.definition import claims
-from printhammer.claims.shapes import rank_correlation
-from printhammer.claims.two_pulses import half_rise
+from printhammer.claims.judging import rank_correlation
+from printhammer.claims.pulses import half_rise
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import holding_margin
 from printhammer.run.ensemble import Ensemble, EnsembleResult

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.claims.definition import claims
-from printhammer.claims.shapes import spread
+from printhammer.claims.judging import spread
 from printhammer.drive.trains import PulseTrain
 from printhammer.maps.frequency import TAIL
 from studies.reconstruction.search.losses import hinge, run_all

@@ -12,12 +12,11 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.chaos import Bifurcation, strobes
-from printhammer.chaos.bifurcation import carry
+from printhammer.chaos.bifurcation import builder
 from printhammer.chaos.bifurcation import diagram as kept
 from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
 from printhammer.chaos.bifurcation.columns import Columns, blank_columns, cycles_of, orbit_distance
-from printhammer.chaos.bifurcation.diagram import hysteresis
-from printhammer.chaos.bifurcation.windows import cells, doublings
+from printhammer.chaos.bifurcation.diagram import cells, doublings, hysteresis
 from printhammer.chaos.strobe.verdict import period_of, repeats
 from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.run.regime import Regime
@@ -85,7 +84,7 @@ def test_rates_and_periods_are_the_same(hammer: "ph.Hammer") -> None:
 def test_the_result_does_not_depend_on_threads(
     hammer: "ph.Hammer", direction: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(carry, "STRAND", 4)
+    monkeypatch.setattr(builder, "STRAND", 4)
     options = {"periods": np.linspace(1.24e-3, 1.34e-3, 14), "direction": direction, "refine": 1, **SHORT}
     assert same(ph.bifurcation(hammer, threads=1, **options), ph.bifurcation(hammer, threads=2, **options))
 
@@ -98,11 +97,11 @@ def test_strands_lead_where_a_strict_carrying_does(
     # Some of them settle slowly.
     settled = {"firings": 500, "transient": 300}
     options = {"periods": 1e-6 * np.array(periods), "direction": "both", "refine": 0, **settled}
-    monkeypatch.setattr(carry, "STRAND", 1000)
+    monkeypatch.setattr(builder, "STRAND", 1000)
     strict = ph.bifurcation(hammer, **options)
     assert strict.carried == 0
     # Strands of four that are not closed would show no hysteresis here.
-    monkeypatch.setattr(carry, "STRAND", 4)
+    monkeypatch.setattr(builder, "STRAND", 4)
     found = ph.bifurcation(hammer, **options)
     assert found.carried > 0
     np.testing.assert_array_equal(found.cycles, strict.cycles)

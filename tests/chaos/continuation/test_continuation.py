@@ -11,8 +11,8 @@ from tests.strobe_maps import strobe_map
 
 import printhammer as ph
 from printhammer.chaos import Branch, BranchEvent
+from printhammer.chaos.continuation.branch import event_of
 from printhammer.chaos.continuation.branch_points import BranchPoint
-from printhammer.chaos.continuation.events import event_of
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, Touch
 from printhammer.chaos.continuation.regimes import InterruptedBranches
 from printhammer.run.regime import Regime

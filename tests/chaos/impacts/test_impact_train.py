@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.chaos.impacts.train import autocorrelation, impact_train
+from printhammer.chaos.impacts import autocorrelation, impact_train
 
 
 def test_a_clock() -> None:

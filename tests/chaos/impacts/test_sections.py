@@ -7,7 +7,7 @@ import pytest
 
 import printhammer as ph
 from printhammer.chaos import Section, sections
-from printhammer.run import touches
+from printhammer.run import simulate
 
 PERIOD = 1.05e-3
 
@@ -43,10 +43,10 @@ def test_stretches_change_nothing(hammer: "ph.Hammer", monkeypatch: pytest.Monke
     whole = ph.section(hammer, period=PERIOD, touches=200)
     # Some of the pauses fall into contacts.
     for length in (40, 58, 64):
-        monkeypatch.setattr(touches, "_STRETCH", length)
+        monkeypatch.setattr(simulate, "_STRETCH", length)
         assert same(ph.section(hammer, period=PERIOD, touches=200), whole)
     # Too short for what comes between two pauses: longer ones are tried.
-    monkeypatch.setattr(touches, "_STRETCH", 1)
+    monkeypatch.setattr(simulate, "_STRETCH", 1)
     assert same(ph.section(hammer, period=PERIOD, touches=200), whole)
 
 

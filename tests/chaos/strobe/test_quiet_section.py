@@ -6,7 +6,7 @@ import pytest
 from tests.strobe_maps import strobe_map
 
 import printhammer as ph
-from printhammer.chaos.strobe.quiet import quiet_section
+from printhammer.chaos.strobe.map import quiet_section
 from printhammer.run.regime import Regime
 
 GRAVITY, GAMMA, RESTITUTION, FREQUENCY = 9.80665, 0.8, 0.8, 50.0

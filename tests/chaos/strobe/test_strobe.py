@@ -12,7 +12,7 @@ from printhammer.claims import claims
 from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.run.ensemble import MODE_NAMES
-from printhammer.run.window import PAPER_WINDOW, window_of
+from printhammer.run.regime import PAPER_WINDOW, window_of
 
 MASS, STIFFNESS, FREQUENCY, AMPLITUDE = 1e-3, 900.0, 100.0, 0.5
 OMEGA = 2.0 * math.pi * FREQUENCY

@@ -9,7 +9,7 @@ import xarray as xr
 from tests.hammers import CRUDE
 
 import printhammer as ph
-from printhammer.printing.rates.materials import Material
+from printhammer.printing.rates.damping import Material
 
 GRID = ("--first", "400 Hz", "--last", "1.2 kHz", "--step", "400 Hz")
 

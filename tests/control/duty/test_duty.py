@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.control.duty.duty import ThermalCoil, steady, time_to
-from printhammer.control.duty.heat import FEEDS, DotHeat, dot_heat
+from printhammer.control.duty import FEEDS, DotHeat, ThermalCoil, dot_heat, steady, time_to
 from printhammer.parts.coil.winding import COPPER
 
 AMBIENT = [25.0, 50.0] * 3

@@ -3,7 +3,7 @@
 import pytest
 
 import printhammer as ph
-from printhammer.control.duty.fired import heat_of
+from printhammer.control.duty import heat_of
 
 
 def test_a_driver_heats_a_warm_coil_as_the_circuit_says() -> None:

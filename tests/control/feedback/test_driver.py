@@ -5,7 +5,7 @@ import pytest
 from tests import hammers
 
 import printhammer as ph
-from printhammer.control.feedback.driver import BoundedSequence, Driver, driver_of
+from printhammer.control.feedback.plant import BoundedSequence, Driver, driver_of
 from printhammer.drive.waveforms.shapes import Switched
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from printhammer.control.feedback.policy import Policy
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 
 SPEEDS = np.linspace(0.6, 1.3, 15)
 

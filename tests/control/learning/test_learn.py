@@ -10,14 +10,12 @@ from tests.hammers import crude
 import printhammer as ph
 from printhammer.control.learning.belief import Belief, Mode
 from printhammer.control.learning.ladder import DOTS, Rung, candidates
-from printhammer.control.learning.law import RUNS, LearningLaw, order_good
+from printhammer.control.learning.law import MARGIN, RUNS, WIDTH, LearningLaw, order_good
 from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import LINE, Press, printed
 from printhammer.control.learning.sensor import ImpactSensor, Readings
-from printhammer.control.learning.settings import MARGIN, WIDTH
-from printhammer.control.table.drivers import driven_by
-from printhammer.control.table.histories import histories, number_of
-from printhammer.control.widths import of_width
+from printhammer.control.pulses import of_width
+from printhammer.control.table.drive import driven_by, histories, number_of
 
 RATE = 1275.0
 SENSOR = ImpactSensor(force=0.03)

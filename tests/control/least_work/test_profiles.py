@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from printhammer.control.least_work.profiles import (
+from printhammer.control.least_work.search import (
     LANDING_SHARES,
     PRINTING_SHARES,
     landing_profile,

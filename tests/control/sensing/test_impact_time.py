@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.control.sensing.estimator import ImpactEstimator
-from printhammer.control.sensing.sampling import Sampling
+from printhammer.control.impact_estimator import ImpactEstimator, Sampling
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
-from printhammer.control.table.drive import COLUMNS
-from printhammer.control.table.histories import (
+from printhammer.control.table.drive import (
+    COLUMNS,
     REST,
     entries_of,
     gap_text,

@@ -6,10 +6,10 @@ from tests.control.table.by_hand import by_hand
 from tests.hammers import crude
 
 import printhammer as ph
+from printhammer.control.pulses import of_width
 from printhammer.control.table.drive import COLUMNS, fading, print_pulse
-from printhammer.control.widths import of_width
 from printhammer.drive.waveforms.shapes import Chain, HalfSine
-from printhammer.printing.dots.slots import slot_times
+from printhammer.printing.dots.strategy import slot_times
 
 
 def test_at_its_own_rates_a_table_says_what_it_holds() -> None:

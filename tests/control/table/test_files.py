@@ -14,9 +14,8 @@ from tests.control.table.by_hand import by_hand, former_json
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable, load_table
-from printhammer.control.table.drive import COLUMNS
+from printhammer.control.table.drive import COLUMNS, histories, number_of
 from printhammer.control.table.formats import read_table
-from printhammer.control.table.histories import histories, number_of
 
 
 def same(one: CompensationTable, other: CompensationTable) -> bool:

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.control.table.histories import (
+from printhammer.control.table.drive import (
     REST,
     checked_size,
     entries_of,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from printhammer.control.table.newton import LONGEST_STEP, changes
+from printhammer.control.table.ways import LONGEST_STEP, changes
 
 FREE = np.array([1.0])
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import printhammer as ph
+from printhammer.control.pulses import of_width
 from printhammer.control.table.drive import brake_of, print_pulse
-from printhammer.control.widths import of_width
 from printhammer.drive.waveforms.drivers import PeakAndHold, Rail
 from printhammer.drive.waveforms.shapes import Chain
 

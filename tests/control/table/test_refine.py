@@ -5,7 +5,7 @@ import pytest
 from tests.control.table.test_tuning import quick
 
 import printhammer as ph
-from printhammer.control.table import refine, tuning
+from printhammer.control.table import tuning
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS
 
@@ -21,8 +21,8 @@ def tuned(halvings: int) -> CompensationTable:
     """Tune a table over these rates, halved so often wherever it is not perfect."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tuning, "_all_rates", lambda _single: GRID)
-        patch.setattr(refine, "HALVINGS", halvings)
-        patch.setattr(refine, "BETWEEN", 0.0)
+        patch.setattr(tuning, "HALVINGS", halvings)
+        patch.setattr(tuning, "BETWEEN", 0.0)
         return ph.tune(quick(), history=1)
 
 

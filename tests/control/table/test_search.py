@@ -12,7 +12,7 @@ from printhammer.control.table import ways as table_ways
 from printhammer.control.table.task import Task
 from printhammer.control.table.ways import Ways
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.rates.perturbation import perturbed
+from printhammer.printing.rates.variability import perturbed
 
 TOLERANCE = 1e-10
 PERIOD = 1.0 / RATE

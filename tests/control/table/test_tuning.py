@@ -9,8 +9,8 @@ from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS
 from printhammer.control.table.report import PERTURBATIONS, STRATEGIES, between, random_patterns
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.slots import slot_times
-from printhammer.printing.rates.perturbation import Perturbation
+from printhammer.printing.dots.strategy import slot_times
+from printhammer.printing.rates.variability import Perturbation
 
 RATE = 1850.0
 """Slots per second at which rebounds of the hammer of these tests disturb the next dot."""

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.printing.dots.judging import FAULTS, judge
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import FAULTS, Limits, judge
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.run.ensemble import DotTable
 

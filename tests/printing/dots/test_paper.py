@@ -7,7 +7,7 @@ import pytest
 from tests.hammers import crude
 
 import printhammer as ph
-from printhammer.printing.dots.slots import slots_of
+from printhammer.printing.dots.strategy import slots_of
 from printhammer.run.pieces import simulate_pieces
 
 PITCH = 4e-4

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.printing.dots.limits import Limits, limits_named
-from printhammer.printing.dots.slots import (
+from printhammer.printing.dots.judging import Limits, limits_named
+from printhammer.printing.dots.strategy import (
     LEAD_IN,
     cycle_with_lead_in,
     de_bruijn,

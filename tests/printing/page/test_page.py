@@ -10,9 +10,8 @@ from tests.hammers import hertz, made_of, power, preload
 import printhammer as ph
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Rectangle
-from printhammer.printing.dots.limits import PRESETS
-from printhammer.printing.dots.slots import FIRST_SLOT
-from printhammer.printing.dots.strategy import open_loop
+from printhammer.printing.dots.judging import PRESETS
+from printhammer.printing.dots.strategy import FIRST_SLOT, open_loop
 from printhammer.printing.page import page as page_module
 from printhammer.printing.page.head import head_of
 from printhammer.printing.page.page import Page, darkness, print_page

@@ -11,10 +11,8 @@ from hypothesis.extra.numpy import arrays
 from PIL import Image
 
 import printhammer as ph
-from printhammer.printing.page.lettering import broken, lettered
-from printhammer.printing.page.matrix_font import ADVANCE, glyphs
-from printhammer.printing.page.pattern import Pattern
-from printhammer.printing.page.pattern_file import pattern_from_toml, pattern_toml
+from printhammer.printing.page.lettering import ADVANCE, broken, glyphs, lettered
+from printhammer.printing.page.pattern import Pattern, pattern_from_toml, pattern_toml
 
 FONTS = Path(mpl.get_data_path()) / "fonts" / "ttf"
 PRINTABLE = "".join(chr(code) for code in range(32, 127))

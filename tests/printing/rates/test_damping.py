@@ -7,11 +7,10 @@ import xarray as xr
 from tests.hammers import made_of, preload
 
 import printhammer as ph
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.settling import settle
-from printhammer.printing.rates.damping import DampingStudy, damping_study, tuned
-from printhammer.printing.rates.materials import Material, materials
+from printhammer.printing.rates.damping import DampingStudy, Material, damping_study, materials, tuned
 
 GRID = {"first": 400.0, "last": 1200.0, "step": 400.0, "limits": Limits(force=0.2, arrival=80e-6)}
 

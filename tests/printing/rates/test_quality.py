@@ -11,9 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.printing.dots.judging import FAULTS
-from printhammer.printing.dots.limits import Limits
-from printhammer.printing.dots.slots import FIRST_SLOT
+from printhammer.printing.dots.judging import FAULTS, Limits
+from printhammer.printing.dots.strategy import FIRST_SLOT
 from printhammer.printing.rates.quality import Quality, pattern_of, quality
 
 PATTERN = "1101"

@@ -8,13 +8,12 @@ from tests.hammers import made_of, preload
 
 import printhammer as ph
 from printhammer.drive.trains import Drive
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
-from printhammer.printing.dots.slots import FIRST_SLOT
-from printhammer.printing.dots.strategy import open_loop
+from printhammer.printing.dots.strategy import FIRST_SLOT, open_loop
 from printhammer.printing.dots.trial import Case, attempt
-from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest, rate_grid, safe_rate
+from printhammer.printing.rates.variability import Perturbation, perturbed
 
 COARSE = {"first": 250.0, "step": 125.0, "last": 2000.0}
 

@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 import printhammer as ph
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.rates.safe_rate import rate_grid, safe_rate, safe_rates
 from printhammer.printing.rates.tolerance import draw, spreads_of, tolerance_yield

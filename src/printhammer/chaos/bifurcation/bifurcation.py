@@ -14,7 +14,7 @@ import numpy as np
 from printhammer.chaos.bifurcation.builder import DiagramBuilder
 from printhammer.chaos.bifurcation.columns import TOLERANCE
 from printhammer.chaos.bifurcation.diagram import Bifurcation
-from printhammer.chaos.strobe.handing import FROM_REST
+from printhammer.chaos.strobe.train import FROM_REST
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
@@ -93,7 +93,7 @@ def bifurcation(
     direction : str, optional
         "from rest": every train begins at rest, with nothing fired before. "up", "down": it begins where the
         train at the value before, or after, ended, with the pulses before under way; the first begins at
-        rest. "both": up and down. See `printhammer.chaos.bifurcation.carry`.
+        rest. "both": up and down. See `printhammer.chaos.bifurcation.builder`.
     state : tuple of float, optional
         Displacement, m, and velocity, m/s, that takes the place of rest, with the pulses before under way.
     refine : int, optional

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.orbits.settled import Settled, settled, shown
-from printhammer.chaos.strobe.handing import FROM_REST, NO_CURRENT, State, handed_on, pack_branches
+from printhammer.chaos.strobe.train import FROM_REST, NO_CURRENT, State, handed_on, pack_branches
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.errors import InputError
 from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import Ensemble
+from printhammer.run.regime import window_of
 from printhammer.run.start import AT_REST, check_branch, initial_state
 from printhammer.run.supply import current_scale
-from printhammer.run.window import window_of
 from printhammer.support.threads import Progress, mapped, shifted
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def run_in_stretches(
 ) -> Columns:
     """Do as `run_columns` for trains that `forgets` allows, a period at a time.
 
-    Slower, but exact over long times, see `printhammer.chaos.strobe.handing.STRETCH`.
+    Slower, but exact over long times, see `printhammer.chaos.strobe.train.STRETCH`.
     """
     columns = blank_columns(len(regimes), firings - transient)
     begun = [
@@ -260,7 +260,7 @@ def state_or_rest(regime: Regime, state: State) -> State:
 def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
     """Return by what differences of displacement, velocity, memory and current are divided, shape (M, 4).
 
-    The half-widths of the window of each train, see `printhammer.run.window`, and a typical current.
+    The half-widths of the window of each train, see `printhammer.run.regime`, and a typical current.
     """
     known: dict[tuple[int, float], tuple[float, ...]] = {}
     rows = []

@@ -15,7 +15,7 @@ from printhammer.chaos.strobe.map import IN_PACK, image_of, margin_of, usable
 from printhammer.errors import InputError
 from printhammer.results import Declared, column, part, scalar
 from printhammer.run.contacts import contacts_of
-from printhammer.run.energy.ledger import increments_of
+from printhammer.run.energy import increments_of
 from printhammer.run.problem import Problem, Record
 from printhammer.run.start import initial_state
 

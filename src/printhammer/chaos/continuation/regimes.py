@@ -22,7 +22,7 @@ from printhammer.drive.input import period_of_rate, read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import RATE
 from printhammer.results import Column, Result, part
-from printhammer.results.stacking import stacked
+from printhammer.results.result import stacked
 from printhammer.run.regime import Regime
 from printhammer.support.threads import Progress, mapped
 

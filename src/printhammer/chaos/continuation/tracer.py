@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, follow
-from printhammer.chaos.continuation.branch import Branch
+from printhammer.chaos.continuation.branch import Branch, BranchEvent, event_of
 from printhammer.chaos.continuation.branch_points import (
     BIRTH,
     BranchPoint,
@@ -19,11 +19,10 @@ from printhammer.chaos.continuation.branch_points import (
     follow_doubled,
     points_of,
 )
-from printhammer.chaos.continuation.events import BranchEvent, event_of
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.chaos.continuation.flights import grazing_of, near_touches
-from printhammer.chaos.strobe.quiet import quiet_section
+from printhammer.chaos.strobe.map import quiet_section
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.support.threads import Progress, mapped

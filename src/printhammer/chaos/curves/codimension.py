@@ -25,8 +25,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, zero_between
-from printhammer.chaos.curves.systems import place_of
-from printhammer.chaos.curves.touches import GrazingSystem
+from printhammer.chaos.curves.systems import GrazingSystem, place_of
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
 

@@ -23,8 +23,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.strobe.map import image_of
-from printhammer.chaos.strobe.quiet import quiet_section
+from printhammer.chaos.strobe.map import image_of, quiet_section
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:

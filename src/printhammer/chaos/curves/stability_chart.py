@@ -15,9 +15,14 @@ from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.continuation.branch import Branch
 from printhammer.chaos.continuation.continuation import continuation
 from printhammer.chaos.continuation.tracer import read_bounds
-from printhammer.chaos.curves.attractors import GRID_TOLERANCE, settled_plane
-from printhammer.chaos.curves.bifurcation_curve import MOST, curve_of
-from printhammer.chaos.curves.curve import SAME, BifurcationCurve
+from printhammer.chaos.curves.bifurcation_curve import (
+    GRID_TOLERANCE,
+    MOST,
+    SAME,
+    BifurcationCurve,
+    curve_of,
+    settled_plane,
+)
 from printhammer.chaos.curves.starts import Start, start_of
 from printhammer.chaos.curves.systems import TESTS, Plane, check_two
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer
@@ -27,7 +32,7 @@ from printhammer.results import Column, Result, column, derived, part, provenanc
 from printhammer.support.threads import Progress, mapped, thread_count
 
 if TYPE_CHECKING:
-    from printhammer.chaos.continuation.events import BranchEvent
+    from printhammer.chaos.continuation.branch import BranchEvent
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing, Regime
     from printhammer.support.arrays import FloatArray, IntArray

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.chaos.continuation.branch import Branch
-from printhammer.chaos.continuation.events import KINDS as EVENTS
-from printhammer.chaos.continuation.events import BranchEvent
+from printhammer.chaos.continuation.branch import KINDS as EVENTS
+from printhammer.chaos.continuation.branch import Branch, BranchEvent
 from printhammer.chaos.curves.systems import KINDS
 from printhammer.errors import InputError
 from printhammer.results import Reopened, reopen

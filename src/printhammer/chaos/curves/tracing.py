@@ -20,9 +20,17 @@ from printhammer.chaos.curves.codimension import (
     resonance_test,
 )
 from printhammer.chaos.curves.normal_forms import doubling_coefficient
-from printhammer.chaos.curves.systems import GRAZING, TESTS, MultiplierSystem, Place, Plane, place_of
-from printhammer.chaos.curves.touches import GrazingSystem, ImpactSystem
-from printhammer.chaos.strobe.quiet import quiet_section
+from printhammer.chaos.curves.systems import (
+    GRAZING,
+    TESTS,
+    GrazingSystem,
+    ImpactSystem,
+    MultiplierSystem,
+    Place,
+    Plane,
+    place_of,
+)
+from printhammer.chaos.strobe.map import quiet_section
 from printhammer.errors import InputError
 from printhammer.support.threads import mapped
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, orbits_table
 from printhammer.results import Column, Result, part, scalar
-from printhammer.results.stacking import stacked
+from printhammer.results.result import stacked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -22,8 +22,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.chaos.orbits.maps import ExactMaps
-from printhammer.chaos.orbits.newton import CLOSED
+from printhammer.chaos.orbits.newton import CLOSED, ExactMaps
 from printhammer.chaos.orbits.orbit import SADDLE, Orbit, multipliers_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from printhammer.chaos.orbits.newton import Closing
-    from printhammer.run.energy.ledger import Ledger
+    from printhammer.run.energy import Ledger
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Final, SupportsIndex, Unpack
 
 import numpy as np
 
-from printhammer.chaos.orbits.maps import ExactMaps
-from printhammer.chaos.orbits.newton import close_orbits
+from printhammer.chaos.orbits.newton import ExactMaps, close_orbits
 from printhammer.chaos.orbits.orbit import Orbit, no_orbit, orbit_of
 from printhammer.chaos.orbits.stages import LONE, Search, shortest
 from printhammer.chaos.strobe.map import MAP_TOLERANCE, read_state

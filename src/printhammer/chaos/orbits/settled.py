@@ -20,8 +20,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.orbits.maps import ExactMaps
-from printhammer.chaos.orbits.newton import close_orbits
+from printhammer.chaos.orbits.newton import ExactMaps, close_orbits
 from printhammer.chaos.orbits.orbit import multipliers_of
 from printhammer.chaos.strobe.map import MAP_TOLERANCE
 from printhammer.results import Declared, part

@@ -3,24 +3,33 @@
 A train of firings is an iterated map, the stroboscopic map, in the plane of displacement and velocity: from
 the state at one firing to that at the next. Where a firing falls inside a pack contact, the state also has
 the branch of the pack's law and its memory, the latest local maximum.
+
+Strobe points and verdicts as the two integrators of the paper compute them, on its schedule of steps.
+
+The panels of Fig. 11 were judged by eye from such points. Fixed steps that locate no contact are not the
+motion: they add errors of their own to it, at every touch, and these make a map of their own, which jumps
+where a step just reaches a contact or just does not. It has no tangent, so that no exponent backs a verdict:
+here a train is strange if no period up to 64 is found, which is what a reader of such a plot has to say.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, SupportsIndex, Unpack
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.strobe.train import States, Train, run_trains
-from printhammer.chaos.strobe.verdict import FIRST, LAST, Verdict
+from printhammer.chaos.strobe.verdict import FIRST, LAST, Verdict, verdict
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import TOLERANCE
-from printhammer.run.regime import Firing, Regime, regimes_of
-from printhammer.run.window import Window, window_of
+from printhammer.run.regime import Firing, Regime, Window, regimes_of, window_of
+from printhammer.run.scheme_runs import READINGS, Reading, Scheme, SchemeProblem
+from printhammer.run.start import initial_state
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,6 +39,7 @@ if TYPE_CHECKING:
     from printhammer.drive.base import Overlap
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
@@ -260,3 +270,76 @@ def strobe_of(
         tolerance=tolerance,
         verdict=judged,
     )
+
+
+SCHEMES: Final[tuple[Scheme, ...]] = ("runge-kutta-4", "trapezoid")
+
+
+def scheme_strobes(
+    hammers: Hammer | Sequence[Hammer],
+    periods: Sequence[float | str],
+    scheme: Scheme,
+    *,
+    reading: Reading = "firings",
+    points: int = POINTS,
+    firings: tuple[int, int] = (FIRST, LAST),
+    progress: Progress | None = None,
+) -> list[Strobe]:
+    """Return the strobe points of trains from rest, as a scheme of 1983 computes them.
+
+    Parameters
+    ----------
+    hammers, periods
+        Hammers and the times between their firings, see `printhammer.run.regime.regimes_of`.
+    scheme : str
+        "runge-kutta-4" or "trapezoid".
+    reading : str, optional
+        When the short step is taken, see `printhammer.run.scheme_runs.READINGS`.
+    points, firings, progress
+        As for `printhammer.chaos.strobes`; the points are those from the first firing on.
+
+    Returns
+    -------
+    list of Strobe
+        One for each train, with its verdict: a period, "strange" where no period up to 64 is found, or
+        "undecided" where the scheme failed on the way.
+
+    Raises
+    ------
+    InputError
+        The scheme or the reading is not known, or a hammer has no rest state or waveform.
+    """
+    if scheme not in SCHEMES or reading not in READINGS:
+        known = f"{' or '.join(SCHEMES)}, and {', '.join(READINGS)}"
+        raise InputError(f"scheme = {scheme!r} with reading = {reading!r}, expected {known}")
+    regimes = regimes_of(hammers, periods)
+    strobed = []
+    for done, regime in enumerate(regimes, 1):
+        train = Train.of(regime, max(points, firings[1]))
+        count = max(points, firings[1])
+        moments = train.times(np.arange(1, count + 1))
+        problem = SchemeProblem(
+            train.hammer, train.drive, initial_state(train.hammer, None), TOLERANCE, scheme, reading=reading
+        )
+        states = States(*problem.strobed(moments))
+        chosen = np.arange(1, points + 1)
+        shown = _part(states, slice(0, points))
+        strobed.append(strobe_of(train, chosen, shown, TOLERANCE, _judged(states, train, firings)))
+        if progress is not None:
+            progress(done, len(regimes))
+    return strobed
+
+
+def _part(states: States, some: slice) -> States:
+    names = ("t", "x", "v", "branch", "memory")
+    return replace(states, **{name: getattr(states, name)[some] for name in names})
+
+
+def _judged(states: States, train: Train, firings: tuple[int, int]) -> Verdict:
+    first, last = firings
+    judged = _part(states, slice(first - 1, last))
+    stopped = states.status if np.isnan(states.x[last - 1]) else ""
+    result = verdict(judged.distances(train), firings, TOLERANCE, None, stopped)
+    if result.period is None and not stopped:
+        return replace(result, name="strange", reason="")
+    return result

@@ -1,30 +1,79 @@
-"""Trains from rest to their last strobe point, together on all cores, and verdicts on them."""
+"""Trains from rest to their last strobe point, together on all cores, and verdicts on them.
+
+States with which a train goes on where another ended, and which trains may be run piece by piece.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from printhammer.chaos.orbits.settled import Settled, settled
-from printhammer.chaos.strobe.handing import FROM_REST, STRETCH, forgets, handed_on, pack_branches
 from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import Ensemble
+from printhammer.run.regime import window_of
+from printhammer.run.start import AT_REST, HELD_BRANCHES, state_to_begin
 from printhammer.run.supply import current_scale
-from printhammer.run.window import window_of
 from printhammer.support.threads import Progress, mapped, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    import numpy.typing as npt
 
     from printhammer.derivatives.states import Exponent
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
     from printhammer.support.arrays import FloatArray, IntArray
+
+State = tuple[float, ...]
+"""Displacement, m, velocity, m/s, and what belongs to a state beside them: `printhammer.run.start.Beyond`."""
+
+NO_CURRENT: Final = AT_REST[2:]
+"""The electric part of a state without current."""
+
+FROM_REST: Final[State] = (math.nan, math.nan, *AT_REST)
+"""Row of a state that stands for a train that begins at rest, with nothing fired before."""
+
+STRETCH: Final = 1
+"""Firings that are run at a time where a train may be run piece by piece.
+
+Time is rounded to a part of itself, and the phase of a force with it; a ball that comes to rest on a table
+and leaves it again makes a hundred million times as much of that. Runs of one period each are all alike, so
+that a motion that forgets its past repeats itself to the last bit.
+"""
+
+
+def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
+    """Return the branches of the pack on which states lie, 0 outside of it."""
+    branches = np.where(x > front, branch, 0).astype(np.int64)
+    for held, part_of in HELD_BRANCHES.items():
+        branches[branches == held] = part_of
+    return branches
+
+
+def handed_on(
+    hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
+) -> State:
+    """Return the state with which another train goes on; `FROM_REST` where none can."""
+    begun = state_to_begin(hammer, x, v, mode, memory)
+    return FROM_REST if begun is None else (*begun, *electric)
+
+
+def forgets(regime: Regime) -> bool:
+    """Tell whether displacement and velocity at a firing are all that a motion goes on from, at any time.
+
+    So it is under a force without end, with a rigid backstop and no pack.
+    """
+    backstop = regime.hammer.backstop
+    rigid = backstop is not None and backstop.law == "rigid"
+    return regime.drive is not None and regime.hammer.pack is None and rigid
+
 
 _BEFORE: Final = 100
 """Firings before an exponent counts."""

@@ -15,7 +15,7 @@ from printhammer.control.feedback.controller import CONTACT, LEADS, WINDOW, Cont
 from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples, run_key
 from printhammer.control.feedback.loop import Loop
 from printhammer.hammer.equilibrium import rest_state
-from printhammer.printing.dots.slots import slot_times
+from printhammer.printing.dots.strategy import slot_times
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 

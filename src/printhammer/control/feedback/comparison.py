@@ -15,15 +15,14 @@ import numpy as np
 
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
-from printhammer.control.feedback.driver import LARGEST_CURRENT, Driver, driver_of
 from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.control.feedback.fronts import OFFSETS, STEPS
+from printhammer.control.feedback.plant import LARGEST_CURRENT, Driver, driver_of
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import WAIT, Nominal
-from printhammer.printing.dots.slots import slots_of
-from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
+from printhammer.printing.dots.strategy import Strategy, name_of, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.results import Declared, Result, column, coordinate, part, scalar

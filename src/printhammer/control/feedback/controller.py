@@ -15,21 +15,20 @@ import numpy as np
 from printhammer.control.feedback.estimator.adaptation import Contacts
 from printhammer.control.feedback.estimator.flight import Expected, FreeForce, flight_from_samples
 from printhammer.control.feedback.fronts import between_fronts, fronts
-from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, force_map
-from printhammer.control.feedback.interpolation import blend_known
-from printhammer.control.feedback.launch import launch
+from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, blend_known, force_map
 from printhammer.control.feedback.loop import APART, REMEMBERED, Loop, Printed, Pulse, Touched
 from printhammer.control.feedback.plant import Plant
 from printhammer.control.feedback.policy import KNOWN, Choice, Committed, Policy, between
+from printhammer.control.feedback.soft_landing import launch
 from printhammer.errors import InputError
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.control.feedback.driver import Driver
     from printhammer.control.feedback.estimator.sensor import Samples
+    from printhammer.control.feedback.plant import Driver
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress

@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.feedback.impact_map import force_map, impact_map, released_forces
-from printhammer.control.feedback.interpolation import place_of
+from printhammer.control.feedback.impact_map import force_map, impact_map, place_of, released_forces
 from printhammer.control.feedback.soft_landing import Landing, soft_landing
 
 if TYPE_CHECKING:
     from printhammer.control.feedback.impact_map import ForceMap, ImpactMap
-    from printhammer.control.feedback.launch import Launch
     from printhammer.control.feedback.plant import Plant
+    from printhammer.control.feedback.soft_landing import Launch
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
 

@@ -5,6 +5,8 @@ flies *freely*: it was released before impact). The coil is then held at the pus
 the return current until `fire`, and at the push current again: up to the next touch and beyond, or for some
 width after which the armature flies freely. Which force this prints, and when and how fast the next touch
 comes, has nothing to do with the rate of printing: one map holds for all rates.
+
+Linear interpolation in the tables of the controller, many places at once.
 """
 
 from __future__ import annotations
@@ -15,8 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 if TYPE_CHECKING:
-    from printhammer.control.feedback.driver import Driver
-    from printhammer.control.feedback.plant import Plant
+    from printhammer.control.feedback.plant import Driver, Plant
     from printhammer.drive.waveforms.shapes import Switched
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
@@ -202,3 +203,26 @@ def first_pulse(kind: int, release: float, back: float, fire: float, driver: Dri
         levels.append(driver.current)
     at += [AHEAD + release, AHEAD + fire]
     return driver.switched(at, [*levels, back, 0.0], levels[0])
+
+
+def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the node below each value, and the share of the one above; nodes are evenly spaced."""
+    place = (values - nodes[0]) / (nodes[1] - nodes[0])
+    below = np.clip(place.astype(np.int64), 0, len(nodes) - 2)
+    return below, place - below
+
+
+def blend(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
+    """Return values between two, nearer the second one the larger its share."""
+    return np.asarray((1.0 - share) * low + share * high)
+
+
+def bilinear(table: FloatArray, i: IntArray, p: FloatArray, j: IntArray, q: FloatArray) -> FloatArray:
+    """Return values of a table between rows i and i + 1, share p, and columns j and j + 1, share q."""
+    low, high = blend(table[i, j], table[i, j + 1], q), blend(table[i + 1, j], table[i + 1, j + 1], q)
+    return blend(low, high, p)
+
+
+def blend_known(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
+    """Return values between two; where one is NaN, the other."""
+    return blend(np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high), share)

@@ -11,7 +11,7 @@ from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Switched
 
 if TYPE_CHECKING:
-    from printhammer.control.feedback.driver import BoundedSequence, Driver
+    from printhammer.control.feedback.plant import BoundedSequence, Driver
     from printhammer.support.arrays import FloatArray
 
 REMEMBERED: Final = 4  # Number of the latest pulses of which anything can be left

@@ -17,11 +17,10 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from printhammer.control.feedback.fronts import MIDDLE, OFFSETS, Fronts, between_fronts
-from printhammer.control.feedback.impact_map import FORCES, ImpactMap
-from printhammer.control.feedback.interpolation import bilinear, blend, place_of
+from printhammer.control.feedback.impact_map import FORCES, ImpactMap, bilinear, blend, place_of
 
 if TYPE_CHECKING:
-    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.judging import Limits
     from printhammer.support.arrays import FloatArray, IntArray
 
 NEVER: Final = 50.0  # Cost of what leads nowhere

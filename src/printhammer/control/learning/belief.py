@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from printhammer.printing.rates.variability import WIDEST
-from printhammer.support.works import together
+from printhammer.support.threads import together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.support.arrays import FloatArray
-    from printhammer.support.works import Work
+    from printhammer.support.threads import Work
 
     T = TypeVar("T")
     # Asks for the readings of units, (M, readings), by their constants, (M, constants); NaN for lost dots.

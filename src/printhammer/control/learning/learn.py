@@ -1,27 +1,151 @@
-"""Learn a table on a unit: what it prints before, while and after."""
+"""Learn a table on a unit: what it prints before, while and after.
+
+Units that are calibrated side by side, each by a learner of its own.
+
+What a hammer prints while it learns its table.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, SupportsIndex
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.calibrate import calibrate
-from printhammer.control.learning.law import PRINTED, RUNS
+from printhammer.control.learning.ladder import DOTS
+from printhammer.control.learning.law import PRINTED, RUNS, LearningLaw
+from printhammer.control.learning.learner import Learner
+from printhammer.control.learning.lines import LINE, Press, printed
 from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
-from printhammer.control.learning.result import Learning
 from printhammer.control.learning.sensor import ImpactSensor
-from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT
+from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, with_pulse
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.printing.rates.variability import Variability
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.support.threads import together
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
+    from printhammer.control.learning.sensor import ImpactSensor
+    from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.judging import Judgement, Limits
+    from printhammer.printing.rates.variability import Variability
+    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+
+
+class Progress(NamedTuple):
+    """Where units stand after some dots each: what they print on the cycle, and on the last test line."""
+
+    dots: int
+    cycle: Judgement
+    line: Judgement
+    learned: BoolArray  # Which units print with the table that is learned, not in an open loop
+
+
+def calibrate(
+    law: LearningLaw,
+    units: Sequence[Hammer],
+    sensor: ImpactSensor,
+    report: Callable[[], None] = lambda: None,
+) -> tuple[list[Learner], list[Progress]]:
+    """Let a learner calibrate each of some units, hammers in which the pulse of the nominal one is fired.
+
+    A unit prints the same every time that it prints the same; so what one run of a stage prints, all do, and
+    only the readings differ. `report` is called after each stage.
+    """
+    task = law.entries.task
+    press = Press(task, law.entries.rate, [with_pulse(unit, task.pulse) for unit in units])
+    flights, forces = press.ladder(law.rungs)
+    learners = [Learner(law) for _ in units]
+    single = task.single.nominal
+    run, history = 0, []
+
+    def record(line: Judgement) -> None:
+        cycle = press.line([learner.printed for learner in learners], PRINTED)[1]
+        state = np.array([learner.learned for learner in learners])
+        history.append(
+            Progress(
+                run * (DOTS + len(LINE)),
+                cycle,
+                line,
+                state,
+            )
+        )
+
+    for number, runs in enumerate(RUNS):
+        dots, judgement = press.line([learner.settings for learner in learners])
+        if not number:
+            record(judgement)
+        for _ in range(runs):
+            for unit, learner in enumerate(learners):
+                rungs = sensor.read(flights[unit], forces[unit], unit, 2 * run)
+                line = sensor.read(
+                    dots.flight_time[unit], dots.peak_force[unit] / single.force, unit, 2 * run + 1
+                )
+                learner.see(rungs, line)
+            run += 1
+        printed(together([learner.learn() for learner in learners]), task)
+        record(judgement)
+        report()
+    return learners, history
+
+
+_DOTS = "stage dot"
+
+
+class Learning(Result, rows=_DOTS):
+    """A unit that calibrates its table, and what it prints at each stage, first in an open loop."""
+
+    hammer: Hammer = part("the nominal hammer, all that the learner knows")
+    unit: Hammer = part("the hammer that is driven", repr=False)
+    table: CompensationTable = part("what is learned, for this unit", repr=False)
+    rate: float = scalar("Hz", "slots per second", name="rate_Hz")
+    driver: str = scalar("", "what switches the coil")
+    sensor: ImpactSensor = part("what the learner is shown")
+    variability: Variability = part("what is known of the production")
+    limits: Limits = part("how far a dot may be off")
+    dots: IntArray = coordinate("1", "dots of test lines printed before", "stage", name="dots_learned")
+    learned: BoolArray = column(
+        "1", "whether the table is printed with, and not an open loop", "stage", dtype=np.int8
+    )
+    slot: IntArray = coordinate("1", "number of the slot", "dot", name="slot")
+    force_deviation: FloatArray = column(
+        "1", "peak force less that of the single pulse, in parts of it", _DOTS
+    )
+    arrival_deviation: FloatArray = column("s", "touch less slot time and single-pulse flight time", _DOTS)
+    good: BoolArray = column("1", "whether the dot is within limits", _DOTS, dtype=np.int8)
+    constants: tuple[str, ...] = coordinate("", "a constant that varies", "constant", name="constant")
+    believed: FloatArray = column("SI", "constant of the unit, as its readings tell it", "constant")
+    uncertainty: FloatArray = column("SI", "its standard deviation", "constant")
+    contraction: FloatArray = part("largest eigenvalue of the law at each update")
+    seed: int = scalar("1", "seed of the simulated hammers")
+
+    @property
+    def title(self) -> str:
+        """What it is, in a line."""
+        return f"{self.hammer.name} learns its table at {self.rate:g} Hz"
+
+    @property
+    def share(self) -> FloatArray:
+        """Share of the dots within limits at each stage."""
+        return np.asarray(self.good.mean(axis=1))
+
+    @property
+    def passed(self) -> bool:
+        """Whether all dots are within limits in the end."""
+        return bool(self.good[-1].all())
+
+    def notes(self) -> dict[str, Any]:
+        """Return limits, sensor noise and what is known of the production."""
+        return {
+            "limits": self.limits.text,
+            "variability": self.variability.text,
+            "sensor_noise_s": self.sensor.noise,
+            "serial": self.table.serial,
+        }
 
 
 def learn(

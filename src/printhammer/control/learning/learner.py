@@ -9,7 +9,7 @@ import numpy as np
 from printhammer.control.learning.belief import Belief, Evidence, believe
 from printhammer.control.learning.law import BAD, RUNS
 from printhammer.control.learning.lines import LINE
-from printhammer.support.works import translated
+from printhammer.support.threads import translated
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
+from printhammer.control.pulses import of_width
 from printhammer.control.table.drive import Settings, pulses_of, sequence
-from printhammer.control.widths import of_width
 from printhammer.drive.sequence import PulseSequence
 from printhammer.printing.dots.judging import Judgement, judge
 from printhammer.printing.dots.nominal import WAIT
-from printhammer.printing.dots.slots import cycle_with_lead_in, slot_times, slots_of
+from printhammer.printing.dots.strategy import cycle_with_lead_in, slot_times, slots_of
 from printhammer.run.ensemble import DotTable, Ensemble
-from printhammer.support.works import answered
+from printhammer.support.threads import answered
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import BoolArray, FloatArray
-    from printhammer.support.works import Work
+    from printhammer.support.threads import Work
 
     T = TypeVar("T")
     # Asks for what is printed.

@@ -6,22 +6,19 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.ladder import Rung, candidates, choose
-from printhammer.control.learning.law import LearningLaw
+from printhammer.control.learning.ladder import Rung, Surrogate, candidates, choose
+from printhammer.control.learning.law import Adjustable, LearningLaw
 from printhammer.control.learning.lines import printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
-from printhammer.control.learning.settings import Adjustable
-from printhammer.control.learning.surrogate import Surrogate
-from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, clearance, print_pulse
-from printhammer.control.table.drivers import driven_by
+from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, clearance, driven_by, print_pulse
 from printhammer.control.table.task import Task, single_of
 from printhammer.control.table.tuning import tune
 from printhammer.errors import InputError
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.support.works import together
+from printhammer.support.threads import together
 
 if TYPE_CHECKING:
     from collections.abc import Callable

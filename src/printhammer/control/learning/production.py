@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.learning.lines import LINE, Press
-from printhammer.support.works import together
+from printhammer.support.threads import together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

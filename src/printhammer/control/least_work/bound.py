@@ -22,7 +22,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.static_force import StaticForce
 from printhammer.results import Declared, scalar
-from printhammer.run.energy.ledger import stored_energy
+from printhammer.run.energy import stored_energy
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import CYCLE
 from printhammer.support.roots import bisect

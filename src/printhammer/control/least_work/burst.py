@@ -19,10 +19,9 @@ from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 import numpy as np
 
 from printhammer.control.least_work.bound import Bound, bound
-from printhammer.control.least_work.coil_force import CoilForce
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
-from printhammer.control.least_work.slot import Task
+from printhammer.control.least_work.slot import CoilForce, Task
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled, Waveform
@@ -35,8 +34,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
 from printhammer.run.contacts import Contact
-from printhammer.run.energy.coil_work import CoilWork, coil_power
-from printhammer.run.energy.ledger import Ledger, stored_energy
+from printhammer.run.energy import CoilWork, Ledger, coil_power, stored_energy
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate

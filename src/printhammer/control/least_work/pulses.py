@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.control.least_work.descent import ARRIVAL, LOST, best_of, descend, deviations, met, sobol
 from printhammer.control.least_work.slot import SlotState, Task, end_of
-from printhammer.control.widths import of_width, widest
+from printhammer.control.pulses import of_width, widest
 from printhammer.drive.sequence import PulseSequence
 from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble

@@ -8,16 +8,30 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.control.table.drive import COLUMNS, ROUNDING, Settings, print_pulse, pulses_of, sequence
-from printhammer.control.table.drivers import driven_by
-from printhammer.control.table.formats import HEAD, OPTIONAL, columns, csv_head, read_table
-from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
-from printhammer.control.table.histories import (
+from printhammer.control.table.drive import (
+    COLUMNS,
+    ROUNDING,
+    Settings,
     checked_size,
+    driven_by,
     entries_of,
     histories,
     history_text,
     number_of,
+    print_pulse,
+    pulses_of,
+    sequence,
+)
+from printhammer.control.table.formats import (
+    HEAD,
+    NANOSECOND,
+    OPTIONAL,
+    bits_of,
+    columns,
+    csv_head,
+    header_text,
+    read_table,
+    size_of,
 )
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
@@ -27,8 +41,7 @@ from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.support.outputs import write_file
-from printhammer.support.texts import read_text
+from printhammer.support.files import read_text, write_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +69,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     before it, `brake_delay` after the slot of the dot before it, a brake pulse of `brake_width` catches the
     armature on its way back, so that it does not rebound. What follows the last dot for long is the brake
     pulse of a dot from rest. Arrays have a column for each of the (reach + 1)**gaps numbers of histories, see
-    `printhammer.control.table.histories`; the Dataset has one for each history that differs.
+    `printhammer.control.table.drive`; the Dataset has one for each history that differs.
 
     Raises
     ------
@@ -85,7 +98,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         more="of force or arrival; nan where it is not known, and 1 is on the limit",
     )
     largest_current: float = scalar("A", "bound on the current that was kept to")
-    driver: str = scalar("", "what switches the coil, see `printhammer.control.table.drivers`", default="own")
+    driver: str = scalar("", "what switches the coil, see `printhammer.control.table.drive`", default="own")
     serial: str = scalar(
         "", "serial number of the unit that it was learned on", more="empty for all units", default=""
     )
@@ -237,7 +250,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         hammer, rate
             As for `strategy` and `at`.
         slots : sequence of int
-            Numbers of the slots, ascending; slot 0 is at `printhammer.printing.dots.slots.FIRST_SLOT`.
+            Numbers of the slots, ascending; slot 0 is at `printhammer.printing.dots.strategy.FIRST_SLOT`.
 
         Raises
         ------

@@ -1,4 +1,7 @@
-"""A compensation table in the making, and how far off the last dots of patterns are with it."""
+"""A compensation table in the making, and how far off the last dots of patterns are with it.
+
+All entries of a table made right: those of short histories first, since they come before the others.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +11,27 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.table.compensation import CompensationTable
-from printhammer.control.table.drive import COLUMNS, Settings, pulses_of, sequence
-from printhammer.control.table.histories import (
+from printhammer.control.table.drive import (
+    COLUMNS,
     REST,
+    History,
+    Settings,
     entries_of,
     histories,
     histories_of,
     number_of,
     pattern_of,
     plain,
+    pulses_of,
+    sequence,
     shared_numbers,
 )
+from printhammer.control.table.ways import solve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from printhammer.control.table.histories import History
+    from printhammer.control.table.drive import History
     from printhammer.control.table.task import Task
     from printhammer.drive.trains import Drive
     from printhammer.drive.waveforms.shapes import Waveform
@@ -31,7 +39,7 @@ if TYPE_CHECKING:
 
     Cells = Sequence[tuple[int, History]]
     """Entries by row and history."""
-
+    from collections.abc import Sequence
 
 VALUES: Final = (*COLUMNS, "deviation")  # Names of the arrays of a table
 # Length of the row of dots in every slot before a history, where it has to be right in long patterns too
@@ -178,3 +186,87 @@ def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
         return [(), late]
     row = (1,) * _DENSE
     return [(), late, (*row, reach), (*row, *late), (reach, 1, reach, 1)]
+
+
+GOOD: Final = 1e-4  # Deviation, in parts of the limits, from which on an entry is left as it is
+LEAST_OF_WIDEST: Final = 0.3  # Least width, in parts of the largest one
+# Deviation, in parts of the limits, above which an entry is made less wrong in all patterns
+ROUGH: Final = 0.2
+_STEP: Final = 0.5e-6  # Difference of times from which derivatives are taken, s
+
+
+def polish(draft: Draft) -> None:
+    """Improve all entries of a draft in place; that from rest stays as it is.
+
+    The draft has a first guess for every history.
+    """
+    task = draft.task
+    for known in range(1, task.gaps + 1):
+        level = histories_of_length(task, known)
+        for history in level if known > 1 else []:
+            parent = (*history[: known - 1], *[REST] * (task.gaps - known + 1))
+            guess = draft.values[:4, :, number_of(parent, task.reach)]
+            draft.values[:4, :, number_of(history, task.reach)] = guess
+        _polish_level(draft, level)
+    # Entries that come before others may have changed since they were judged.
+    draft.judge()
+    task.report()
+
+
+def _polish_level(draft: Draft, level: Sequence[History]) -> None:
+    """Improve the entries of some histories at all rates; what is printed from rest stays as it is.
+
+    At first each entry is made right in the pattern that begins with it: where all dots before are right, it
+    is right in all others as well. Where that cannot be, it is made less wrong in all.
+    """
+    settled = draft.task.single.settled
+    cells = [
+        (row, history)
+        for row, rate in enumerate(draft.rates.tolist())
+        for history in level
+        if history[0] / rate <= settled
+    ]
+    _solve(draft, cells, dense=False)
+    draft.judge(level)
+    if not cells:
+        return
+    rows, columns = draft.places(cells)
+    rough = [cells[k] for k in np.flatnonzero(draft.deviation[rows, columns] > ROUGH).tolist()]
+    if not rough:
+        return
+    before = draft.values.copy()
+    _solve(draft, rough, dense=True)
+    draft.judge(level)
+    rows, columns = draft.places(rough)
+    worse = ~(draft.deviation[rows, columns] < before[4, rows, columns])
+    draft.values[:, rows[worse], columns[worse]] = before[:, rows[worse], columns[worse]]
+
+
+def _solve(draft: Draft, cells: Cells, *, dense: bool) -> None:
+    if not cells:
+        return
+    task = draft.task
+    rows, columns = draft.places(cells)
+    gap = np.array([history[0] for _row, history in cells]) / draft.rates[rows]
+    first = task.earliest(*draft.brakes[:, rows, columns])
+
+    def measure(now: FloatArray, active: IntArray, shifts: FloatArray) -> FloatArray:
+        # Dots before the last one may have the same history.
+        draft.timing[:, rows, columns] = now.T
+        off = draft.last_dots([cells[k] for k in active.tolist()], now[active], shifts, dense=dense)
+        task.report()
+        return off
+
+    def bounded(now: FloatArray, active: IntArray, stepped: BoolArray) -> None:
+        on = active[stepped]
+        now[on, 0] = np.clip(now[on, 0], -task.latest(now[on, 1]), gap[on] - first[on])
+
+    draft.timing[:, rows, columns] = solve(
+        measure,
+        draft.timing[:, rows, columns].T,
+        steps=(_STEP, _STEP),
+        good=GOOD,
+        least=LEAST_OF_WIDEST * task.widest,
+        most=task.widest,
+        bounded=bounded,
+    ).T

@@ -1,27 +1,133 @@
-"""From the settings of a compensation table to a drive: a pulse for each dot, and a brake pulse after it."""
+"""From the settings of a compensation table to a drive: a pulse for each dot, and a brake pulse after it.
+
+The history of a dot: how many slots ago the dots before it were printed.
+
+A history of length n holds the gaps, in slots, from the dot to the one before it, from that one to the one
+before, and so on, n of them. A gap longer than the reach G tells nothing any more: the hammer is at rest by
+then, whatever was printed before. It is written as 0, "rest", and so is everything that lies before it.
+
+Histories are numbered with the latest gap as the most significant of n digits to the base G + 1, which is the
+index that the firmware computes. Numbers of which a digit follows a rest stand for the same dot as the number
+that is all rest from there on.
+
+What switches the coil: the hammer's own pulse, or a fast switch on a higher rail.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+import itertools
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from printhammer.control.coil_current import fading_current, peak_current
-from printhammer.control.table.histories import histories_of
-from printhammer.control.widths import of_width, widest
+from printhammer.control.pulses import fading_current, of_width, peak_current, widest
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.drivers import PeakAndHold, Rail
-from printhammer.drive.waveforms.shapes import Chain, Waveform
+from printhammer.drive.waveforms.shapes import Chain, Rectangle, Waveform
 from printhammer.errors import InputError
-from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settled_from
-from printhammer.printing.dots.slots import slot_times
+from printhammer.printing.dots.strategy import slot_times
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
+
+REST: Final = 0  # Gap of a dot that is printed from rest
+MOST_GAPS: Final = 4  # Largest number of gaps in a history
+MOST_REACH: Final = 8  # Largest reach, slots
+History = tuple[int, ...]
+
+
+def checked_size(gaps: int, reach: int) -> tuple[int, int]:
+    """Return number of gaps and reach.
+
+    Raises
+    ------
+    InputError
+        They are not whole numbers within bounds.
+    """
+    for name, value, most in (("history", gaps, MOST_GAPS), ("reach", reach, MOST_REACH)):
+        if isinstance(value, bool) or not 1 <= value <= most:
+            raise InputError(f"{name} = {value!r}, expected a whole number from 1 to {most}")
+    return int(gaps), int(reach)
+
+
+def entries_of(gaps: int, reach: int) -> int:
+    """Return the number of numbers of histories."""
+    return int((reach + 1) ** gaps)
+
+
+def plain(history: Sequence[int]) -> History:
+    """Return a history in which everything before a rest is rest."""
+    known = list(itertools.takewhile(lambda gap: gap != REST, history))
+    return (*known, *[REST] * (len(history) - len(known)))
+
+
+def number_of(history: Sequence[int], reach: int) -> int:
+    """Return the number of a history."""
+    number = 0
+    for gap in plain(history):
+        number = number * (reach + 1) + gap
+    return number
+
+
+def histories(gaps: int, reach: int) -> list[History]:
+    """List all histories that differ, those with more rest first, so that what comes before is known."""
+    every = itertools.product(range(reach + 1), repeat=gaps)
+    return sorted((row for row in every if row == plain(row)), key=lambda row: (gaps - row.count(REST), row))
+
+
+def shared_numbers(gaps: int, reach: int) -> IntArray:
+    """Return for every number that of the history it stands for, shape (entries,)."""
+    every = itertools.product(range(reach + 1), repeat=gaps)
+    return np.array([number_of(row, reach) for row in every], np.int64)
+
+
+def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
+    """Return the number of the history of each dot of a pattern that begins at rest.
+
+    The last one, of dots + 1, is that of a dot long after, which is printed from rest: all rest. `slots` are
+    those at which dots are wanted, ascending.
+
+    Raises
+    ------
+    InputError
+        The slots do not ascend.
+    """
+    steps = np.diff(np.asarray(slots, np.int64))
+    if (steps < 1).any():
+        raise InputError(f"slots = {tuple(slots)}, expected ascending numbers")
+    recent = [REST] * gaps
+    numbers = [number_of(recent, reach)]
+    for step in steps.tolist():
+        recent = [step if step <= reach else REST, *recent[:-1]]
+        numbers.append(number_of(recent, reach))
+    return np.array([*numbers, number_of([REST] * gaps, reach)], np.int64)
+
+
+def gap_text(gap: int) -> str:
+    """Return a gap in words."""
+    return "rest" if gap == REST else str(gap)
+
+
+def history_text(history: Sequence[int]) -> str:
+    """Return a history in words, such as "1-2-rest"."""
+    return "-".join(map(gap_text, history))
+
+
+def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int, ...]:
+    """Return the slots of a pattern whose last dot has a history.
+
+    `before` are further gaps, the latest first, of dots still earlier; for a history without rest only.
+    """
+    gaps = [gap for gap in (*plain(history), *before) if gap != REST]
+    return tuple(itertools.accumulate(reversed(gaps), initial=0))
+
 
 WIDEST: Final = 2.0  # Largest width of a pulse, in parts of that of the hammer's own
 LARGEST_CURRENT: Final = 2.0  # Largest current in any drive by default, A
@@ -157,3 +263,84 @@ def sequence(
             known[key] = Chain(parts=((0.0, plain), (offset, brake_of(pulse, braked)))) if braked else plain
         waveforms.append(known[key])
     return PulseSequence(waveforms, at=pulses.fired.tolist())
+
+
+Driver = Literal["own", "switch", "bridge"]
+DRIVERS: Final = get_args(Driver)
+"""The hammer's own pulse, with the rise of its supply; a fast unipolar switch, whose current rises as fast as
+that of the hammer falls; an H-bridge, which switches off against the reversed rail."""
+
+# Time constant of the decay against the reversed rail, in parts of that of the rise: the current falls as
+# 2 exp(-t) - 1 and is zero at ln 2; an exponential of this constant has the same charge.
+_REVERSED: Final = 1.0 - float(np.log(2.0))
+
+_EDGE: Final = 20e-6  # Time constant of a switch where the waveform of the hammer has no decay, s
+_LEAST_EDGE: Final = 1e-6  # Least time constant of a switch, s
+_GRID: Final = 33  # Number of widths that are tried at a time
+_ROUNDS: Final = 7  # How often: each time between two neighbours of the one before
+
+
+def checked_driver(driver: str) -> Driver:
+    """Return a driver by its name.
+
+    Raises
+    ------
+    InputError
+        There is none of that name.
+    """
+    if driver not in DRIVERS:
+        raise InputError(f"driver = {driver!r}, expected {', '.join(DRIVERS[:-1])} or {DRIVERS[-1]}")
+    return driver  # type: ignore[return-value]
+
+
+def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
+    """Return a hammer with the pulse of a driver, of a width at which the dot is as hard as before.
+
+    `largest` is the current of a switch or a bridge, A.
+
+    Raises
+    ------
+    InputError
+        The driver is not known, the waveform of the hammer is a force, or no width makes such a dot.
+    """
+    if checked_driver(driver) == "own":
+        return hammer
+    own: Any = pulse_of(hammer)
+    if own.quantity != "current":
+        raise InputError(
+            f"{hammer.path}: the waveform is a {own.quantity}, expected a current, or driver = 'own'"
+        )
+    edge = max(float(getattr(own, "decay", _EDGE)), _LEAST_EDGE)
+    force = nominal(hammer, tolerance=DISPLAY_TOLERANCE).force
+    decay = edge * (_REVERSED if driver == "bridge" else 1.0)
+    shape = Rectangle(amplitude=largest, width=edge, rise=edge, decay=decay)
+    return of_force(hammer, shape, force, 0.5 * edge, 2.0 * float(getattr(own, "width", own.support)))
+
+
+def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
+    """Return a hammer fired by a pulse of such a width, between two, s, that the dot has a force, N.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    for _ in range(_ROUNDS):
+        widths = np.linspace(low, high, _GRID).tolist()
+        pulses = [of_width(pulse, width) for width in widths]
+        dots = single_pulses([hammer] * _GRID, pulses, tolerance=DISPLAY_TOLERANCE)
+        hard = [dot is not None and dot.force >= force for dot in dots]
+        if hard[0] or not any(hard):
+            raise InputError(
+                f"{hammer.path}: no width of the pulse makes a dot of {force:.4g} N, expected another"
+                " largest_current, or a hammer nearer to its design"
+            )
+        first = hard.index(True)
+        low, high = widths[first - 1], widths[first]
+    return with_pulse(hammer, of_width(pulse, high))
+
+
+def with_pulse(hammer: Hammer, pulse: Waveform) -> Hammer:
+    """Return a hammer that is fired by another pulse."""
+    constants = {key: value for key, value in dict(pulse).items() if key != "quantity"}
+    return hammer.replace("waveform", {"shape": pulse.shape, **constants}, source="of the driver")

@@ -8,13 +8,12 @@ import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
-from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slots_of
-from printhammer.printing.dots.strategy import Strategy, open_loop
+from printhammer.printing.dots.strategy import LEAD_IN, Strategy, cycle_with_lead_in, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
-from printhammer.printing.rates.perturbation import Perturbation, perturbed
 from printhammer.printing.rates.safe_rate import from_rest
+from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 

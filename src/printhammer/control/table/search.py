@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.control.table.compensation import JUMP
-from printhammer.control.table.newton import largest_of
 from printhammer.control.table.ways import (
     LEAST_OF_OWN,
     Ways,
     costs,
     fits,
     joined,
+    largest_of,
     seconds,
     solved,
     ways_of,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.judging import Limits
     from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, in parts of the way to the pack

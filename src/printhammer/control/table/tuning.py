@@ -1,4 +1,7 @@
-"""Tune a compensation table for a hammer: every dot like a dot from rest, whatever was printed before it."""
+"""Tune a compensation table for a hammer: every dot like a dot from rest, whatever was printed before it.
+
+Rates between the rates of a table: where the table is no good there, more rates are put in between.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +10,24 @@ from typing import TYPE_CHECKING, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.table.draft import Draft, blank
-from printhammer.control.table.drive import LARGEST_CURRENT, clearance, print_pulse
-from printhammer.control.table.drivers import driven_by
-from printhammer.control.table.histories import checked_size, histories, number_of
-from printhammer.control.table.newton import ROUNDS
-from printhammer.control.table.polish import polish
-from printhammer.control.table.refine import refined
-from printhammer.control.table.search import SPACING, chosen, spaced
+from printhammer.control.table.draft import Draft, blank, polish
+from printhammer.control.table.drive import (
+    LARGEST_CURRENT,
+    REST,
+    checked_size,
+    clearance,
+    driven_by,
+    histories,
+    number_of,
+    print_pulse,
+)
+from printhammer.control.table.search import BAD, SPACING, chosen, searched, spaced
 from printhammer.control.table.task import Single, Task, single_of
+from printhammer.control.table.ways import ROUNDS, costs, solved, ways_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.limits import Limits
-from printhammer.printing.rates.perturbation import Perturbation, perturbed
+from printhammer.printing.dots.judging import Limits
+from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 if TYPE_CHECKING:
@@ -28,7 +36,81 @@ if TYPE_CHECKING:
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.rates.variability import Variability
-    from printhammer.support.arrays import FloatArray
+    from printhammer.support.arrays import FloatArray, IntArray
+
+HALVINGS: Final = 3  # How often the step between two rates is halved at most
+# Deviation between two rates, in parts of the limits, from which on there is one more between them
+BETWEEN: Final = 0.5
+
+
+def refined(draft: Draft) -> Draft:
+    """Put rates between those of a table where it is not good enough halfway between two of them.
+
+    Such places are where the way to fire a dot changes. The new entries follow that of the rate below or that
+    of the rate above, whichever is the better one; where neither is good, another one is looked for.
+    """
+    # Rates at which every dot is printed from rest need nothing.
+    lower = np.flatnonzero(1.0 / draft.rates[1:] <= draft.task.single.settled)
+    wanted = set(draft.rates[lower].tolist())
+    for _ in range(HALVINGS):
+        lower = np.flatnonzero(np.isin(draft.rates, list(wanted)))
+        lower = lower[lower < draft.rates.size - 1]
+        if not lower.size:
+            break
+        halfway = _halfway(draft, lower)
+        draft.task.report()
+        lower = lower[~(halfway.worst <= BETWEEN)]
+        if not lower.size:
+            break
+        more = _tuned(draft, lower)
+        wanted = {*draft.rates[lower].tolist(), *more.rates.tolist()}
+        rates = np.concatenate([draft.rates, more.rates])
+        order = np.argsort(rates, kind="stable")
+        values = np.concatenate([draft.values, more.values], axis=1)
+        draft = Draft(draft.task, rates[order], values[:, order])
+    return draft
+
+
+def _halfway(draft: Draft, lower: IntArray) -> Draft:
+    """Return what the table says halfway between some rates and those above them, and how good that is."""
+    table = draft.table()
+    rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
+    settings = np.array([table.at(float(rate)) for rate in rates])
+    values = np.concatenate([settings, np.zeros_like(settings[:, :1])], axis=1).transpose(1, 0, 2)
+    halfway = Draft(draft.task, rates, values)
+    halfway.judge()
+    return halfway
+
+
+def _tuned(draft: Draft, lower: IntArray) -> Draft:
+    """Return tuned rows halfway between some rates and those above them."""
+    task = draft.task
+    rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
+    halfway = Draft(task, rates, draft.values[:, lower])
+    for gap in range(1, task.reach + 1):
+        periods = gap / rates
+        near = np.flatnonzero(periods <= task.single.settled)
+        if not near.size:
+            continue
+        column = number_of((gap, *[REST] * (task.gaps - 1)), task.reach)
+        cells = []
+        for row in near.tolist():
+            for side in (lower[row], lower[row] + 1):
+                advance, width, delay, brake = draft.values[:4, side, column].tolist()
+                cells.append((float(periods[row]), delay, brake, float(periods[row]) - advance, width))
+        ways = solved(task, ways_of(cells))
+        cost = costs(task, ways).reshape(-1, 2)
+        for place, row in enumerate(near.tolist()):
+            best = ways.take([2 * place + int(cost[place].argmin())])
+            if not cost[place].min() <= BAD:
+                # Neither goes on from its rate to here; perhaps there is one more.
+                more = searched(task, float(periods[row]))
+                if more.size and more.cost.min() < cost[place].min():
+                    best = more.take([int(more.cost.argmin())])
+            halfway.values[:4, row, column] = best.settings[:, 0]
+    polish(halfway)
+    return halfway
+
 
 FIRST: Final = 100.0  # Lowest rate of a table over all rates, Hz: every dot is printed from rest
 STEP: Final = 5.0  # Step between the rates of such a table, Hz
@@ -94,7 +176,7 @@ def tune(
         Tune width and advance on the hammers that differ as well, for the least mean square of all, instead
         of on this hammer alone.
     driver : str, optional
-        What switches the coil, of `DRIVERS` in `printhammer.control.table.drivers`: "own", the pulse of the
+        What switches the coil, of `DRIVERS` in `printhammer.control.table.drive`: "own", the pulse of the
         hammer or the driver of its coil, "switch", a fast unipolar switch, or "bridge", an H-bridge. With
         these two, which replace a current, the dot from rest is as hard as with the own pulse, and is fired
         so much later that it arrives as it does.
@@ -155,7 +237,7 @@ def tune(
         report=_counter(progress, steps),
         mean_square=variability is not None,
     )
-    draft = _tuned(task, grid, open_ended=asked is None)
+    draft = _tuned_tuning(task, grid, open_ended=asked is None)
     if asked is None:
         return refined(draft.rows(np.arange(_usable(draft)))).table().fired_by(driver, hammer)
     _tune_again(draft)
@@ -210,12 +292,12 @@ def _tune_again(draft: Draft) -> None:
     poor = np.flatnonzero(~(draft.worst <= _POOR))
     if not poor.size:
         return
-    again = _tuned(draft.task, draft.rates[poor], around=_AROUND)
+    again = _tuned_tuning(draft.task, draft.rates[poor], around=_AROUND)
     better = again.worst < draft.worst[poor]
     draft.values[:, poor[better]] = again.values[:, better]
 
 
-def _tuned(
+def _tuned_tuning(
     task: Task, rates: FloatArray, *, open_ended: bool = False, around: FloatArray | None = None
 ) -> Draft:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.

@@ -1,23 +1,137 @@
-"""A sampled waveform: a measured record of current or force."""
+"""A sampled waveform: a measured record of current or force.
+
+Records of a measured current or force: checked samples, and CSV files with units in the heading.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from printhammer.drive.segments import POLYNOMIAL, table
-from printhammer.drive.waveforms.base import QuantityName, Waveform
-from printhammer.drive.waveforms.record import Samples, checked, read_csv
+from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName, Waveform
+from printhammer.errors import InputError, located
 from printhammer.support.constants import folder_of
+from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     import numpy.typing as npt
 
     from printhammer.support.arrays import FloatArray
+
+_UNITS: Final = {name: si for si, name in QUANTITY_UNITS.items()}
+_HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples in SI: times since the firing, values, and what they drive."""
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+    quantity: QuantityName
+
+
+def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName, what: str) -> Samples:
+    """Check samples and make a record of them.
+
+    Raises
+    ------
+    InputError
+        Fewer than two samples, different lengths, a sample not finite, a time negative or not above the one
+        before.
+    """
+    try:
+        t = np.asarray(times, dtype=np.float64)
+        y = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{what}: the samples are expected to be numbers") from None
+    if t.ndim != 1 or t.shape != y.shape:
+        raise InputError(f"{what}: {t.size} times and {y.size} values, expected one value for each time")
+    if len(t) < 2:
+        raise InputError(f"{what}: {len(t)} samples, expected at least 2")
+    for name, column in (("time", t), ("value", y)):
+        bad = np.flatnonzero(~np.isfinite(column))
+        if len(bad):
+            raise InputError(
+                f"{what}: {name} {column[bad[0]]} of sample {bad[0] + 1} is expected to be finite"
+            )
+    if t[0] < 0.0:
+        raise InputError(f"{what}: first time {t[0]:.9g} s is expected to be 0 or later (the firing is at 0)")
+    bad = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(bad):
+        k = int(bad[0]) + 1
+        order = f"{t[k]:.9g} s (sample {k + 1}) follows {t[k - 1]:.9g} s"
+        raise InputError(f"{what}: times are expected to increase strictly, but {order}")
+    if quantity not in _UNITS:
+        raise InputError(f"{what}: quantity = {quantity!r} is expected to be current or force")
+    return Samples(tuple(t.tolist()), tuple(y.tolist()), quantity)
+
+
+def read_csv(path: Path) -> Samples:
+    """Read a record from a CSV file.
+
+    Its columns are ``time [unit]`` and ``current [unit]`` or ``force [unit]``. Blank lines and lines that
+    begin with # are passed over.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, is empty, lacks units, or holds something else than finite numbers at
+        increasing times.
+    """
+    what = str(path)
+    rows = read_sheet(path, "the sampled waveform").rows
+    if not rows:
+        raise InputError(
+            f"{what}: the file is empty, expected the heading {_HEADINGS} and at least 2 samples"
+        )
+    time_unit, name, unit = _heading(rows[0][1], what)
+    columns: tuple[list[float], list[float]] = ([], [])
+    for line, row in rows[1:]:
+        if len(row) != 2:
+            raise InputError(f"{what}: line {line} has {len(row)} cells, expected 2")
+        for cell, column in zip(row, columns, strict=True):
+            column.append(finite(cell, f"{what}: line {line}"))
+    return checked(
+        _converted(columns[0], time_unit, "s", what),
+        _converted(columns[1], unit, _UNITS[name], what),
+        name,
+        what,
+    )
+
+
+def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
+    """Return the unit of time, what is driven, and its unit."""
+    if len(cells) != 2:
+        raise InputError(f"{what}: {len(cells)} columns, expected the 2 columns {_HEADINGS}")
+    names, units = zip(*map(split_heading, cells), strict=True)
+    for cell, unit in zip(cells, units, strict=True):
+        if not unit:
+            raise InputError(
+                f"{what}: heading {cell.strip()!r} is expected to carry its unit, such as 'time [us]'"
+            )
+    names = tuple(name.lower() for name in names)
+    for quantity in _UNITS:
+        if names == ("time", quantity):
+            return units[0], quantity, units[1]
+    raise InputError(f"{what}: columns {names[0]!r} and {names[1]!r}, expected {_HEADINGS}")
+
+
+def _converted(column: list[float], unit: str, si: str, what: str) -> list[float]:
+    """Convert a column to SI."""
+    from printhammer.units import to_si
+
+    with located(what):
+        to_si(1.0, unit, si)
+        return [to_si(number, unit, si) for number in column]
+
 
 Interpolation = Literal["pchip", "linear"]
 

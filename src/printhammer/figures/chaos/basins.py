@@ -1,4 +1,9 @@
-"""Basins in the plane of the initial states, each in a colour, with the attractors drawn in."""
+"""Basins in the plane of the initial states, each in a colour, with the attractors drawn in.
+
+Stable and unstable manifolds of saddles in the plane of displacement and velocity.
+
+The quench map: where the second dot is lost and how high the hammer comes; else how hard it prints.
+"""
 
 from __future__ import annotations
 
@@ -6,20 +11,76 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.figures.chaos.manifolds import draw
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.map_marks import edges
-from printhammer.figures.elements.marks import heading, legend_below, place_lines
-from printhammer.figures.elements.scales import label, scale
-from printhammer.figures.elements.style import INK, new_panel, sign, styled
+from printhammer.figures.elements.marks import dashed, dots, heading, legend_above, legend_below, place_lines
+from printhammer.figures.elements.scales import Scale, label, scale
+from printhammer.figures.elements.style import BLUE, INK, MUTED, ORANGE, SMALL, new_panel, sign, styled
+from printhammer.figures.paper.motion import DELAYS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
     from printhammer.chaos.basins.basins import Basins
+    from printhammer.chaos.basins.quench import QuenchMap
     from printhammer.chaos.orbits.manifolds import Manifolds
+
+COLOURS: Final = {"stable": BLUE, "unstable": ORANGE}
+_LIGHT: Final = {"stable": "white", "unstable": INK}
+"""Over the colours of basins."""
+
+
+@styled
+def plot_manifolds(manifolds: Manifolds) -> Figure:
+    """Draw the manifolds of one saddle, and the saddle in the middle."""
+    figure, ax = new_panel(5.0)
+    largest = np.nanmax(np.abs(manifolds.x)) if len(manifolds.x) else 1.0
+    way, speed = scale("displacement", float(largest)), scale("velocity")
+    handles = draw(ax, manifolds, way, speed, COLOURS)
+    place_lines(ax, manifolds.orbit.regime.hammer, way, "x")
+    legend_below(ax, handles, [str(handle.get_label()) for handle in handles], ncols=3)
+    heading(ax, f"{manifolds.orbit.name.capitalize()}, every {shown_period(manifolds.orbit.regime.period)}")
+    label(ax, "x", way, "Displacement at the section")
+    label(ax, "y", speed, "Velocity at the section")
+    sign(figure, manifolds.orbit.regime.hammer)
+    return figure
+
+
+def draw(
+    ax: Axes, manifolds: Manifolds, way: Scale, speed: Scale, colours: dict[str, str] = _LIGHT
+) -> list[Line2D]:
+    """Draw manifolds and their saddle in axes as they are; return a handle of each kind and of the saddle."""
+    from matplotlib.patheffects import withStroke
+
+    from printhammer.chaos.orbits.manifolds import KINDS
+
+    kept: dict[str, Line2D] = {}
+    for number, kind in enumerate(manifolds.kinds):
+        name = KINDS[int(kind)]
+        points = manifolds.points(number)
+        (kept[name],) = ax.plot(
+            way.shown(points[:, 0]),
+            speed.shown(points[:, 1]),
+            color=colours[name],
+            lw=0.8,
+            label=f"{name} manifold",
+            gid=f"{name} manifold {number}",
+            zorder=3.0,
+            path_effects=[withStroke(linewidth=1.8, foreground=INK)] if colours[name] == "white" else None,
+            scalex=colours is not _LIGHT,
+            scaley=colours is not _LIGHT,
+        )
+    x, v = way.shown(manifolds.orbit.section[:1]), speed.shown(manifolds.orbit.section[1:])
+    (kept["saddle"],) = ax.plot(
+        x, v, ls="none", marker="X", ms=5.5, mew=0.7, mec=INK, mfc="white", label="saddle", zorder=5.0,
+        scalex=False, scaley=False,
+    )  # fmt: skip
+    return list(kept.values())
+
 
 SHADES: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00", "#999933")
 """Colours of the basins, of M. Okabe and K. Ito (2008); further ones begin anew, lighter."""
@@ -107,4 +168,71 @@ def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifol
     label(ax, "y", speed, "Velocity at the first firing")
     more = count - _MOST
     sign(figure, basins.regime.hammer, f"{more} more attractors are not named." if more > 0 else "")
+    return figure
+
+
+PRINTED: Final = "viridis"
+LOST: Final = "bone"
+"""Colours of the force of printed dots, and of the second peak where the dot is lost; both monotonous."""
+
+_FAILED: Final = "#d55e00"
+_FEW_QUENCH: Final = 0.01
+
+
+@styled
+def plot_quench(quenches: QuenchMap) -> Figure:
+    """Draw a quench map.
+
+    Crosses: the two cases of Fig. 6 of the paper, where they lie in the plane.
+    """
+    figure, ax = new_panel(4.6)
+    across = Scale("Second firing after the first", "s", "ms")
+    up = Scale("Width of the second pulse", "s", "ms")
+    x, y = edges(across.shown(quenches.gaps)), edges(up.shown(quenches.widths))
+    ax.set_facecolor(_FAILED)
+    lost = np.ma.masked_where(~quenches.lost, np.nan_to_num(quenches.peak_share)).T
+    printed = np.ma.masked_where(~quenches.struck, quenches.force_ratio).T
+    mesh = None
+    if quenches.struck.any():
+        known = quenches.force_ratio[quenches.struck]
+        low, high = np.quantile(known, [_FEW_QUENCH, 1.0 - _FEW_QUENCH])
+        mesh = ax.pcolormesh(x, y, printed, cmap=PRINTED, vmin=low, vmax=high, rasterized=True)
+        bar = figure.colorbar(mesh, ax=ax, pad=0.02, fraction=0.05, extend="both")
+        bar.set_label("Printed: force over that of the first alone", fontsize=SMALL)
+    if quenches.lost.any():
+        mesh = ax.pcolormesh(x, y, lost, cmap=LOST, vmin=0.0, vmax=1.0, rasterized=True)
+        # Beyond 1 where the second firing falls into the contact of the first dot.
+        bar = figure.colorbar(mesh, ax=ax, pad=0.02, fraction=0.05, extend="max")
+        bar.set_label("Lost: second peak, parts of the way to the pack", fontsize=SMALL)
+    width = getattr(quenches.waveform, "width", None)
+    if width is not None and y[0] < up.shown(width) < y[-1]:
+        dashed(
+            ax.axhline,
+            float(up.shown(width)),
+            color="white",
+            label="width of the first pulse",
+            gid="first width",
+        )
+        shown = [delay for delay in DELAYS if quenches.gaps[0] <= delay <= quenches.gaps[-1]]
+        level = np.full(len(shown), float(up.shown(width)))
+        crosses = {"marker": "x", "mew": 1.4, "label": "the two cases of Fig. 6", "gid": "Fig. 6"}
+        if shown:
+            dots(ax, across.shown(shown), level, 6.0, "white", **crosses)
+        # White on grey, as the marks are white on the map.
+        box = {
+            "frameon": True,
+            "facecolor": MUTED,
+            "edgecolor": "none",
+            "framealpha": 1.0,
+            "labelcolor": "white",
+        }
+        legend_above(ax, ax.get_legend_handles_labels()[0], **box)
+    ax.set_xlim(float(x[0]), float(x[-1]))
+    ax.set_ylim(float(y[0]), float(y[-1]))
+    label(ax, "x", across)
+    label(ax, "y", up)
+    for spine in ax.spines.values():
+        spine.set_color(INK if spine.get_visible() else MUTED)
+    bad = int((quenches.status != "ok").sum())
+    sign(figure, quenches.hammer, f"{bad} of {quenches.status.size} runs ended early." if bad else "")
     return figure

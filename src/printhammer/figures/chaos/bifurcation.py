@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
-from printhammer.chaos.bifurcation.diagram import Bifurcation, hysteresis
-from printhammer.chaos.bifurcation.windows import cells
+from printhammer.chaos.bifurcation.diagram import Bifurcation, cells, hysteresis
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import dots, legend_below, note

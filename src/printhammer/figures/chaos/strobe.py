@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.figures.elements import style
-from printhammer.figures.elements.marks import HALO, dots, heading, note
-from printhammer.figures.elements.room import freest
+from printhammer.figures.elements.marks import HALO, dots, freest, heading, note
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_panel, sign, styled
-from printhammer.run.window import Window
+from printhammer.run.regime import Window
 from printhammer.units import from_si
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from printhammer.figures.elements.marks import beside, heading, legend_above
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_figure, new_panel, sign, styled
 from printhammer.figures.elements.timeline import between_surfaces, current_between
-from printhammer.run.energy.coil_work import coil_power
+from printhammer.run.energy import coil_power
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -61,7 +61,7 @@ def poincare(
         where the verdict on the points is another.
     scheme : str, optional
         "runge-kutta-4" or "trapezoid": the points as that scheme computes them on the schedule of the paper,
-        see `printhammer.chaos.strobe.schemes_1983`.
+        see `printhammer.chaos.strobe.points`.
     reading : str, optional
         When the short step of that schedule is taken.
     """
@@ -116,7 +116,7 @@ def _strobed(
         from printhammer.chaos import strobes
 
         return strobes(hammer, periods, points=points)
-    from printhammer.chaos.strobe.schemes_1983 import scheme_strobes
+    from printhammer.chaos.strobe.points import scheme_strobes
 
     return scheme_strobes(hammer, periods, scheme, reading=reading, points=points)
 

@@ -19,10 +19,10 @@ from printhammer.identify.bench.sensor import (
     Amount,
     Channel,
     Sensor,
+    adjusted,
     full_scale,
     wrong_rows,
 )
-from printhammer.identify.bench.sensor_settings import adjusted
 from printhammer.results import Column, Result, part, scalar
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ class Measurement(Result):
         InputError
             The file cannot be written.
         """
-        from printhammer.support.outputs import write_file
+        from printhammer.support.files import write_file
 
         write_file(path, self.to_csv())
 

@@ -34,7 +34,7 @@ from typing import Any, Final
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.file import read_document
 from printhammer.support.constants import shown
-from printhammer.support.texts import read_text
+from printhammer.support.files import read_text
 from printhammer.units import describe, split, to_si
 
 TEXTS: Final = {"name": True, "source": True, "title": False, "note": False}

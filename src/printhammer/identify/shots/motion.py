@@ -18,12 +18,17 @@ from printhammer.hammer.uncertainty import Uncertainty
 from printhammer.identify.lowpass import time_constant
 from printhammer.identify.result import REPLACED, Fit, FittedConstant
 from printhammer.identify.shots.approach import Prior
-from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
-from printhammer.identify.shots.identifiable import condition_number, refuse_degenerate, tied_constants, weak
+from printhammer.identify.shots.gauss_newton import (
+    GaussNewton,
+    Solution,
+    condition_number,
+    refuse_degenerate,
+    tied_constants,
+    weak,
+)
 from printhammer.identify.shots.notes import further, remembered, rests, tested
-from printhammer.identify.shots.pulse import Pulse, fit_pulse
 from printhammer.identify.shots.shooting import Parameters, Shooting
-from printhammer.identify.shots.shot import FEWEST, Shot, read_shot
+from printhammer.identify.shots.shot import FEWEST, Pulse, Shot, fit_pulse, read_shot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

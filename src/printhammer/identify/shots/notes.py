@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.identify.shots.identifiable import would_be_found
+from printhammer.identify.shots.gauss_newton import would_be_found
 from printhammer.identify.shots.shooting import Parameters, Shooting
 from printhammer.identify.shots.shot import FEWEST, Shot
 

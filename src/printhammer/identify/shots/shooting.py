@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.shots.pulse import Pulse
+    from printhammer.identify.shots.shot import Pulse
     from printhammer.support.arrays import FloatArray, IntArray
 
 _STEP: Final = 1e-7

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.static.assemble import Data, assemble, enough, solved
-from printhammer.identify.static.checks import judge
+from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
 from printhammer.identify.tables import read_table
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from printhammer.drive.input import read_number
 from printhammer.errors import InputError, located
 from printhammer.results import Declared, part, scalar
 from printhammer.support.constants import shown
-from printhammer.support.texts import read_text
+from printhammer.support.files import read_text
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer

@@ -9,8 +9,7 @@ import numpy as np
 from printhammer.drive.batch import firings_of, joined
 from printhammer.printing.dots.judging import Judgement, judge
 from printhammer.printing.dots.nominal import WAIT, SinglePulse
-from printhammer.printing.dots.slots import FIRST_SLOT
-from printhammer.printing.dots.strategy import Strategy, checked_drives, open_loop
+from printhammer.printing.dots.strategy import FIRST_SLOT, Strategy, checked_drives, open_loop
 from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import DotTable, Ensemble
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.judging import Limits
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray
     from printhammer.support.threads import Progress
 

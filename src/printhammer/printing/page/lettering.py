@@ -1,21 +1,145 @@
-"""Text to dots: broken into print lines, and set in the built-in font or in a TrueType one."""
+"""Text to dots: broken into print lines, and set in the built-in font or in a TrueType one.
+
+The built-in font: dots on nine wires, drawn for this program, every printable character of ASCII.
+
+Characters have five full columns and are six apart, ten to the inch on a column pitch of 1/60 in. Every
+column is a slot in which a wire may be fired, so that level strokes are printed at the full rate of slots;
+there are no half-dot columns.
+
+TrueType fonts as dots: characters rasterised to the wires of a head.
+
+The size is the largest at which all printable characters of ASCII, and those of the text, fit on the wires.
+Dots are as far apart across as wires are, and a dot is set where the outline covers the middle of its cell,
+hinted by the font.
+"""
 
 from __future__ import annotations
 
+import math
+import string
 import textwrap
+from functools import cache, lru_cache
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.page import matrix_font
-from printhammer.printing.page.outline_font import OutlineFont, standard_font
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
+    from PIL.ImageFont import FreeTypeFont
+
     from printhammer.support.arrays import BoolArray
+
+NAME: Final = "nine-wire"
+WIRES: Final = 9
+ADVANCE: Final = 6
+"""Columns from one character to the next."""
+
+_COLUMNS: Final = 5
+_STEP: Final = 7
+_DOT: Final = "#"
+
+
+@cache
+def glyphs() -> Mapping[str, BoolArray]:
+    """Return the dots of every character of the font: arrays (9, 6), wires from the top by columns."""
+    text = (files("printhammer.printing.page") / "fonts" / "nine-wire.txt").read_text("utf-8")
+    drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
+    # Blank lines part the groups; the first one says what the file is.
+    for group in text.split("\n\n")[1:]:
+        heading, *rows = group.strip("\n").split("\n")
+        for start in range(0, len(heading), _STEP):
+            dots = np.zeros((WIRES, ADVANCE), np.bool_)
+            cut = [[mark == _DOT for mark in row[start : start + _COLUMNS]] for row in rows]
+            dots[:, :_COLUMNS] = cut
+            drawn[heading[start]] = dots
+    for dots in drawn.values():
+        dots.flags.writeable = False
+    return drawn
+
+
+_STANDARD: Final = "mpl-data/fonts/ttf/DejaVuSansMono.ttf"
+_ASCII: Final = string.digits + string.ascii_letters + string.punctuation
+_LARGER: Final = 2
+"""Size from which on the one that fits is looked for, in wires."""
+
+
+def standard_font() -> Path:
+    """Return the font used where the built-in one has too few wires: DejaVu Sans Mono, of matplotlib."""
+    # Found without importing matplotlib, which takes a while.
+    spec = find_spec("matplotlib")
+    assert spec is not None
+    assert spec.origin is not None
+    return Path(spec.origin).parent / _STANDARD
+
+
+class OutlineFont:
+    """A TrueType or OpenType font at the size at which ASCII and a text fit a number of wires.
+
+    Raises
+    ------
+    InputError
+        The file is no font, or its characters do not fit even at the least size.
+    """
+
+    def __init__(self, path: str | Path, wires: int, text: str = "") -> None:
+        self.path = Path(path)
+        self.wires = wires
+        self.name = self.path.stem
+        _opened(self.path, 1)
+        marks = {*_ASCII, *text} - set(self.missing("".join({*_ASCII, *text})))
+        self._font, self._base = _fitted(self.path, wires, "".join(sorted(marks)))
+
+    def missing(self, text: str) -> list[str]:
+        """Return the characters that the font lacks, each once, in the order in which they come."""
+        known = _characters(self.path)
+        return [mark for mark in dict.fromkeys(text) if ord(mark) not in known]
+
+    def glyph(self, mark: str) -> BoolArray:
+        """Return the dots of one character, wires from the top by columns; at least one column."""
+        from PIL import Image, ImageDraw
+
+        width = max(1, round(self._font.getlength(mark)))
+        image = Image.new("1", (width, self.wires), 0)
+        ImageDraw.Draw(image).text((0, self._base), mark, fill=1, font=self._font, anchor="ls")
+        return np.array(image, dtype=np.bool_)
+
+
+def _opened(path: Path, size: int) -> FreeTypeFont:
+    from PIL import ImageFont
+
+    try:
+        return ImageFont.truetype(str(path), size, layout_engine=ImageFont.Layout.BASIC)
+    except (OSError, ValueError):
+        what = "a TrueType font" if path.is_file() else "a TrueType font file that is there"
+        raise InputError(f"{path}: expected {what}") from None
+
+
+@lru_cache(maxsize=16)
+def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
+    """Return the font at the largest size that fits, and the wires above the base line."""
+    for size in range(_LARGER * wires, 0, -1):
+        font = _opened(path, size)
+        boxes = [font.getbbox(mark, mode="1", anchor="ls") for mark in marks]
+        up = max(0, *(math.ceil(-box[1]) for box in boxes))
+        down = max(0, *(math.ceil(box[3]) for box in boxes))
+        if up + down <= wires:
+            return font, up
+    raise InputError(f"{path}: {wires} wires are too few for this font, expected more")
+
+
+@lru_cache(maxsize=16)
+def _characters(path: Path) -> frozenset[int]:
+    from matplotlib.ft2font import FT2Font
+
+    return frozenset(FT2Font(str(path)).get_charmap())
+
 
 COLUMNS: Final = 40  # Characters of a print line by default
 
@@ -38,7 +162,7 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 
 
 def lettered(
-    text: str, wires: int = matrix_font.WIRES, font: str | Path | None = None, columns: int = COLUMNS
+    text: str, wires: int = WIRES, font: str | Path | None = None, columns: int = COLUMNS
 ) -> BoolArray:
     """Set a text in dots, shape (lines, wires, slots), as `Pattern.from_text` does."""
     if columns < 1:
@@ -47,9 +171,9 @@ def lettered(
         raise InputError(f"text = {text!r}, expected something to print")
     glyph: Callable[[str], BoolArray]
     lines = broken(text, columns)
-    if font is None and wires == matrix_font.WIRES:
-        known = matrix_font.glyphs()
-        name, glyph = matrix_font.NAME, known.__getitem__
+    if font is None and wires == WIRES:
+        known = glyphs()
+        name, glyph = NAME, known.__getitem__
         lacking = [mark for mark in dict.fromkeys("".join(lines)) if mark not in known]
     else:
         outlines = OutlineFont(standard_font() if font is None else font, wires, "".join(lines))

@@ -20,11 +20,9 @@ import numpy as np
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.printing.dots.extra_dots import extra_dots
-from printhammer.printing.dots.judging import FAULTS
-from printhammer.printing.dots.limits import PRESETS, Limits
+from printhammer.printing.dots.judging import FAULTS, PRESETS, Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
-from printhammer.printing.dots.slots import slots_of
-from printhammer.printing.dots.strategy import OpenLoop, Strategy, name_of, open_loop
+from printhammer.printing.dots.strategy import OpenLoop, Strategy, name_of, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.page.head import Head, head_of
 from printhammer.printing.page.pattern import Pattern

@@ -1,21 +1,170 @@
-"""Patterns: which wire is to make a dot in which slot of which print line."""
+"""Patterns: which wire is to make a dot in which slot of which print line.
+
+Pattern files: dots as TOML or as a bitmap, read and written back.
+
+A pattern file has four keys, all of them required::
+
+    format = 1
+    name = "two letters"
+    wires = 9
+    rows = [
+      ".###...#...#.",
+      "#...#..#...#.",
+      ...
+    ]
+
+Each row is one wire, each character one slot: ``#`` where a dot is wanted, ``.`` where none is. All rows have
+the same length, and their number is a multiple of `wires`: print line after print line, wires from the top.
+
+In a bitmap every pixel is a slot of a wire; dark and opaque ones are dots. Rows of pixels that are missing in
+the last print line are empty.
+"""
 
 from __future__ import annotations
 
+import json
+import tomllib
+from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.page import matrix_font
+from printhammer.printing.page import lettering
 from printhammer.printing.page.lettering import COLUMNS, lettered
-from printhammer.printing.page.pattern_file import read_pattern, write_pattern
 from printhammer.results import Declared, column, part
+from printhammer.support.constants import shown
+from printhammer.support.files import read_text, write_file
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from printhammer.support.arrays import BoolArray
+
+FORMAT: Final = 1  # Version of the pattern file format
+
+BITMAPS: Final = {".png": "PNG", ".pbm": "PPM", ".bmp": "BMP"}
+SUFFIXES: Final = (".toml", *BITMAPS)
+"""Ends of names of bitmaps, and of all files that hold patterns."""
+
+_KEYS: Final = ("format", "name", "wires", "rows")
+_DOT, _EMPTY = "#", "."
+_MOST_PIXELS: Final = 50_000_000
+
+
+def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolArray]:
+    """Read name and dots, shape (lines, wires, slots), as `Pattern.load` does.
+
+    The name of a bitmap is that of the file, without its end.
+    """
+    source = Path(path)
+    suffix = source.suffix.lower()
+    if suffix in BITMAPS:
+        return source.stem, _bitmap(source, lettering.WIRES if wires is None else wires)
+    if suffix != ".toml":
+        raise InputError(f"{source}: expected a name that ends in one of {', '.join(SUFFIXES)}")
+    name, dots = pattern_from_toml(read_text(source, "the pattern file"), str(source))
+    if wires is not None and wires != dots.shape[1]:
+        raise InputError(f"{source}: wires = {dots.shape[1]}, expected {wires}")
+    return name, dots
+
+
+def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArray]:
+    """Read the text of a pattern file; the sentence of an error names key and value."""
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{source}: expected TOML ({' '.join(str(error).split())})") from None
+    for key in data:
+        if key not in _KEYS:
+            odd = key if key.isprintable() else shown(key)
+            raise InputError(f"{source}: {odd} is not known, expected {', '.join(_KEYS)}")
+    for key in _KEYS:
+        if key not in data:
+            raise InputError(f"{source}: {key} is missing")
+    if data["format"] != FORMAT or isinstance(data["format"], bool | float):
+        raise InputError(f"{source}: format = {shown(data['format'])}, expected {FORMAT}")
+    name, wires, rows = data["name"], data["wires"], data["rows"]
+    if not isinstance(name, str) or not name.strip():
+        raise InputError(f"{source}: name = {shown(name)}, expected a name")
+    if not isinstance(wires, int) or isinstance(wires, bool) or wires < 1:
+        raise InputError(f"{source}: wires = {shown(wires)}, expected a whole number from 1 on")
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, str) for row in rows):
+        raise InputError(
+            f"{source}: rows = {shown(rows)}, expected a list of rows of '{_DOT}' and '{_EMPTY}'"
+        )
+    return name, _marked(rows, wires, source)
+
+
+def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
+    """Return the dots of rows of marks, print line by print line."""
+    if len(rows) % wires:
+        raise InputError(f"{source}: rows has {len(rows)} rows, expected a multiple of wires = {wires}")
+    for number, row in enumerate(rows, 1):
+        odd = [mark for mark in row if mark not in (_DOT, _EMPTY)]
+        if odd:
+            raise InputError(f"{source}: rows: {odd[0]!r} in row {number}, expected '{_DOT}' and '{_EMPTY}'")
+        if len(row) != len(rows[0]):
+            raise InputError(
+                f"{source}: rows: row {number} has {len(row)} slots, expected {len(rows[0])} as the first"
+            )
+    dots = np.array([[mark == _DOT for mark in row] for row in rows], np.bool_)
+    return dots.reshape(-1, wires, len(rows[0]))
+
+
+def _bitmap(path: Path, wires: int) -> BoolArray:
+    from PIL import Image
+
+    if wires < 1:
+        raise InputError(f"wires = {wires}, expected 1 or more")
+    try:
+        with Image.open(path, formats=sorted(set(BITMAPS.values()))) as image:
+            if image.width * image.height > _MOST_PIXELS:
+                raise InputError(
+                    f"{path}: {image.width} x {image.height} pixels, expected at most {_MOST_PIXELS}"
+                )
+            pixels = np.asarray(image.convert("LA"))
+    except (OSError, ValueError, SyntaxError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = getattr(error, "strerror", None)
+        why = f" ({reason})" if reason else ""
+        raise InputError(f"{path}: expected a bitmap that can be read{why}") from None
+    dark = (pixels[:, :, 0] < 128) & (pixels[:, :, 1] >= 128)
+    lines = -(-len(dark) // wires)
+    dots = np.zeros((lines * wires, dark.shape[1]), np.bool_)
+    dots[: len(dark)] = dark
+    return dots.reshape(lines, wires, -1)
+
+
+def pattern_toml(name: str, dots: BoolArray) -> str:
+    """Return the text of a pattern file; reading it back gives the same name and dots."""
+    _lines, wires, slots = dots.shape
+    marks = np.where(dots.reshape(-1, slots), _DOT, _EMPTY)
+    rows = "\n".join(f'  "{"".join(row)}",' for row in marks.tolist())
+    title = json.dumps(name, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return f"format = {FORMAT}\nname = {title}\nwires = {wires}\nrows = [\n{rows}\n]\n"
+
+
+def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
+    """Write a pattern file or a bitmap, as `Pattern.save` does."""
+    target = Path(path)
+    suffix = target.suffix.lower()
+    content: Any
+    if suffix == ".toml":
+        content = pattern_toml(name, dots)
+    elif suffix in BITMAPS:
+        from PIL import Image
+
+        buffer = BytesIO()
+        white = ~dots.reshape(-1, dots.shape[2])
+        Image.fromarray(white).save(buffer, format=BITMAPS[suffix])
+        content = buffer.getvalue()
+    else:
+        raise InputError(f"{target}: expected a name that ends in one of {', '.join(SUFFIXES)}")
+    write_file(target, content)
+
 
 MOST_WIRES: Final = 1000
 MOST_CELLS: Final = 50_000_000
@@ -59,7 +208,7 @@ class Pattern(Declared):
     def from_text(
         cls,
         text: str,
-        wires: int = matrix_font.WIRES,
+        wires: int = lettering.WIRES,
         *,
         font: str | Path | None = None,
         columns: int = COLUMNS,
@@ -74,7 +223,7 @@ class Pattern(Declared):
             Number of wires.
         font : path, optional
             A TrueType font; by default the built-in font for 9 wires, of
-            `printhammer.printing.page.matrix_font`, and DejaVu Sans Mono for others.
+            `printhammer.printing.page.lettering`, and DejaVu Sans Mono for others.
         columns : int, optional
             Most characters of a print line.
 
@@ -93,7 +242,7 @@ class Pattern(Declared):
     def load(cls, path: str | Path, wires: int | None = None) -> Self:
         """Read a pattern file (.toml) or a bitmap (.png, .pbm, .bmp).
 
-        The format is described in `printhammer.printing.page.pattern_file`.
+        The format is described in `printhammer.printing.page.pattern`.
 
         Parameters
         ----------

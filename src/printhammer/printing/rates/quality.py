@@ -9,15 +9,22 @@ import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.judging import FAULTS, judge
-from printhammer.printing.dots.limits import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, Limits
+from printhammer.printing.dots.judging import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, FAULTS, Limits, judge
 from printhammer.printing.dots.nominal import Nominal, wait_of
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.settling import Wear, wear_of
-from printhammer.printing.dots.slots import LEAD_IN, cycle_with_lead_in, slot_times, slots_of
-from printhammer.printing.dots.strategy import Strategy, checked_drives, name_of, open_loop
+from printhammer.printing.dots.strategy import (
+    LEAD_IN,
+    Strategy,
+    checked_drives,
+    cycle_with_lead_in,
+    name_of,
+    open_loop,
+    slot_times,
+    slots_of,
+)
 from printhammer.results import Declared, Result, column, derived, part, scalar
-from printhammer.run.energy.coil_work import squared_current
+from printhammer.run.energy import squared_current
 from printhammer.run.ensemble import DotTable
 from printhammer.run.pieces import simulate_pieces
 from printhammer.run.problem import TOLERANCE
@@ -32,7 +39,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.dots.paper import Paper
     from printhammer.run.contacts import Dot
-    from printhammer.run.energy.ledger import Ledger
+    from printhammer.run.energy import Ledger
     from printhammer.run.motion import Motion
     from printhammer.run.pieces import PiecewiseMotion
     from printhammer.support.arrays import BoolArray, FloatArray, IntArray

@@ -17,11 +17,18 @@ import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
-from printhammer.printing.dots.judging import FAULTS
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import FAULTS, Limits
 from printhammer.printing.dots.nominal import nominal as single_pulse
-from printhammer.printing.dots.slots import LEAD_IN, SLOTS, cycle_with_lead_in, eight_slot_patterns, slots_of
-from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
+from printhammer.printing.dots.strategy import (
+    LEAD_IN,
+    SLOTS,
+    Strategy,
+    cycle_with_lead_in,
+    eight_slot_patterns,
+    name_of,
+    open_loop,
+    slots_of,
+)
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.run.problem import TOLERANCE

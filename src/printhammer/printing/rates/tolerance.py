@@ -11,12 +11,12 @@ import numpy as np
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import unknown
-from printhammer.printing.dots.limits import Limits
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case
-from printhammer.printing.rates.perturbation import changed
 from printhammer.printing.rates.safe_rate import FIRST, LAST, all_pass, grid_notes, rate_grid, safe_rates
+from printhammer.printing.rates.variability import changed
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 

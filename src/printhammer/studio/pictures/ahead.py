@@ -104,7 +104,7 @@ def draw(name: str) -> bytes:
 def main() -> None:
     """Draw all."""
     from printhammer.hammer.hammer import shipped
-    from printhammer.support.outputs import write_file
+    from printhammer.support.files import write_file
 
     folder = Path(__file__).parents[1] / "ahead"
     for name in shipped():

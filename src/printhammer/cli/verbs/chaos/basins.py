@@ -7,10 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.firing import firing_of
-from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
+from printhammer.cli.options import Units, range_with_unit, with_unit
+from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
 from printhammer.cli.screen import facts
-from printhammer.cli.units import Units, range_with_unit, with_unit
 
 if TYPE_CHECKING:
     from printhammer.chaos.basins.basins import Basins
@@ -123,8 +122,7 @@ def curves_of(job: Job, planes: Basins, longest: int) -> tuple[list[Manifolds], 
 
 def led(result: Basins, box: int | None, units: Units) -> list[tuple[str, str | None]]:
     """Return the attractors with their shares, the cells that lead to none, and the basin entropy."""
-    from printhammer.chaos.basins.basins import UNDECIDED
-    from printhammer.chaos.basins.entropy import BOX
+    from printhammer.chaos.basins.basins import BOX, UNDECIDED
 
     rows: list[tuple[str, str | None]] = []
     share, error = result.shares

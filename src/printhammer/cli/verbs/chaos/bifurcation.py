@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
-from printhammer.cli.firing import firing_of
-from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
+from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
 from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
 
@@ -184,8 +183,7 @@ def summary(result: Bifurcation, direction: str) -> Table:
 
 def sentences(result: Bifurcation) -> list[str]:
     """Return what the diagram tells: routes to strange trains, hysteresis, why trains are undecided."""
-    from printhammer.chaos.bifurcation.diagram import hysteresis
-    from printhammer.chaos.bifurcation.windows import cells
+    from printhammer.chaos.bifurcation.diagram import cells, hysteresis
 
     lines = [""]
     shown, unit = shown_with(result)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
-from printhammer.cli.firing import firing_of
-from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
 from printhammer.cli.screen import Column, multiplier, table
 from printhammer.errors import InputError
 

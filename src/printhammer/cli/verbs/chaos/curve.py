@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
-from printhammer.cli.firing import firing_of
-from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
 from printhammer.cli.screen import Column, multiplier, table
 from printhammer.cli.verbs.chaos.continuation import both, read_state
 from printhammer.errors import InputError
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-    from printhammer.chaos.curves.curve import BifurcationCurve
+    from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve
     from printhammer.hammer.hammer import Hammer
 
 _START: Final = "Start"

@@ -7,8 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.firing import firing_of
-from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
+from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
 from printhammer.cli.screen import Column, coloured, facts, table, train_line
 from printhammer.errors import InputError
 

@@ -6,15 +6,14 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.firing import firing_of
-from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
 from printhammer.cli.screen import Column, multiplier, table, train_line
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from printhammer.chaos.orbits.orbit import Orbit
-    from printhammer.cli.units import Units
+    from printhammer.cli.options import Units
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.cli import options as opt
-from printhammer.cli.firing import firing_of
-from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.options import Units, range_with_unit
+from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
 from printhammer.cli.screen import facts, repeated, train_line
-from printhammer.cli.units import Units, range_with_unit
 
 if TYPE_CHECKING:
     from printhammer.chaos import Strobe

@@ -274,7 +274,7 @@ def coil(
     """
 
     def made(known: Hammer | None) -> Fit:
-        from printhammer.identify.coil.fit import FREE, fit_coil
+        from printhammer.identify.coil import FREE, fit_coil
 
         if known is None:
             raise InputError("the hammer is missing, expected --hammer with the constants known already")
@@ -306,7 +306,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     """Fit, and return what is shown and written."""
     from printhammer.cli.verbs.laboratory.fit_report import described
     from printhammer.hammer.hammer import load
-    from printhammer.support.outputs import write_file
+    from printhammer.support.files import write_file
 
     for path in job.wanted["into"]:
         if hammer is None:

@@ -9,10 +9,10 @@ from rich.markup import escape
 from rich.padding import Padding
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units, with_unit
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import STATUS_STYLES, Column, coloured, facts, honesty, table
 from printhammer.cli.terminal import warn
-from printhammer.cli.units import Units, with_unit
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -74,7 +74,7 @@ def measure(
         each: measured(each, hammer, sensor=settings[each], seed=seed, **options[each]) for each in kinds
     }
     if kind == ALL and out is not None:
-        from printhammer.support.outputs import make_folder
+        from printhammer.support.files import make_folder
 
         make_folder(out)
     for each, table in tables.items():
@@ -90,7 +90,7 @@ def measure(
 def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str, Path]]:
     """Return what is to be measured, and the files to write."""
     from printhammer.identify.bench.laboratory import KINDS
-    from printhammer.support.outputs import check_outputs
+    from printhammer.support.files import check_outputs
 
     if kind not in (*KINDS, ALL):
         raise InputError(f"KIND = {kind!r}, expected one of {', '.join((*KINDS, ALL))}")
@@ -115,7 +115,7 @@ def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str,
 def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the settings of the sensors of each kind; a setting must belong to one of them."""
     from printhammer.identify.bench.laboratory import SENSORS, SI
-    from printhammer.identify.bench.sensor_settings import PARTS, applicable, by_quantity
+    from printhammer.identify.bench.sensor import PARTS, applicable, by_quantity
 
     known = {name: SI[name] for kind in kinds for name in SENSORS[kind].channels}
     recorded = [kind for kind in kinds if SENSORS[kind].sampling_rate is not None]

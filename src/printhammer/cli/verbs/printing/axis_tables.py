@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from printhammer.cli.units import Units
+    from printhammer.cli.options import Units
     from printhammer.control.axes import AxisTables
     from printhammer.hammer.hammer import Hammer
 

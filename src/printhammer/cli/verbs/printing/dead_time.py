@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units, with_unit
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import Column, facts, table
-from printhammer.cli.units import Units, with_unit
 
 if TYPE_CHECKING:
-    from printhammer.control.dead_time.table import DeadTime
+    from printhammer.control.dead_time import DeadTime
     from printhammer.hammer.hammer import Hammer
 
 _ROWS = 24
@@ -37,7 +37,7 @@ def dead_time(
     """Find the time from switching on to impact against rail and temperature, and pulses of the same blow."""
     import numpy as np
 
-    from printhammer.control.dead_time.table import dead_time as timed
+    from printhammer.control.dead_time import dead_time as timed
 
     grid: dict[str, Any] = {
         "voltage": opt.between(voltage, "V", "--voltage"),

@@ -13,8 +13,8 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from printhammer.control.duty.duty import ThermalDuty
-    from printhammer.control.duty.limit import ThermalLimit
+    from printhammer.control.duty import ThermalDuty
+    from printhammer.control.thermal_limit import ThermalLimit
 
 _COIL: Final = "Coil"
 _NEEDED: Final = ("thermal_resistance", "limit")
@@ -52,7 +52,7 @@ def duty(
 ) -> Answer:
     """Find the largest rate that a coil stands at an ambient temperature, and what faster bursts may last."""
     if rates is not None:
-        from printhammer.control.duty.limit import read_rates, thermal_limit
+        from printhammer.control.thermal_limit import read_rates, thermal_limit
         from printhammer.errors import located
 
         opt.refuse(
@@ -64,7 +64,7 @@ def duty(
         with located(str(rates)):
             behind = thermal_limit(**read_rates(rates))
         return Answer(limit_shown(behind), files={"out": Content.of(behind)})
-    from printhammer.control.duty.duty import thermal_duty
+    from printhammer.control.duty import thermal_duty
 
     if (hammer is None) == (heat is None):
         raise InputError("HAMMER and --heat: expected one of them, such as --heat '4 mJ'")
@@ -77,7 +77,7 @@ def duty(
 
 def _fired(name: str | None, passed: dict[str, Any]) -> Any:
     """Return the heat of one dot of a hammer."""
-    from printhammer.control.duty.fired import heat_of
+    from printhammer.control.duty import heat_of
 
     if "feed" in passed:
         raise InputError("--feed is given, expected it beside --heat only: a hammer has a driver of its own")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units, with_unit
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, facts, table
-from printhammer.cli.units import Units, with_unit
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:

@@ -6,9 +6,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units, with_unit
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
-from printhammer.cli.units import Units, with_unit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,7 +63,7 @@ def feedback(
     from printhammer.control.table.compensation import TableStrategy, load_table
     from printhammer.drive.file import save_drive
     from printhammer.drive.input import read_positive
-    from printhammer.printing.rates.perturbation import Perturbation, perturbed
+    from printhammer.printing.rates.variability import Perturbation, perturbed
 
     if beside is not None:
         passed["beside"] = [TableStrategy(load_table(beside), hammer)]

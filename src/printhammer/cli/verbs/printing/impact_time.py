@@ -9,8 +9,8 @@ from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
 
 if TYPE_CHECKING:
-    from printhammer.cli.units import Units
-    from printhammer.control.sensing.impact_time import ImpactTime
+    from printhammer.cli.options import Units
+    from printhammer.control.impact_time import ImpactTime
     from printhammer.hammer.hammer import Hammer
 
 _ROWS = 24
@@ -41,8 +41,8 @@ def impact_time(
     **passed: Any,
 ) -> Answer:
     """Estimate times of impact from samples of current or voltage of the coil, and tell their error."""
-    from printhammer.control.sensing.impact_time import impact_time as studied
-    from printhammer.control.sensing.sampling import UNITS
+    from printhammer.control.impact_estimator import UNITS
+    from printhammer.control.impact_time import impact_time as studied
 
     grids: dict[str, Any] = {
         "noise": opt.between(noise, UNITS[passed.get("signal", "current")], "--noise"),

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from printhammer.cli.units import Units
-    from printhammer.control.learning.result import Learning
+    from printhammer.cli.options import Units
+    from printhammer.control.learning.learn import Learning
     from printhammer.hammer.hammer import Hammer
 
 _PANEL: Final = "The sensor"
@@ -91,7 +91,7 @@ def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict
     """Return what the time of impact from samples of the coil is like: noise, offset and share missed."""
     from dataclasses import asdict
 
-    from printhammer.control.sensing.impact_time import impact_time
+    from printhammer.control.impact_time import impact_time
 
     if noise is None:
         raise InputError(

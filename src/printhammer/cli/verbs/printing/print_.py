@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units, with_unit
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
 from printhammer.cli.screen import facts
-from printhammer.cli.units import Units, with_unit
 from printhammer.cli.verbs.printing.strategy import FEEDBACK, SERIAL, TABLE, chosen_strategy
 from printhammer.errors import InputError
 
@@ -71,10 +71,10 @@ def print_(
     A hammer on every wire, each print line from rest. Ends with status 1 where a run stopped before its end.
     """
     from printhammer.drive.input import read_positive
-    from printhammer.printing.dots.limits import limits_named
+    from printhammer.printing.dots.judging import limits_named
     from printhammer.printing.page.head import head_of
     from printhammer.printing.page.page import print_page
-    from printhammer.printing.page.pattern_file import BITMAPS
+    from printhammer.printing.page.pattern import BITMAPS
 
     if rate is None:
         raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
@@ -108,8 +108,7 @@ def print_(
 def _pattern(
     text: str | None, path: Path | None, font: Path | None, wires: int | None, columns: int | None
 ) -> Pattern:
-    from printhammer.printing.page.lettering import COLUMNS
-    from printhammer.printing.page.matrix_font import WIRES
+    from printhammer.printing.page.lettering import COLUMNS, WIRES
     from printhammer.printing.page.pattern import Pattern
 
     if path is not None:

@@ -14,7 +14,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from printhammer.cli.units import Units
+    from printhammer.cli.options import Units
     from printhammer.hammer.hammer import Hammer
 
 _MORE: Final = "Instead of the report"
@@ -71,7 +71,7 @@ def quality(
     Ends with status 1 where a run stopped before its end.
     """
     from printhammer.cli.verbs.printing import quality_report
-    from printhammer.printing.dots.limits import limits_named
+    from printhammer.printing.dots.judging import limits_named
 
     instead = {"safe-rate": safe_rate, "yield": yield_ is not None, "damping": damping}
     tasks = [name for name, wanted in instead.items() if wanted] or ["report"]

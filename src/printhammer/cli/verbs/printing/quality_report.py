@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from rich.markup import escape
 
+from printhammer.cli.options import Units, shown, unit, with_unit
 from printhammer.cli.screen import Column, coloured, facts, table
-from printhammer.cli.units import Units, shown, unit, with_unit
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from printhammer.printing.dots.limits import Limits
+    from printhammer.printing.dots.judging import Limits
     from printhammer.printing.rates.damping import DampingStudy
     from printhammer.printing.rates.quality import Quality, Spread
     from printhammer.printing.rates.safe_rate import SafeRate

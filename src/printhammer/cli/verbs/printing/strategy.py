@@ -45,7 +45,7 @@ def chosen_strategy(
         return {}, None
     from printhammer.control.feedback.closed_loop import FeedbackStrategy
     from printhammer.control.feedback.controller import Controller
-    from printhammer.control.feedback.driver import driver_of
+    from printhammer.control.feedback.plant import driver_of
 
     with job.counting("tables of the controller") as tell:
         return {"strategy": FeedbackStrategy(Controller(hammer, driver_of(hammer), progress=tell))}, None

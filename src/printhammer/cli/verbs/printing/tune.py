@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from printhammer.cli.units import Units
+    from printhammer.cli.options import Units
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.control.table.report import TableReport
     from printhammer.hammer.hammer import Hammer
@@ -105,7 +105,7 @@ def tune(
 
 def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> None:
     """Write a table, a C header in ticks of the timer."""
-    from printhammer.support.outputs import write_file
+    from printhammer.support.files import write_file
 
     if path.suffix.lower() == ".h":
         write_file(path, made.to_header(**header))
@@ -115,7 +115,7 @@ def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> N
 
 def entries(made: CompensationTable, units: Units) -> Table:
     """Return the entries at the highest rate, a row each."""
-    from printhammer.control.table.histories import gap_text, histories, number_of
+    from printhammer.control.table.drive import gap_text, histories, number_of
 
     def entry(name: str, history: tuple[int, ...]) -> float:
         return float(getattr(made, name)[-1, number_of(history, made.reach)])

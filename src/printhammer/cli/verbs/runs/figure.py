@@ -35,7 +35,7 @@ def figure(
     """Draw a figure of the paper as SVG, PNG and PDF."""
     from printhammer.figures import FIGURES, save
     from printhammer.figures.elements.save import FORMATS
-    from printhammer.support.outputs import make_folder
+    from printhammer.support.files import make_folder
 
     entry = FIGURES.get(opt.read_whole(number, "figure"))
     if entry is None:

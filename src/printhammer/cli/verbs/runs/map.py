@@ -175,6 +175,6 @@ def _drawn(hammer: Hammer, chart: xr.Dataset, beside: xr.Dataset | None, number:
 
     if beside is None:
         return FIGURES[number].draw(hammer, chart=chart)
-    from printhammer.figures.map_comparison import compare_maps
+    from printhammer.figures.paper.maps import compare_maps
 
     return compare_maps(chart, beside)

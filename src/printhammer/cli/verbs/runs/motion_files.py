@@ -25,7 +25,7 @@ def write_rows(rows: Rows[Any], path: Path) -> None:
 
 def write_motion(motion: Motion, path: Path) -> None:
     """Write a motion: all that it tells as JSON, else its record; errors as for `Motion.save`."""
-    from printhammer.support.outputs import write_file
+    from printhammer.support.files import write_file
 
     if path.suffix.lower() == ".json":
         write_file(path, as_json(motion))

@@ -41,7 +41,7 @@ def paper(
 ) -> Answer:
     """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
     from printhammer.report import write_report
-    from printhammer.report.publish import check_place
+    from printhammer.report.build import check_place
 
     if not job.force:
         check_place(out)

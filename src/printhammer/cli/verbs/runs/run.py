@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units, with_unit
 from printhammer.cli.runner import Answer, Content, Job, tables_beside, verb
 from printhammer.cli.screen import Column, coloured, facts, table
-from printhammer.cli.units import Units, with_unit
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.feedback.interpolation import bilinear, blend
+from printhammer.control.feedback.impact_map import bilinear, blend
 from printhammer.hammer.static_force import StaticForce
 
 if TYPE_CHECKING:

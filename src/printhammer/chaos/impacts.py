@@ -1,0 +1,449 @@
+"""Impact maps: Poincaré sections at the touches of the backstop or of the pack.
+
+At a touch the displacement is that of the surface. What decides all that follows is the velocity and the time
+since the last firing; from touch to touch these two are an iterated map, as the strobe is from firing to
+firing, only that here the armature tells when to look.
+
+Statistics of an impact train: how regular the times are at which a surface is touched.
+
+What a platen hears, or a vibration sensor sees, is a train of impacts. The intervals between them, their
+coefficient of variation and their autocorrelation tell a regular train from an irregular one without any
+state; the Fano factor tells whether the irregularity adds up (D. R. Cox and P. A. W. Lewis, The Statistical
+Analysis of Series of Events, 1966, chapters 4 and 5).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, Unpack, get_args
+
+import numpy as np
+
+from printhammer.chaos.strobe.train import Train
+from printhammer.drive.input import MOST_PULSES, read_array, read_count, read_positive
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.results import Column, Result, column, derived, part, provenance, scalar
+from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.run.regime import Firing, Regime, regimes_of
+from printhammer.run.simulate import touches_of
+from printhammer.run.start import initial_state
+from printhammer.support.threads import Progress, mapped
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
+
+    from printhammer.drive.base import Overlap
+    from printhammer.drive.trains import Drive
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray, IntArray
+
+Surface = Literal["pack", "backstop"]
+SURFACES: Final = get_args(Surface)
+
+TOUCHES: Final = 1000
+"""Number of touches unless told otherwise."""
+
+_FIRINGS_A_TOUCH: Final = 10
+
+
+class Section(Result):
+    """States of a hammer at the touches of a surface."""
+
+    hammer: Hammer = part("the hammer")
+    drive: Drive = part("the drive")
+    period: float = scalar("s", "time between firings")
+    surface: Surface = scalar("", '"pack" or "backstop"')
+    first: int = scalar(
+        "1",
+        "first of the firings between which touches were looked for",
+        more="the very first one is number 1",
+    )
+    last: int = scalar("1", "last of them")
+    t: FloatArray = column("s", "time of touch", "touch")
+    v: FloatArray = column("m/s", "velocity at touch", "touch")
+    firing: IntArray = column(
+        "1", "number of the latest firing", "touch", more="at or before the touch", dtype=np.int32
+    )
+    since: FloatArray = column("s", "time since the last firing", "touch")
+    t_out: FloatArray = column(
+        "s", "time of leaving", "touch", more="nan where the contact is open at the end of the run"
+    )
+    v_out: FloatArray = column("m/s", "velocity at leaving", "touch", more="nan likewise")
+    wanted: int = scalar(
+        "1",
+        "number of touches asked for",
+        more="fewer where the surface is not touched often enough",
+    )
+    status: str = part("how the run ended")
+    tolerance: float = part("tolerance of the integration")
+
+    @property
+    def title(self) -> str:
+        """One line that says what the touches are."""
+        return f"touches of the {self.surface} by {self.hammer.name}, fired every {self.period:.9g} s"
+
+    @property
+    @derived("1", "number of the touch", "touch", kind="coordinate", dtype=np.int32)
+    def touch(self) -> IntArray:
+        """Numbers of the touches, from 1 on."""
+        return np.arange(1, len(self.t) + 1)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run went as asked."""
+        return self.status == "ok"
+
+    @property
+    def per_firing(self) -> float:
+        """Mean number of touches from firing to firing; NaN where there was but one firing."""
+        fired = self.last - self.first
+        return int((self.firing < self.last).sum()) / fired if fired else float("nan")
+
+    @property
+    def remark(self) -> str:
+        """What there is to say of a section that has fewer touches than asked for; else empty."""
+        if len(self.t) == self.wanted:
+            return ""
+        why = "" if self.ok else f"; the run ended early: {self.status}"
+        return (
+            f"{len(self.t)} of {self.wanted} touches of the {self.surface} from firing {self.first} to"
+            f" {self.last}{why}"
+        )
+
+
+def section(
+    hammer: Hammer | Regime,
+    *,
+    surface: Surface = "backstop",
+    touches: SupportsIndex = TOUCHES,
+    transient: SupportsIndex = 0,
+    firings: SupportsIndex | None = None,
+    state: tuple[float, float] | None = None,
+    tolerance: float = TOLERANCE,
+    **firing: Unpack[Firing],
+) -> Section:
+    """Return the state of a hammer at each touch of its backstop, or of the pack.
+
+    Parameters
+    ----------
+    hammer : Hammer or Regime
+        The hammer; or the hammer with all that `firing` says of it. Its phase plays no part.
+    surface : str, optional
+        "backstop" or "pack".
+    touches : int, optional
+        Number of touches.
+    transient : int, optional
+        Number of firings left out before the first touch.
+    firings : int, optional
+        Number of firings after which to give up looking; by default ten for each touch asked for.
+    state, tolerance, **firing
+        As for `printhammer.strobe`.
+
+    Returns
+    -------
+    Section
+        With a status; a run that could not go on, or has too few touches, is no exception.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above; the hammer has no such surface, no waveform or no rest
+        state.
+    """
+    counts = _counts(touches, transient, firings)
+    check_tolerance(tolerance)
+    train = Train.of(Regime.of(hammer, **firing), counts[1] + counts[2], state)
+    return _section(train, surface, counts, tolerance)
+
+
+def sections(
+    hammers: Hammer | Regime | Sequence[Hammer | Regime],
+    periods: Sequence[float | str] | npt.ArrayLike | None = None,
+    *,
+    surface: Surface = "backstop",
+    touches: SupportsIndex = TOUCHES,
+    transient: SupportsIndex = 0,
+    firings: SupportsIndex | None = None,
+    waveform: Waveform | None = None,
+    overlap: Overlap | None = None,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> list[Section]:
+    """Return the sections of many trains from rest, computed on all cores; see `section`.
+
+    Parameters
+    ----------
+    hammers, periods, waveform, overlap
+        Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
+    surface, touches, transient, firings, tolerance
+        As for `section`, for all trains.
+    threads, progress
+        As for `printhammer.chaos.strobes`.
+
+    Returns
+    -------
+    list of Section
+        One for each train.
+
+    Raises
+    ------
+    InputError
+        As for `section`, or numbers of hammers and periods that do not fit together.
+    """
+    counts = _counts(touches, transient, firings)
+    check_tolerance(tolerance)
+    regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
+    trains = [Train.of(regime, counts[1] + counts[2]) for regime in regimes]
+    return mapped(lambda train: _section(train, surface, counts, tolerance), trains, threads, progress)
+
+
+def _counts(
+    touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
+) -> tuple[int, int, int]:
+    """Return the numbers of touches, of firings left out, and of firings after which to give up."""
+    wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
+    room = MOST_PULSES - skipped - 1
+    limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
+    if not 1 <= limit <= room:
+        raise InputError(
+            f"firings = {limit} after a transient of {skipped}, expected at most {MOST_PULSES - 1} together"
+        )
+    return wanted, skipped, limit
+
+
+def _section(train: Train, surface: Surface, counts: tuple[int, int, int], tolerance: float) -> Section:
+    wanted, skipped, limit = counts
+    if surface not in SURFACES:
+        raise InputError(f"surface = {surface!r}, expected {' or '.join(SURFACES)}")
+    if getattr(train.hammer, surface) is None:
+        raise InputError(f"surface = {surface!r}: the hammer {train.hammer.name!r} has no {surface}")
+    state = initial_state(train.hammer, train.state)
+    problem = Problem(train.hammer, train.drive, state, 0.0, tolerance)
+    firing = np.arange(1, skipped + limit + 2)
+    times = train.times(firing)
+    touches = touches_of(problem, surface, float(times[skipped]), float(times[-1]), wanted)
+    t, v, t_out, v_out = touches.rows.T.copy()
+    latest = np.searchsorted(times, t, side="right") - 1
+    # Touches are looked for up to the last one there is, or as far as the run got.
+    until = t[-1] if len(t) == wanted else touches.reached
+    return Section(
+        hammer=train.hammer,
+        drive=train.drive,
+        period=train.period,
+        surface=surface,
+        first=skipped + 1,
+        last=max(int(np.searchsorted(times, until, side="right")), skipped + 1),
+        t=t,
+        v=v,
+        firing=firing[latest],
+        since=t - times[latest],
+        t_out=t_out,
+        v_out=v_out,
+        wanted=wanted,
+        status=touches.status,
+        tolerance=tolerance,
+    )
+
+
+BINS: Final = 60
+"""Number of bins of the histogram unless told otherwise."""
+
+LAGS: Final = 40
+"""Largest lag of the autocorrelation unless told otherwise; at most a quarter of the intervals."""
+
+_FEWEST: Final = 8
+_SAME: Final = 1e-9
+"""Part of an interval up to which differences count as none."""
+
+
+class ImpactTrain(Result):
+    """Intervals between impacts, and what they tell."""
+
+    times: FloatArray = column("s", "time of the impact", "impact", name="t")
+    intervals: FloatArray = part("times between successive impacts, s", more="one fewer", repr=False)
+    mean: float = scalar("s", "mean of the intervals")
+    deviation: float = scalar("s", "standard deviation of the intervals")
+    variation: float = scalar(
+        "1",
+        "coefficient of variation, deviation over mean",
+        more="0 for a clock, 1 for a Poisson process",
+    )
+    edges: FloatArray = part("edges of the bins of the histogram, s", more="one more than bins", repr=False)
+    counts: IntArray = column("1", "intervals in the bin", "bin", name="count", dtype=np.int32)
+    autocorrelation: FloatArray = column(
+        "1",
+        "autocorrelation of the intervals",
+        "lag",
+        more="from lag 0 on; nan where all intervals are the same",
+    )
+    window: float = scalar("s", "length of the windows in which impacts are counted")
+    windows: int = scalar(
+        "1",
+        "number of windows",
+        more="they follow each other from half a mean interval before the first impact on",
+    )
+    fano: float = scalar(
+        "1",
+        "variance over mean of the numbers of impacts in the windows",
+        more="1 for a Poisson process, nan for fewer than two windows",
+    )
+    source: Section | None = part("where the times come from", repr=False)
+
+    @property
+    def title(self) -> str:
+        """One line that says what this is."""
+        return "impact train"
+
+    @property
+    @derived("s", "time since the impact before", "impact")
+    def interval(self) -> FloatArray:
+        """The intervals, NaN before the first."""
+        return np.concatenate([[np.nan], self.intervals])
+
+    @property
+    def hammer(self) -> Hammer | None:
+        """The hammer, where it is known."""
+        return None if self.source is None else self.source.hammer
+
+    @property
+    def significant(self) -> float:
+        """What the autocorrelation of n independent intervals exceeds once in twenty lags, 1.96/sqrt(n)."""
+        return 1.96 / math.sqrt(len(self.intervals))
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the times come from."""
+        return provenance() if self.source is None else self.source.provenance
+
+    def notes(self) -> dict[str, Any]:
+        """Return which touches were looked for, for the attributes of the Dataset."""
+        return {name: getattr(self.source, name, None) for name in ("surface", "first", "last", "wanted")}
+
+    def entries(self) -> dict[str, tuple[Column, Any]]:
+        """Return times over `impact`, histogram over `bin` and autocorrelation over `lag`."""
+        number = np.arange(1, len(self.times) + 1, dtype=np.int32)
+        places = {
+            "impact": ("1", "number of the impact", "impact", number),
+            "lower_edge": ("s", "lower edge of the bin", "bin", self.edges[:-1]),
+            "upper_edge": ("s", "upper edge of the bin", "bin", self.edges[1:]),
+            "lag": ("1", "lag", "lag", np.arange(len(self.autocorrelation), dtype=np.int32)),
+        }
+        return super().entries() | {
+            name: (Column(unit, meaning, (dim,), "coordinate", name=name), values)
+            for name, (unit, meaning, dim, values) in places.items()
+        }
+
+
+def impact_train(
+    touches: Section | Regime | Hammer | npt.ArrayLike,
+    *,
+    window: float | str | None = None,
+    bins: SupportsIndex = BINS,
+    lags: SupportsIndex = LAGS,
+    **firing: Unpack[Firing],
+) -> ImpactTrain:
+    """Return the statistics of the impacts of a section, or of a series of times.
+
+    Parameters
+    ----------
+    touches : Section, Regime, Hammer or array
+        From `printhammer.section`; or a regime, or a hammer and how it is fired, of which that is taken; or
+        times of impacts, s, ascending. At least nine.
+    window : float or str, optional
+        Length of the windows for the Fano factor, s, or text with a unit; by default ten periods of the
+        drive, or ten mean intervals where there is none. In a window of one period every train that prints
+        once a period looks like a clock.
+    bins : int, optional
+        Number of bins of the histogram, between the shortest and the longest interval.
+    lags : int, optional
+        Largest lag of the autocorrelation; no more than a quarter of the intervals is taken.
+    **firing
+        How a hammer is fired, as for `printhammer.Regime.of`.
+
+    Returns
+    -------
+    ImpactTrain
+        The statistics.
+
+    Raises
+    ------
+    InputError
+        There are too few times, they are not ascending or not finite; a window that is not positive.
+    """
+    if isinstance(touches, Regime | Hammer):
+        touches = section(touches, **firing)
+    elif firing:
+        raise InputError(f"times are given, expected no {' or '.join(firing)} beside them")
+    source = touches if isinstance(touches, Section) else None
+    times = _times(touches.t if isinstance(touches, Section) else touches, source)
+    intervals = np.diff(times)
+    mean, deviation = float(intervals.mean()), float(intervals.std(ddof=1))
+    length = 10.0 * (mean if source is None else source.period)
+    if window is not None:
+        length = read_positive(window, "s", "window")
+    number, shown = read_count(bins, "bins"), min(read_count(lags, "lags"), len(intervals) // 4)
+    count, fano = _fano(times, length)
+    edges = np.linspace(*_range(intervals), number + 1)
+    return ImpactTrain(
+        times=times,
+        intervals=intervals,
+        mean=mean,
+        deviation=deviation,
+        variation=deviation / mean,
+        edges=edges,
+        counts=np.histogram(intervals, edges)[0].astype(np.int64),
+        autocorrelation=autocorrelation(intervals, shown),
+        window=length,
+        windows=count,
+        fano=fano,
+        source=source,
+    )
+
+
+def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
+    """Return the autocorrelation of a series at the lags from 0 to `longest`.
+
+    The sums of the products of deviations are divided by that at lag 0, as G. E. P. Box and G. M. Jenkins do
+    (Time Series Analysis, 1970, section 2.1.5). NaN where the numbers differ by no more than 1e-9 of the
+    largest.
+    """
+    away = series - series.mean()
+    whole = float((away**2).sum())
+    if whole <= len(series) * (_SAME * float(np.abs(series).max())) ** 2:
+        return np.full(longest + 1, np.nan)
+    sums = [float((away[: len(away) - lag] * away[lag:]).sum()) for lag in range(longest + 1)]
+    return np.array(sums) / whole
+
+
+def _range(intervals: FloatArray) -> tuple[float, float]:
+    """Return the ends of the histogram: a thousandth of the mean apart at least."""
+    low, high = float(intervals.min()), float(intervals.max())
+    room = max(0.0, 0.5 * (1e-3 * float(intervals.mean()) - (high - low)))
+    return low - room, high + room
+
+
+def _fano(times: FloatArray, length: float) -> tuple[int, float]:
+    """Return how many windows of a length, s, there are, and the Fano factor of the impacts in them."""
+    # Half an interval before the first impact, so that those of a clock do not fall on the edges.
+    begin = times[0] - 0.5 * (times[-1] - times[0]) / (len(times) - 1)
+    windows = int((times[-1] - begin) // length)
+    if windows < 2:
+        return windows, math.nan
+    edges = begin + length * np.arange(windows + 1)
+    numbers = np.diff(np.searchsorted(times, edges, side="right"))
+    return windows, float(numbers.var(ddof=1) / numbers.mean()) if numbers.any() else math.nan
+
+
+def _times(touches: npt.ArrayLike, source: Section | None) -> FloatArray:
+    times = read_array(touches, "touches", "times, s")
+    if times.ndim != 1 or times.size <= _FEWEST:
+        why = f" ({source.remark})" if source is not None and source.remark else ""
+        raise InputError(f"touches: {times.size} times, expected at least {_FEWEST + 1}{why}")
+    if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise InputError("touches: expected finite, ascending times, s")
+    return times

@@ -1,1 +1,0 @@
-"""Impacts: Poincaré sections at the contacts, and the times between them."""

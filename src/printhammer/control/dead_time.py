@@ -1,0 +1,321 @@
+"""Dead time: from switching on to impact, against rail voltage and temperature of the coil.
+
+A warm coil draws less current and a low rail lets it rise later, so that a dot comes later and is struck
+less hard. Firmware that knows both fires earlier and longer: for each rail and temperature of a grid the
+hammer's own pulse is fired from rest, and then the pulse is sought, by its width, that gives the same blow:
+a speed of impact, by default that of the hammer's own pulse at its own rail and temperature.
+
+The C header of a dead time: rails, temperatures, tables of times, and a function between their entries.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.control.duty import read_temperature
+from printhammer.control.pulses import of_width
+from printhammer.drive.input import read_positive
+from printhammer.errors import InputError
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.files import ENDINGS
+from printhammer.run.problem import TOLERANCE
+from printhammer.support import c_code
+from printhammer.support.files import write_file
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from printhammer.drive.waveforms.shapes import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray, TextArray
+
+_NANOSECOND: Final = 1e-9
+
+
+def header_text(
+    hammer: str,
+    fingerprint: str,
+    voltage: FloatArray,
+    temperature: FloatArray,
+    tables: Mapping[str, FloatArray],
+) -> str:
+    """Return a C header (C99) with rails in millivolts, tenths of a degree and nanoseconds.
+
+    `tables` are times by name, s, over rails, V, and temperatures, degC; what is NaN becomes 0.
+    """
+    prefix = c_code.identifier(hammer)
+    upper, guard = prefix.upper(), f"{prefix}_dead_time_h".upper()
+    arrays = "\n".join(
+        c_code.table("int32_t", f"{prefix}_{name}", np.rint(np.nan_to_num(times) / _NANOSECOND))
+        for name, times in tables.items()
+    )
+    return f"""\
+#ifndef {guard}
+#define {guard}
+
+/* Dead time of the hammer {c_code.comment(hammer)},
+   fingerprint {fingerprint}.
+   [rail][temperature of the coil]; times are in nanoseconds, 0 where no pulse gives the blow.
+   A dot is fired `dead_time` before its impact with a pulse of `width`. */
+
+#include <stdint.h>
+
+#define {upper}_RAILS {voltage.size}
+#define {upper}_TEMPERATURES {temperature.size}
+
+/* Rails, in millivolts. */
+static const int32_t {prefix}_rail[{voltage.size}] = {{
+{c_code.numbers(np.rint(1e3 * voltage))}
+}};
+
+/* Temperatures of the coil, in tenths of a degree Celsius. */
+static const int32_t {prefix}_temperature[{temperature.size}] = {{
+{c_code.numbers(np.rint(10.0 * temperature))}
+}};
+
+{arrays}
+/* Between the entries of a table, and at its edges beyond them; 0 where one of the four is 0. */
+static inline int32_t {prefix}_between(
+  const int32_t table[{upper}_RAILS][{upper}_TEMPERATURES], int32_t millivolts, int32_t tenths)
+{{
+  const int32_t *rail = {prefix}_rail, *warm = {prefix}_temperature;
+  unsigned i = 0, j = 0;
+  while (i + 2u < {upper}_RAILS && millivolts > rail[i + 1u]) i++;
+  while (j + 2u < {upper}_TEMPERATURES && tenths > warm[j + 1u]) j++;
+  unsigned k = {upper}_RAILS > 1 ? i + 1u : i, l = {upper}_TEMPERATURES > 1 ? j + 1u : j;
+  int64_t a = table[i][j], b = table[k][j], c = table[i][l], d = table[k][l];
+  if (a == 0 || b == 0 || c == 0 || d == 0) return 0;
+  int64_t p = millivolts < rail[i] ? rail[i] : millivolts > rail[k] ? rail[k] : millivolts;
+  int64_t q = tenths < warm[j] ? warm[j] : tenths > warm[l] ? warm[l] : tenths;
+  if (k > i) {{
+    a += (b - a) * (p - rail[i]) / (rail[k] - rail[i]);
+    c += (d - c) * (p - rail[i]) / (rail[k] - rail[i]);
+  }}
+  return (int32_t)(l > j ? a + (c - a) * (q - warm[j]) / (warm[l] - warm[j]) : a);
+}}
+
+#endif
+"""
+
+
+MOST: Final = 10_000
+"""Number of pairs of rail and temperature above which a grid is refused."""
+
+LONGEST: Final = 8.0
+"""Width of the longest pulse, and length of a run, in parts of the flight time at the own rail."""
+
+SHORTEST: Final = 1.0 / 64.0
+"""Width of the shortest one, in parts of the flight time with the longest."""
+
+_DOUBLINGS: Final = 6
+_WIDTH_ERROR: Final = 1e-9  # Of the flight time
+_SAME: Final = 1e-9  # Of the blow
+
+
+class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
+    """From switching on to impact, against rail and temperature of the coil."""
+
+    hammer: Hammer = part("the hammer")
+    blow: float = scalar("m/s", "speed of impact that is the same everywhere")
+    own_width: float = scalar("s", "width of the hammer's own pulse")
+    own_time: float = scalar("s", "time from switching on to impact with it at the own rail and temperature")
+    voltage: FloatArray = coordinate("V", "rail voltage", "voltage")
+    temperature: FloatArray = coordinate("degC", "temperature of the coil", "temperature")
+    time: FloatArray = column(
+        "s",
+        "time from switching on to impact with the own pulse",
+        "voltage temperature",
+        more="NaN, as the three that follow, where it does not reach what it strikes",
+    )
+    speed: FloatArray = column("m/s", "speed of impact with it", "voltage temperature")
+    current: FloatArray = column("A", "largest current with it", "voltage temperature")
+    heat: FloatArray = column("J", "heat of the coil with it", "voltage temperature")
+    status: TextArray = column(
+        "", "how the run with the own pulse ended", "voltage temperature", more="as a motion says it"
+    )
+    strongest: FloatArray = column(
+        "m/s", "speed of impact with a pulse that lasts until then", "voltage temperature"
+    )
+    width: FloatArray = column(
+        "s",
+        "width of the pulse with the blow",
+        "voltage temperature",
+        more="NaN, as the two that follow, where no width gives it",
+    )
+    width_time: FloatArray = column(
+        "s", "time from switching on to impact with that width", "voltage temperature"
+    )
+    width_heat: FloatArray = column("J", "heat of the coil with that width", "voltage temperature")
+
+    @property
+    def title(self) -> str:
+        """What it is of."""
+        return f"dead time of {self.hammer.name}"
+
+    def to_header(self) -> str:
+        """Return a C header (C99) with widths and dead times in nanoseconds, and a function between them."""
+        tables = {"width": self.width, "dead_time": self.width_time}
+        return header_text(self.hammer.name, self.hammer.fingerprint, self.voltage, self.temperature, tables)
+
+    def save(self, path: str | Path) -> None:
+        """Write the table, a C header (.h) among others, by the ending of the name; whole or not at all.
+
+        Raises
+        ------
+        InputError
+            The name ends in none of `ENDINGS`, or the file cannot be written.
+        """
+        if Path(path).suffix.lower() == ".h":
+            write_file(Path(path), self.to_header())
+        else:
+            super().save(path)
+
+
+@dataclass(frozen=True)
+class _Fired:
+    """One firing from rest."""
+
+    time: float = np.nan
+    speed: float = np.nan
+    current: float = np.nan
+    heat: float = np.nan
+    status: str = "ok"
+
+
+def dead_time(
+    hammer: Hammer,
+    *,
+    voltage: Sequence[float | str] = (),
+    temperature: Sequence[float | str] = (),
+    blow: float | str | None = None,
+    tolerance: float = TOLERANCE,
+    progress: Callable[[int, int], None] | None = None,
+) -> DeadTime:
+    """Find how long a hammer takes from switching on to impact, and which pulse gives the same blow.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer whose waveform is a driver on a rail.
+    voltage : sequence of float or str, optional
+        Rails, V, which are put in order; by default that of the waveform, and 10 % less and more.
+    temperature : sequence of float or str, optional
+        Temperatures of the coil, degC; by default 20, 60 and 100 degC.
+    blow : float or str, optional
+        Speed of impact, m/s, whose pulse is sought; by default that of the hammer's own pulse at its own rail
+        and temperature, which a lower rail or a warmer coil may not reach.
+    tolerance : float, optional
+        Of the integrator.
+    progress : callable, optional
+        Called with pairs done and of all.
+
+    Raises
+    ------
+    InputError
+        The hammer has no driver with a width, does not strike at its own rail, or the grid is too large.
+    """
+    waveform = hammer.waveform
+    own: Any = waveform
+    if waveform is None or not hasattr(waveform, "voltage"):
+        raise InputError(f"{hammer.path}: expected a [waveform] that is a driver on a rail, such as 'rail'")
+    rails = np.unique([read_positive(each, "V", "voltage") for each in voltage])
+    warm = np.unique([read_temperature(each, "temperature") for each in temperature])
+    rails = rails if rails.size else own.voltage * np.array([0.9, 1.0, 1.1])
+    warm = warm if warm.size else np.array([20.0, 60.0, 100.0])
+    if rails.size * warm.size > MOST:
+        raise InputError(f"{rails.size} rails and {warm.size} temperatures, expected at most {MOST} pairs")
+    reference, reach = _reference(hammer, waveform, tolerance)
+    wanted = reference.speed if blow is None else read_positive(blow, "m/s", "blow")
+    shape = rails.size, warm.size
+    names = ("time", "speed", "current", "heat", "strongest", "width", "width_time", "width_heat")
+    arrays = {name: np.full(shape, np.nan) for name in names}
+    status = np.full(shape, "ok", dtype=object)
+    for j, degrees in enumerate(warm.tolist()):
+        coil = hammer.replace("coil.temperature", degrees)
+        for i, volts in enumerate(rails.tolist()):
+            if progress is not None:
+                progress(j * rails.size + i, rails.size * warm.size)
+            pulse = waveform.scaled(volts / own.voltage)
+            fired = _fire(coil, pulse, reach, tolerance)
+            status[i, j] = fired.status
+            longest = _fire(coil, of_width(pulse, reach), reach, tolerance)
+            width = _same_blow(coil, pulse, wanted, longest, tolerance)
+            again = _Fired() if width is None else _fire(coil, of_width(pulse, width), reach, tolerance)
+            own_pulse = (fired.time, fired.speed, fired.current, fired.heat, longest.speed)
+            values = (*own_pulse, np.nan if width is None else width, again.time, again.heat)
+            for name, value in zip(names, values, strict=True):
+                arrays[name][i, j] = value
+    if progress is not None:
+        progress(rails.size * warm.size, rails.size * warm.size)
+    return DeadTime(
+        hammer=hammer,
+        blow=wanted,
+        own_width=own.width,
+        own_time=reference.time,
+        voltage=rails,
+        temperature=warm,
+        status=status.astype(np.str_),
+        **arrays,
+    )
+
+
+def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_Fired, float]:
+    """Return the firing at the own rail, and how long a run must be; InputError if nothing is struck."""
+    span = 4.0 * float(waveform.width)  # type: ignore[attr-defined]
+    for _ in range(_DOUBLINGS):
+        fired = _fire(hammer, waveform, span, tolerance)
+        if fired.speed > 0.0:
+            return fired, LONGEST * fired.time
+        span *= 2.0
+    raise InputError(f"{hammer.path}: expected a hammer whose own pulse reaches what it strikes")
+
+
+def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fired:
+    """Fire once from rest; NaN where nothing is struck within a time, s."""
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.run.simulate import simulate
+
+    drive = PulseTrain(pulse, at=[0.0])
+    motion = simulate(hammer, drive, duration=span, tolerance=tolerance, ledger=True)
+    dot = motion.dots[0]
+    if not dot.struck or dot.flight_time is None or dot.impact_speed is None:
+        return _Fired(status=motion.status)
+    peak = float(motion.current.max())
+    return _Fired(dot.flight_time, dot.impact_speed, peak, motion.energy.copper_loss, motion.status)
+
+
+def _same_blow(
+    hammer: Hammer, pulse: Waveform, wanted: float, longest: _Fired, tolerance: float
+) -> float | None:
+    """Return the width of a pulse, s, with a speed of impact, m/s; None where there is none.
+
+    What comes after the impact of the longest pulse changes nothing, so that no wider one is asked for.
+    """
+    from scipy.optimize import brentq
+
+    def off(width: float) -> float:
+        speed = _fire(hammer, of_width(pulse, width), LONGEST * longest.time, tolerance).speed
+        return -1.0 if np.isnan(speed) else speed / wanted - 1.0
+
+    if not longest.speed >= wanted * (1.0 - _SAME):
+        return None
+    shortest = _shortest(pulse, SHORTEST * longest.time)
+    if not shortest < longest.time or off(shortest) > 0.0:
+        return None
+    if off(longest.time) <= 0.0:
+        return longest.time
+    return float(brentq(off, shortest, longest.time, xtol=_WIDTH_ERROR * longest.time, rtol=1e-12))
+
+
+def _shortest(pulse: Waveform, width: float) -> float:
+    """Return the least width, s, from one on by powers of two, that a pulse can have."""
+    for doubling in range(2 * _DOUBLINGS):
+        with suppress(InputError):
+            of_width(pulse, width * 2.0**doubling)
+            return width * 2.0**doubling
+    return width

@@ -1,1 +1,0 @@
-"""Time from switching on to impact, as a table for the firmware."""

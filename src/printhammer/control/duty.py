@@ -1,0 +1,350 @@
+"""Thermal duty: the largest rate at which a coil stays below a temperature, and how long it stands more.
+
+The coil is one thermal mass, or two: the winding, of temperature T, and the body around it, of temperature B.
+
+    C dT/dt  = f E(T) - (T - B) / R          winding, of heat capacity C, by the thermal resistance R
+    C' dB/dt = (T - B) / R - (B - A) / R'    body, of C', to an ambient temperature A by R'
+
+f is the number of dots a second and E(T) the heat of one (`printhammer.control.duty`); one mass is the
+winding alone with B = A. When all is steady the winding is f E(T) (R + R') above the ambient temperature, so
+that the largest rate at a limit L is (L - A) / (E(L) (R + R')): with one limit it falls with the ambient
+temperature in one proportion, whatever rail and driver do.
+
+Source: the lumped thermal network of any text on heat transfer. Validity: pulses that are short beside the
+warming of the winding, so that their heat is even in time. Weakness: the winding has one temperature, where a
+real one is hotter inside.
+
+Heat of one dot in the coil, as a function of the temperature of its winding.
+
+The resistance of copper rises by 0.393 % a kelvin of that at 20 degC. A time on a rail that is long beside
+L / R draws less current through a warm winding, and heats it less; a current that a driver keeps up heats it
+more; a driver that meters the energy of a dot heats it the same.
+
+Heat of one dot of a hammer: what its standard waveform leaves in the coil.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.drive.input import read_number, read_positive
+from printhammer.errors import InputError
+from printhammer.parts.coil.winding import COPPER, REFERENCE
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.support.roots import bisect
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+COLDEST: Final = REFERENCE - 1.0 / COPPER
+"""Temperature at which the straight line of the resistance would reach zero, degC."""
+
+FEEDS: Final = ("voltage", "current", "energy")
+"""What a driver keeps the same when the coil gets warm."""
+
+
+@dataclass(frozen=True)
+class DotHeat:
+    """Heat of one dot over the temperature of the winding."""
+
+    temperature: tuple[float, ...]
+    """Temperatures, degC, ascending; one or more."""
+    heat: tuple[float, ...]
+    """Heat of one dot there, J."""
+    feed: str
+    """One of `FEEDS`: how the heat goes on outside the temperatures, and between them in proportion to it."""
+
+    def at(self, temperature: float) -> float:
+        """Return the heat of one dot at a temperature of the winding, degC; J."""
+        shares = [
+            heat / _share(self.feed, place) for heat, place in zip(self.heat, self.temperature, strict=True)
+        ]
+        return float(np.interp(temperature, self.temperature, shares)) * _share(self.feed, temperature)
+
+
+def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
+    """Return the heat of one dot from that at 20 degC of the winding, J, and what its driver keeps the same.
+
+    Raises
+    ------
+    InputError
+        The heat is not positive, or the feed none of `FEEDS`.
+    """
+    if feed not in FEEDS:
+        raise InputError(f"feed = {feed!r}, expected one of {', '.join(FEEDS)}")
+    return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
+
+
+def read_temperature(value: float | str, name: str) -> float:
+    """Read a temperature, degC or text with that unit, at which copper has a resistance.
+
+    Raises
+    ------
+    InputError
+        It is no temperature, or below the one at which the line of the resistance reaches zero.
+    """
+    temperature = read_number(value, "degC", name)
+    if not temperature > COLDEST:
+        raise InputError(f"{name} = {value!r} is expected to be more than {COLDEST:.4g} degC")
+    return temperature
+
+
+def _share(feed: str, temperature: float) -> float:
+    """Return the heat of one dot in parts of that at 20 degC."""
+    warm = 1.0 + COPPER * (temperature - REFERENCE)
+    return {"voltage": 1.0 / warm, "current": warm, "energy": 1.0}[feed]
+
+
+HOTTEST: Final = 1500.0
+"""Temperature beyond which a steady one counts as none, degC: copper has melted."""
+
+_TOLERANCE: Final = 1e-9
+
+
+@dataclass(frozen=True)
+class ThermalCoil:
+    """A coil as one thermal mass, or two."""
+
+    resistance: float
+    """From the winding to the body, or to the ambient temperature where there is no body, K/W."""
+    capacity: float | None = None
+    """Heat capacity of the winding, J/K; None where it is not known, and no time follows."""
+    body_resistance: float = 0.0
+    """From the body to the ambient temperature, K/W; 0 for one thermal mass."""
+    body_capacity: float | None = None
+    """Heat capacity of the body, J/K."""
+
+    @property
+    def whole(self) -> float:
+        """Thermal resistance from the winding to the ambient temperature, K/W."""
+        return self.resistance + self.body_resistance
+
+
+class ThermalDuty(Result, rows="ambient burst"):
+    """The largest rates of a coil, and what faster bursts are allowed."""
+
+    coil: ThermalCoil = part("the thermal masses")
+    heat: DotHeat = part("heat of one dot")
+    limit: float = scalar("degC", "largest temperature of the winding")
+    limit_heat: float = scalar("J", "heat of one dot at that temperature")
+    ambient: FloatArray = coordinate("degC", "ambient temperature", "ambient")
+    rate: FloatArray = column(
+        "Hz", "dots per second that the coil stands for ever", "ambient", more="0 where it is too hot at rest"
+    )
+    burst: FloatArray = coordinate("Hz", "dots per second while it fires", "burst")
+    temperature: FloatArray = column(
+        "degC",
+        "temperature of the winding when it fires at that rate for ever",
+        "ambient burst",
+        more="infinite where it would melt",
+    )
+    time: FloatArray = column(
+        "s",
+        "time of firing at that rate, from cold, until the winding is at the limit",
+        "ambient burst",
+        more="infinite where it never is; NaN where no heat capacity is given",
+    )
+    share: FloatArray = column(
+        "1",
+        "part of the time that it may fire at that rate, in turns short beside the warming",
+        "ambient burst",
+    )
+
+    @property
+    def title(self) -> str:
+        """What the rates are for."""
+        return f"thermal duty of a coil up to {self.limit:g} degC"
+
+
+def thermal_duty(
+    heat: float | str | DotHeat,
+    thermal_resistance: float | str,
+    limit: float | str,
+    *,
+    ambient: Sequence[float | str] = (25.0,),
+    burst: Sequence[float | str] = (),
+    feed: str = "voltage",
+    thermal_capacity: float | str | None = None,
+    body_resistance: float | str | None = None,
+    body_capacity: float | str | None = None,
+) -> ThermalDuty:
+    """Find how many dots a second a coil stands without getting hotter than a limit.
+
+    Parameters
+    ----------
+    heat : float, str or DotHeat
+        Heat of one dot with the winding at 20 degC, J or text with a unit; or a function of its temperature,
+        see `printhammer.control.duty.heat_of`.
+    thermal_resistance : float or str
+        From the winding to the ambient temperature, or to the body where there is one, K/W.
+    limit : float or str
+        Largest temperature of the winding, degC.
+    ambient : sequence of float or str, optional
+        Ambient temperatures, degC.
+    burst : sequence of float or str, optional
+        Rates, Hz, of which to tell how hot, how long and how much of the time; by default the largest that
+        the coil stands at any of the ambient temperatures.
+    feed : str, optional
+        What the driver keeps the same as the coil gets warm: "voltage", "current" or "energy".
+    thermal_capacity : float or str, optional
+        Heat capacity of the winding, J/K, without which no time is known.
+    body_resistance, body_capacity : float or str, optional
+        Thermal resistance from the body around the winding to the ambient temperature, K/W, and its heat
+        capacity, J/K; both or none.
+
+    Raises
+    ------
+    InputError
+        A number is out of its bounds, only one is given of two that belong together, or there is no ambient
+        temperature.
+    """
+    one_dot = heat if isinstance(heat, DotHeat) else dot_heat(heat, feed)
+    if (body_resistance is None) != (body_capacity is None):
+        missing = "body_capacity" if body_capacity is None else "body_resistance"
+        raise InputError(f"{missing} is missing, expected body_resistance and body_capacity, or neither")
+    if body_capacity is not None and thermal_capacity is None:
+        raise InputError("thermal_capacity is missing, expected that of the winding beside body_capacity")
+    coil = ThermalCoil(
+        read_positive(thermal_resistance, "K/W", "thermal_resistance"),
+        None if thermal_capacity is None else read_positive(thermal_capacity, "J/K", "thermal_capacity"),
+        0.0 if body_resistance is None else read_positive(body_resistance, "K/W", "body_resistance"),
+        None if body_capacity is None else read_positive(body_capacity, "J/K", "body_capacity"),
+    )
+    largest = read_temperature(limit, "limit")
+    ambients = np.array([read_temperature(each, "ambient") for each in ambient])
+    if not ambients.size:
+        raise InputError("ambient is empty, expected one temperature or more")
+    at_limit = one_dot.at(largest)
+    rate = np.maximum(largest - ambients, 0.0) / (at_limit * coil.whole)
+    bursts = np.array([_rate(each) for each in burst or [rate.max()] if each != 0.0])
+    pairs = [[(float(cold), float(fast)) for fast in bursts] for cold in ambients]
+    shape = ambients.size, bursts.size
+
+    def table(values: list[list[float]]) -> FloatArray:
+        return np.array(values, dtype=np.float64).reshape(shape)
+
+    return ThermalDuty(
+        coil=coil,
+        heat=one_dot,
+        limit=largest,
+        limit_heat=at_limit,
+        ambient=ambients,
+        rate=rate,
+        burst=bursts,
+        temperature=table([[steady(coil, one_dot, *pair) for pair in row] for row in pairs]),
+        time=table([[time_to(coil, one_dot, largest, *pair) for pair in row] for row in pairs]),
+        share=np.minimum(rate[:, None] / bursts, 1.0),
+    )
+
+
+def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> float:
+    """Return the temperature, degC, that the winding comes to at an ambient one and a rate, Hz."""
+
+    def excess(temperature: float) -> float:
+        return rate * heat.at(temperature) * coil.whole - (temperature - ambient)
+
+    return bisect(excess, ambient, HOTTEST) if excess(HOTTEST) < 0.0 else math.inf
+
+
+def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate: float) -> float:
+    """Return how long, s, a coil at an ambient temperature may be fired at a rate, Hz, up to a limit."""
+    if limit <= ambient:
+        return 0.0
+    # At and below the largest steady rate the limit is never passed.
+    if rate * heat.at(limit) * coil.whole <= limit - ambient:
+        return math.inf
+    if coil.capacity is None:
+        return math.nan
+    from scipy.integrate import solve_ivp
+
+    winding, around = coil.capacity, coil.body_capacity
+    slowest = (winding + (around or 0.0)) * coil.whole
+
+    def slopes(_t: float, state: Any) -> list[float]:
+        body = ambient if around is None else state[1]
+        flow = (state[0] - body) / coil.resistance
+        warming = (rate * heat.at(state[0]) - flow) / winding
+        if around is None:
+            return [warming]
+        return [warming, (flow - (body - ambient) / coil.body_resistance) / around]
+
+    def reached(_t: float, state: Any) -> float:
+        return float(state[0] - limit)
+
+    reached.terminal = True  # type: ignore[attr-defined]
+    start, span = [ambient] * (1 if around is None else 2), slowest
+    while True:
+        run = solve_ivp(slopes, (0.0, span), start, "LSODA", events=reached, rtol=_TOLERANCE, atol=_TOLERANCE)
+        times = run.t_events or [np.zeros(0)]
+        if times[0].size:
+            return float(times[0][0])
+        # Hardly faster than what it stands for ever: the limit comes late.
+        if span > 64.0 * slowest:
+            return math.inf
+        span *= 4.0
+
+
+def _rate(value: float | str) -> float:
+    rate = read_number(value, "Hz", "burst")
+    if rate <= 0.0:
+        raise InputError(f"burst = {value!r} is expected to be greater than 0 Hz")
+    return rate
+
+
+TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
+"""Temperatures of the winding at which a hammer with a driver is fired, degC."""
+
+_LEFT: Final = 1e-3  # Current that may be left at the end, in parts of the largest
+_DOUBLINGS: Final = 8
+
+
+def heat_of(hammer: Hammer) -> DotHeat:
+    """Return the heat of one dot of a hammer over the temperature of its winding.
+
+    A driver fires it from rest with its coil at `TEMPERATURES`; a current is taken to be kept up whatever the
+    resistance.
+
+    Raises
+    ------
+    InputError
+        The hammer has no resistance of the coil, its waveform is a force, or its current does not end.
+    """
+    from printhammer.drive.trains import PulseTrain
+    from printhammer.run.energy import squared_current
+
+    waveform: Any = hammer.waveform
+    if hammer.coil_resistance is None:
+        raise InputError(f"{hammer.path}: coil.resistance is missing, expected it for the heat of a dot")
+    if waveform is None or waveform.quantity == "force":
+        raise InputError(
+            f"{hammer.path}: expected a [waveform] of a voltage or a current for the heat of a dot"
+        )
+    drive = PulseTrain(waveform, at=[0.0])
+    if waveform.quantity == "current":
+        heat = hammer.coil_resistance * squared_current(drive, 0.0, waveform.support)
+        return DotHeat((REFERENCE,), (heat,), "current")
+    heats = [_copper_loss(hammer.replace("coil.temperature", warm), drive) for warm in TEMPERATURES]
+    return DotHeat(TEMPERATURES, tuple(heats), "voltage")
+
+
+def _copper_loss(hammer: Hammer, drive: PulseTrain) -> float:
+    """Return the heat of the coil of one firing until its current has ended, J."""
+    from printhammer.run.simulate import simulate
+
+    span = 4.0 * drive.waveform.support
+    for _ in range(_DOUBLINGS):
+        motion = simulate(hammer, drive, duration=span, ledger=True)
+        if abs(motion.current[-1]) <= _LEFT * abs(motion.current).max():
+            return motion.energy.copper_loss
+        span *= 2.0
+    raise InputError(
+        f"{hammer.path}: the current lasts for ever, expected one that ends for the heat of a dot"
+    )

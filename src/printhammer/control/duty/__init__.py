@@ -1,1 +1,0 @@
-"""How fast a coil may be fired before it is too hot."""

@@ -1,0 +1,299 @@
+"""The time of impact from samples of the coil: a matched filter for what the pack does to the signal.
+
+While the armature moves it induces a voltage in its coil, and when it strikes that changes: the current,
+which had dipped, turns, or the voltage of the open coil of a permanent magnet falls. Two runs of the nominal
+hammer, one with its pack and one with the pack out of reach, say what to expect: their difference d(t) is
+zero up to the touch. Samples y less those of the run without pack are then taken for
+
+    a d(t - shift) + b0 + b1 t + noise,
+
+within a window around the touch, and the shift is that at which least is left over: for each shift the
+least squares in a and b are linear, so that a filter of fixed weights gives them (a matched filter with
+nuisance parameters, or generalised likelihood ratio; S. M. Kay, *Fundamentals of Statistical Signal
+Processing: Detection Theory*, 1998, ch. 7). The straight line takes what differs slowly between a unit and
+the nominal hammer: resistance, temperature, rail.
+
+The estimator sees samples, the pulse that was fired, and the nominal hammer; nothing of the unit.
+
+How the current or the voltage of a coil is sampled: noise, rate, bits, and the span of the converter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.printing.dots.nominal import WAIT, pulse_of
+from printhammer.results import Declared, part, scalar
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from printhammer.drive.waveforms.base import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import FloatArray
+
+PHASES: Final = 8  # Shifts within the time from sample to sample that are tried
+BEFORE: Final = 1.0  # What is looked at before the touch, in parts of the contact
+AFTER: Final = 0.6  # And after it
+REACH: Final = 0.15  # How far the impact is looked for around that of the nominal hammer, of its flight time
+FAINTEST: Final = 5.0  # Least size of what is found, in standard deviations
+_DEGREE: Final = 1  # Of the polynomial
+_LEAST: Final = 8  # Samples of the window
+_MOST: Final = 200_000  # Samples of a record
+_SPAN: Final = 1.5  # Of the converter, in parts of the largest value around the touch
+_FLOWING: Final = 0.02  # Current at the touch below which it counts as over, in parts of its largest
+_DOUBLINGS: Final = 6
+_MOST_BEFORE: Final = 0.5  # Most that is looked at before the touch, in parts of the flight time
+_AROUND: Final = 0.2  # Largest shift within a window, in parts of the contact
+_FINEST: Final = 400  # Steps of the shifts in a contact
+_MOVES: Final = 3  # How often a window is moved
+_FIRM: Final = ("pack.stiffness", "pack.damping")
+_SOFT: Final = 1e-9  # Part of these that a pack has which does nothing
+
+
+class ImpactEstimator:
+    """Times of impact from samples of the coil, for one pulse of a hammer.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The nominal hammer, with a pack and a coil that a voltage drives.
+    sampling : Sampling
+        How the coil is sampled.
+    pulse : Waveform, optional
+        The pulse that is fired; by default that of the hammer.
+
+    Raises
+    ------
+    InputError
+        The pulse is no voltage, it makes no dot, too few samples fall on the contact, or nothing of the
+        impact is to be expected in them.
+    """
+
+    def __init__(self, hammer: Hammer, sampling: Sampling, pulse: Waveform | None = None) -> None:
+        self.hammer, self.pulse = hammer, pulse_of(hammer, pulse)
+        if self.pulse.quantity != "voltage":
+            raise InputError(
+                f"{hammer.path}: the waveform is a {self.pulse.quantity}, expected the voltage of a driver"
+                " on a coil, whose current and voltage an impact changes"
+            )
+        if hammer.front is None:
+            raise InputError(f"{hammer.path}: the hammer has no pack, expected one that it strikes")
+        self.step = 1.0 / sampling.sampling_rate
+        self.flight, self.contact = self._dot()
+        parts = min(BEFORE * self.contact, _MOST_BEFORE * self.flight), AFTER * self.contact
+        before, after = (max(math.ceil(part / self.step), 1) for part in parts)
+        self._before, self._size = before, before + after + 1
+        if self._size < _LEAST:
+            raise InputError(
+                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self._size} samples fall on the contact of"
+                f" {1e6 * self.contact:.3g} us, expected {_LEAST} at least"
+            )
+        self.count = math.ceil((1.0 + REACH) * self.flight / self.step) + after + 2
+        if self.count > _MOST:
+            raise InputError(
+                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self.count} samples a dot, expected at most"
+                f" {_MOST}"
+            )
+        fine = np.asarray(self.step / PHASES * np.arange(PHASES * self.count), np.float64)
+        run = simulate(hammer, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
+        free = self._without_pack(sampling, fine)
+        true = sampling.of(run)
+        touch = round(self.flight / self.step * PHASES)
+        # An open switch lets the coil rise far above what it shows of the impact.
+        ahead = before if sampling.signal == "current" else 0
+        around = slice(max(touch - PHASES * ahead, 0), touch + PHASES * after)
+        self.sampling = sampling.scaled_to(_SPAN * max(float(true[around].max()), 0.0) or 1.0)
+        self._free = self.sampling.clipped(free)[::PHASES]
+        self._template = self.sampling.clipped(true) - self.sampling.clipped(free)
+        self._currents = float(np.abs(run.current).max()), float(run.current[touch])
+        self._check_signal()
+
+    @property
+    def times(self) -> FloatArray:
+        """Times of the samples after the firing, s."""
+        return np.asarray(self.step * np.arange(self.count), np.float64)
+
+    @property
+    def clearness(self) -> float:
+        """Size of what the impact of the nominal hammer does, in standard deviations of the samples."""
+        return float(self._filters[2][len(self._filters[2]) // 2]) / self.sampling.deviation
+
+    def __call__(self, samples: FloatArray) -> float:
+        """Return the time from firing to impact, s; NaN where none shows.
+
+        `samples` are the first `count` from the firing on, A or V; more are left unread.
+        """
+        left = np.asarray(samples, np.float64)[: self.count] - self._free
+        windows = sliding_window_view(left, self._size)
+        touches = self.step * (self._before + np.arange(len(windows)))
+        near = np.flatnonzero(np.abs(touches - self.flight) <= REACH * self.flight)
+        place = int(near[np.argmax(self._likeness(windows[near]))])
+        shifts, weights, sizes = self._filters
+        for _ in range(_MOVES):
+            found = weights @ windows[place] / sizes
+            best = int(np.argmax(found))
+            if 0 < best < shifts.size - 1:
+                break
+            place = int(np.clip(place + round(float(shifts[best]) / self.step), near[0], near[-1]))
+        if not found[best] >= FAINTEST * self.sampling.deviation:
+            return math.nan
+        bend = _vertex(np.maximum(found, 0.0) ** 2, best)
+        return float(touches[place] + shifts[best] + bend * (shifts[1] - shifts[0]))
+
+    def _likeness(self, windows: FloatArray) -> FloatArray:
+        """Return how much windows are like what the touch in their place does: 1 is the same form."""
+        _shifts, weights, sizes = self._filters
+        middle = len(weights) // 2
+        found = windows @ weights[middle] / sizes[middle]
+        whole = (windows**2).sum(axis=1) - ((windows @ self._base) ** 2).sum(axis=1)
+        # What is no more than noise is like nothing.
+        least = self._size * self.sampling.deviation**2
+        return np.asarray(found / np.sqrt(np.maximum(whole, least)))
+
+    @cached_property
+    def _base(self) -> FloatArray:
+        """Orthonormal polynomials over a window, (window, degree + 1)."""
+        offsets = np.arange(self._size) - self._before
+        return np.asarray(np.linalg.qr(np.vander(offsets / self._size, _DEGREE + 1))[0], np.float64)
+
+    @cached_property
+    def _filters(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Shifts of the touch within a window, s, the weights of the filter of each, and what they weigh."""
+        offsets = self.step * (np.arange(self._size) - self._before)
+        grid = max(self.step / PHASES, self.contact / _FINEST)
+        count = math.ceil(_AROUND * self.contact / grid)
+        shifts = np.asarray(grid * np.arange(-count, count + 1), np.float64)
+        fine = self.step / PHASES * np.arange(self._template.size)
+        rows = np.interp(self.flight + offsets - shifts[:, np.newaxis], fine, self._template)
+        rows -= (rows @ self._base) @ self._base.T
+        return shifts, rows, np.sqrt((rows**2).sum(axis=1))
+
+    def _dot(self) -> tuple[float, float]:
+        """Return flight time and time of contact of the nominal hammer, s."""
+        span = WAIT
+        for _ in range(_DOUBLINGS):
+            run = simulate(self.hammer, PulseTrain(self.pulse), duration=span, points=2)
+            dot: Any = run.dots[0]
+            if dot.flight_time is not None and dot.contact_time is not None:
+                return float(dot.flight_time), float(dot.contact_time)
+            span *= 2.0
+        raise InputError(f"{self.hammer.path}: a single pulse makes no dot, expected a hammer that prints")
+
+    def _without_pack(self, sampling: Sampling, fine: FloatArray) -> FloatArray:
+        """Return the signal where the pack does nothing, A or V; where that run ends early, its last."""
+        known = self.hammer.constants
+        away = self.hammer.replace({key: _SOFT * known[key].si for key in _FIRM if key in known})
+        run = simulate(away, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
+        values = sampling.of(run)
+        return np.concatenate([values, np.full(fine.size - values.size, values[-1])])
+
+    def _check_signal(self) -> None:
+        sampling, (largest, now) = self.sampling, self._currents
+        if self.clearness >= FAINTEST:
+            return
+        if sampling.signal == "voltage" and not self.clearness > 0.0:
+            raise InputError(
+                f"{self.hammer.path}: the voltage shows no impact, since the supply or a diode holds it, or"
+                " the magnet is not permanent, expected signal = 'current'"
+            )
+        if sampling.signal == "current" and abs(now) < _FLOWING * largest:
+            raise InputError(
+                f"{self.hammer.path}: the current shows no impact, since {1e3 * now:.3g} mA of"
+                f" {1e3 * largest:.3g} mA are left of it by then, expected a pulse that lasts until the"
+                " impact, a slower decay, or signal = 'voltage' if the magnet is permanent"
+            )
+        raise InputError(
+            f"{self.hammer.path}: the impact changes the {sampling.signal} by {self.clearness:.2g} standard"
+            f" deviations, expected less noise than {sampling.noise:g} {sampling.unit}, more bits than"
+            f" {sampling.bits}, or faster sampling"
+        )
+
+
+def _vertex(score: FloatArray, place: int) -> float:
+    """Return where the parabola through a largest value and its neighbours is highest, in steps from it."""
+    if not 0 < place < score.size - 1:
+        return 0.0
+    before, here, after = score[place - 1 : place + 2].tolist()
+    bend = before - 2.0 * here + after
+    return 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+
+
+Signal = Literal["current", "voltage"]
+SIGNALS: Final = get_args(Signal)
+UNITS: Final = {"current": "A", "voltage": "V"}
+_MOST_BITS: Final = 24
+
+
+class Sampling(Declared):
+    """A converter that samples the current in a coil, or the voltage across it, from the firing on.
+
+    Raises
+    ------
+    InputError
+        A number is not within its bounds, or the signal is not known.
+    """
+
+    signal: Signal = part("what is sampled, current or voltage", default="current")
+    noise: float = part("standard deviation of a sample, A or V", default=0.0)
+    sampling_rate: float = scalar("Hz", "samples per second", default=1e6)
+    bits: int = part("of the converter", default=12)
+    full_scale: float | None = part(
+        "largest value that is shown, A or V, beside 0 as the least; None for half as much again as the"
+        " single pulse shows around its impact",
+        default=None,
+    )
+
+    def __post_init__(self) -> None:
+        if self.signal not in SIGNALS:
+            raise InputError(f"signal = {self.signal!r}, expected {' or '.join(SIGNALS)}")
+        if not 0.0 <= self.noise < math.inf:
+            raise InputError(f"noise = {self.noise!r} is expected to be a number not below 0")
+        if not 0.0 < self.sampling_rate < math.inf:
+            raise InputError(f"sampling_rate = {self.sampling_rate!r} is expected to be a number above 0")
+        if type(self.bits) is not int or not 1 <= self.bits <= _MOST_BITS:
+            raise InputError(f"bits = {self.bits!r}, expected a whole number from 1 to {_MOST_BITS}")
+        if self.full_scale is not None and not 0.0 < self.full_scale < math.inf:
+            raise InputError(f"full_scale = {self.full_scale!r} is expected to be a number above 0")
+
+    @property
+    def unit(self) -> str:
+        """SI unit of what is sampled."""
+        return UNITS[self.signal]
+
+    def scaled_to(self, largest: float) -> Sampling:
+        """Return the same with a span, A or V, unless it has one."""
+        return self if self.full_scale is not None else replace(self, full_scale=largest)
+
+    @property
+    def step(self) -> float:
+        """Step of the converter, A or V; not a number before it has a span."""
+        return math.nan if self.full_scale is None else self.full_scale / 2.0**self.bits
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of a sample with its rounding, A or V."""
+        return math.hypot(self.noise, self.step / math.sqrt(12.0))
+
+    def of(self, motion: Motion) -> FloatArray:
+        """Return the true values of what is sampled at the output times of a motion, A or V."""
+        values = motion.current if self.signal == "current" else motion.voltage
+        return np.asarray(values, np.float64)
+
+    def clipped(self, values: FloatArray) -> FloatArray:
+        """Return values as far as the span goes, from 0 on, A or V."""
+        span = math.inf if self.full_scale is None else self.full_scale
+        return np.clip(values, 0.0, span)
+
+    def read(self, values: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return what is shown of true values, A or V, of any shape."""
+        noisy = values + self.noise * rng.standard_normal(values.shape)
+        return self.clipped(np.rint(noisy / self.step) * self.step)

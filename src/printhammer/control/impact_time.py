@@ -1,0 +1,239 @@
+"""How well samples of the coil tell the time of impact, against noise, sampling rate and bits."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+
+import numpy as np
+
+from printhammer.control.impact_estimator import UNITS, ImpactEstimator, Sampling
+from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.drive.input import read_count, read_number, read_positive
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.printing.rates.variability import Variability
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from printhammer.control.impact_estimator import Signal
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.results.result import Entries
+    from printhammer.support.arrays import FloatArray, IntArray
+
+MOST: Final = 2000
+"""Number of ways to sample above which a study is refused."""
+
+_MOST_MISSED: Final = 0.99  # Of the impacts that a sensor does not see
+_MOST_DOTS: Final = 10_000
+_CELLS: Final = "noise sampling_rate bits"
+
+
+class ImpactTime(Result, rows=_CELLS):
+    """Errors of times of impact that are estimated from the current or the voltage of the coil.
+
+    Bias and standard deviation on the nominal hammer are what noise, sampling and rounding do; those over
+    units are what the differences between hammers add, which no averaging takes away.
+    """
+
+    hammer: Hammer = part("the hammer")
+    signal: str = part("what is sampled, current or voltage")
+    variability: Variability = part("of the constants of the units")
+    flight_time: float = scalar("s", "from firing to impact on the nominal hammer")
+    dots: int = part("dots in each way to sample")
+    noise: FloatArray = coordinate("", "standard deviation of a sample, A or V", "noise")
+    sampling_rate: FloatArray = coordinate("Hz", "samples per second", "sampling_rate")
+    bits: IntArray = coordinate("1", "bits of the converter", "bits")
+    bias: FloatArray = column("s", "mean error on the nominal hammer", _CELLS, more="NaN if none is seen")
+    deviation: FloatArray = column("s", "standard deviation of the error on the nominal hammer", _CELLS)
+    missed: FloatArray = column("1", "share of its impacts that are not seen", _CELLS)
+    unit_bias: FloatArray = column("s", "mean error over units", _CELLS)
+    unit_deviation: FloatArray = column("s", "standard deviation of the error over units", _CELLS)
+    unit_missed: FloatArray = column("1", "share of the impacts of units that are not seen", _CELLS)
+
+    @property
+    def title(self) -> str:
+        """What it is of."""
+        return f"time of impact of {self.hammer.name} from the {self.signal} of its coil"
+
+    def entries(self) -> Entries:
+        """Return the arrays, the noise in the unit of the signal."""
+        entries = super().entries()
+        note, values = entries["noise"]
+        return {**entries, "noise": (replace(note, unit=self.unit), values)}
+
+    def sensor(self, seed: int = 0) -> ImpactSensor:
+        """Return the estimator as a sensor for `printhammer.learn`, where one way to sample was studied.
+
+        Its noise is the standard deviation on the nominal hammer. What units differ by beside, which is the
+        same for every dot of a unit, is its offset.
+
+        Raises
+        ------
+        InputError
+            There is more than one way to sample, or no impact was seen.
+        """
+        if self.bias.size != 1:
+            raise InputError(f"{self.bias.size} ways to sample were studied, expected one for a sensor")
+        noise, units = float(self.deviation[0, 0, 0]), float(self.unit_deviation[0, 0, 0])
+        if not np.isfinite(noise + units):
+            raise InputError("no impact was seen in the samples, expected less noise for a sensor")
+        # The mean over units is known at the design, and is taken off.
+        offset = float(np.sqrt(max(units**2 - noise**2, 0.0)))
+        missed = min(float(self.unit_missed[0, 0, 0]), _MOST_MISSED)
+        return ImpactSensor(noise=noise, offset=offset, missed=missed, seed=seed)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the noise."""
+        return UNITS[self.signal]
+
+
+def impact_time(
+    hammer: Hammer,
+    *,
+    signal: Signal = "current",
+    noise: Sequence[float | str] = (),
+    sampling_rate: Sequence[float | str] = (1e6,),
+    bits: Sequence[SupportsIndex] = (12,),
+    full_scale: float | str | None = None,
+    dots: SupportsIndex = 50,
+    units: SupportsIndex = 20,
+    variability: Variability | None = None,
+    seed: SupportsIndex = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> ImpactTime:
+    """Find the error of times of impact that are estimated from samples of the coil of a hammer.
+
+    The estimator is `printhammer.control.impact_estimator.ImpactEstimator`: it sees the samples of one dot
+    and knows the nominal hammer and the pulse.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        A hammer with a pack and a driver of its coil.
+    signal : str, optional
+        "current", which shows an impact while it flows, or "voltage", which does while the coil of a
+        permanent magnet is open.
+    noise : sequence of float or str, optional
+        Standard deviations of a sample, A or V; by default three of 0.1, 0.3 and 1 % of the largest current
+        in the hammer's own pulse, or of 10 V.
+    sampling_rate : sequence of float or str, optional
+        Samples per second, Hz.
+    bits : sequence of int, optional
+        Of the converter.
+    full_scale : float or str, optional
+        Largest value that it shows, A or V; by default half as much again as the nominal hammer shows around
+        its impact.
+    dots : int, optional
+        Dots of the nominal hammer, and of all units, in each way to sample.
+    units : int, optional
+        Hammers drawn from the variability.
+    variability : Variability, optional
+        By default `Variability.of(hammer)`.
+    seed : int, optional
+        Of the units and of the noise.
+    progress : callable, optional
+        Called with ways to sample done and of all.
+
+    Raises
+    ------
+    InputError
+        An argument is not what is described above, or the samples show no impact.
+    """
+    volts = signal == "voltage"
+    levels = np.unique([read_number(each, UNITS.get(signal, "A"), "noise") for each in noise])
+    rates = np.unique([read_positive(each, "Hz", "sampling_rate") for each in sampling_rate])
+    widths = np.unique([read_count(each, "bits") for each in bits])
+    many, others, first = (
+        read_count(dots, "dots"),
+        read_count(units, "units"),
+        read_count(seed, "seed", least=0),
+    )
+    span = None if full_scale is None else read_positive(full_scale, UNITS.get(signal, "A"), "full_scale")
+    if not 2 <= many <= _MOST_DOTS or not 2 <= others <= many:
+        raise InputError(
+            f"dots = {many} and units = {others}, expected 2 to {_MOST_DOTS} dots, and from 2"
+            " units to as many"
+        )
+    if not levels.size:
+        scale = 10.0 if volts else _largest_current(hammer)
+        levels = scale * np.array([0.001, 0.003, 0.01])
+    shape = levels.size, rates.size, widths.size
+    total = int(np.prod(shape))
+    if not 0 < total <= MOST:
+        raise InputError(f"{total} ways to sample are asked for, expected 1 to {MOST}")
+    spread = Variability.of(hammer) if variability is None else variability
+    drawn = spread.draw(hammer, others, first)
+    rng = np.random.default_rng((first, 1))
+    names = ("bias", "deviation", "missed", "unit_bias", "unit_deviation", "unit_missed")
+    arrays = {name: np.full(shape, np.nan) for name in names}
+    flight, done = np.nan, 0
+    for j, rate in enumerate(rates.tolist()):
+        records: list[Any] = []
+        for i, k in itertools.product(range(levels.size), range(widths.size)):
+            if progress is not None:
+                progress(done, total)
+            sampling = Sampling(signal, float(levels[i]), rate, int(widths[k]), span)
+            estimator = ImpactEstimator(hammer, sampling)
+            flight = estimator.flight
+            if not records:
+                records = [_record(unit, estimator) for unit in (hammer, *drawn)]
+            own = _errors(estimator, records[:1], many, rng)
+            all_units = _errors(estimator, records[1:], many, rng)
+            for prefix, errors in (("", own), ("unit_", all_units)):
+                seen = errors[np.isfinite(errors)]
+                arrays[f"{prefix}missed"][i, j, k] = 1.0 - seen.size / errors.size
+                if seen.size:
+                    arrays[f"{prefix}bias"][i, j, k] = seen.mean()
+                    arrays[f"{prefix}deviation"][i, j, k] = seen.std()
+            done += 1
+    if progress is not None:
+        progress(total, total)
+    return ImpactTime(
+        hammer=hammer,
+        signal=signal,
+        variability=spread,
+        flight_time=flight,
+        dots=many,
+        noise=levels,
+        sampling_rate=rates,
+        bits=widths,
+        **arrays,
+    )
+
+
+def _largest_current(hammer: Hammer) -> float:
+    """Return the largest current of the hammer's own pulse, A."""
+    waveform = hammer.waveform
+    if waveform is None or waveform.quantity != "voltage":
+        return 1.0  # The estimator says what is wrong.
+    motion = simulate(hammer, PulseTrain(waveform), duration=1.1 * waveform.support)
+    return float(np.abs(motion.current).max())
+
+
+def _record(unit: Hammer, estimator: ImpactEstimator) -> tuple[FloatArray, float]:
+    """Return the true signal of a dot of a unit, A or V, and when it strikes, s."""
+    times = estimator.times
+    motion = simulate(
+        unit, PulseTrain(estimator.pulse), duration=float(times[-1]) + estimator.step, times=times
+    )
+    true = estimator.sampling.of(motion)
+    flight = motion.dots[0].flight_time
+    short = np.full(times.size - true.size, true[-1])
+    return np.concatenate([true, short]), np.nan if flight is None else float(flight)
+
+
+def _errors(
+    estimator: ImpactEstimator, records: Sequence[Any], dots: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return the errors of estimated times of impact of dots, s, in turn one of each record."""
+    errors = []
+    for number in range(dots):
+        true, flight = records[number % len(records)]
+        errors.append(estimator(estimator.sampling.read(true, rng)) - flight)
+    return np.array(errors)

@@ -1,0 +1,89 @@
+"""The current of a pulse: that of a driver comes out of the coil, so that the hammer is fired once.
+
+Pulses of a hammer with other widths.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.drive.trains import PulseTrain
+from printhammer.errors import InputError
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.simulate import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from printhammer.drive.waveforms.base import Waveform
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+_SAMPLES: Final = 4001
+_SPAN: Final = 2.0  # Length of a run at first, in parts of the width
+_DOUBLINGS: Final = 6
+
+
+def peak_current(hammer: Hammer, pulse: Waveform) -> float:
+    """Return the largest current of a pulse that is fired from rest, A."""
+    if pulse.quantity != "voltage":
+        return pulse.peak
+    return float(_course(hammer, pulse, _SPAN)[1].max())
+
+
+def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
+    """Return the time, s, after the width of a driver's pulse when its current is first a share of its peak.
+
+    Raises
+    ------
+    InputError
+        It does not become as small.
+    """
+    own: Any = pulse
+    for doubling in range(_DOUBLINGS):
+        times, current = _course(hammer, pulse, _SPAN * 2.0**doubling)
+        faded = (times >= own.width) & (current <= share * current.max())
+        if faded.any():
+            return float(times[int(np.argmax(faded))] - own.width)
+    raise InputError(
+        f"{hammer.path}: the current lasts {_SPAN * 2.0**_DOUBLINGS:g} times the width of the pulse, expected"
+        " a driver whose current decays sooner"
+    )
+
+
+def _course(hammer: Hammer, pulse: Waveform, span: float) -> tuple[FloatArray, FloatArray]:
+    """Return times, s, and absolute currents, A, for a span in parts of the width."""
+    own: Any = pulse
+    end = span * own.width
+    times = np.linspace(0.0, end, _SAMPLES)
+    motion = simulate(hammer, PulseTrain(pulse), duration=end, times=times, tolerance=DISPLAY_TOLERANCE)
+    return times[: motion.current.size], np.abs(motion.current)
+
+
+def of_width(pulse: Waveform, width: float) -> Waveform:
+    """Return a pulse like another one, but of another width, s."""
+    kind: Any = type(pulse)
+    return kind(**{**dict(pulse), "width": width})  # type: ignore[no-any-return]
+
+
+def widest(
+    pulse: Waveform,
+    bound: float,
+    low: float,
+    high: float,
+    halvings: int,
+    peak: Callable[[Waveform], float] = lambda pulse: pulse.peak,
+) -> float:
+    """Return the largest width, s, between two at which the current of a pulse keeps to a bound, A.
+
+    The bound is taken to hold at `low`, and it is `low` where it holds nowhere above. `peak` tells the
+    largest current of a pulse, A.
+    """
+    if peak(of_width(pulse, high)) <= bound:
+        return high
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if peak(of_width(pulse, middle)) <= bound else (low, middle)
+    return low

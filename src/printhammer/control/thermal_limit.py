@@ -1,0 +1,128 @@
+"""The largest temperature of a coil, from the rates that its maker allows at several ambient temperatures.
+
+At one rail the largest rate is (L - A) / K, with the limit L of the winding, the ambient temperature A and
+the warming K of a dot a second (`printhammer.control.duty`). L is common to all rails and K is one for
+each; both are found by least squares of the logarithms of the rates.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.control.duty import COLDEST, read_temperature
+from printhammer.drive.input import read_number, read_positive
+from printhammer.errors import InputError
+from printhammer.results import Result, column, scalar
+from printhammer.support.roots import bisect
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from printhammer.support.arrays import FloatArray
+
+COLUMNS: Final = {"voltage": "V", "ambient": "degC", "rate": "Hz"}
+"""Columns of a file of rates, and their SI units."""
+
+_HIGHEST: Final = 1e4  # Above the hottest ambient temperature, K
+
+
+class ThermalLimit(Result):
+    """One largest temperature of the winding, from rates at several ambient temperatures."""
+
+    limit: float = scalar("degC", "largest temperature of the winding")
+    error: float = scalar(
+        "K", "its standard error", more="from what the rates are off; NaN where none is more than needed"
+    )
+    voltage: FloatArray = column("V", "rail", "row")
+    ambient: FloatArray = column("degC", "ambient temperature", "row")
+    rate: FloatArray = column("Hz", "largest dots per second, as stated", "row")
+    fitted: FloatArray = column("Hz", "the same with the one limit", "row")
+    warming: FloatArray = column("K s", "what one dot a second warms the winding at this rail", "row")
+
+    @property
+    def title(self) -> str:
+        """What was found."""
+        return f"largest temperature of a coil, {self.limit:.4g} degC"
+
+
+def thermal_limit(
+    ambient: Sequence[float | str],
+    rate: Sequence[float | str],
+    voltage: Sequence[float | str] | None = None,
+) -> ThermalLimit:
+    """Find the largest temperature of a coil from the rates that it stands.
+
+    Parameters
+    ----------
+    ambient, rate : sequence of float or str
+        Ambient temperatures, degC, and the largest dots per second there, Hz.
+    voltage : sequence of float or str, optional
+        Rails, V, at which they hold; by default all at the same.
+
+    Raises
+    ------
+    InputError
+        The sequences are not of one length, no rail has rates at two ambient temperatures, or rates do not
+        fall as it gets warmer, or hardly.
+    """
+    cold = np.array([read_temperature(each, "ambient") for each in ambient])
+    rates = np.array([read_positive(each, "Hz", "rate") for each in rate])
+    rails = np.array([read_number(each, "V", "voltage") for each in voltage or [0.0] * len(cold)])
+    if not cold.size == rates.size == rails.size:
+        raise InputError(
+            f"{cold.size} ambient temperatures, {rates.size} rates and {rails.size} voltages, expected as"
+            " many of each"
+        )
+    _kinds, group = np.unique(rails, return_inverse=True)
+    if not any(np.unique(cold[group == each]).size > 1 for each in group):
+        raise InputError("expected rates at two ambient temperatures or more of one rail at least")
+
+    def centred(values: FloatArray) -> FloatArray:
+        sums = np.bincount(group, values)
+        return values - (sums / np.bincount(group))[group]
+
+    def off(limit: float) -> FloatArray:
+        return centred(np.log(rates) - np.log(limit - cold))
+
+    def slope(limit: float) -> float:
+        return float(off(limit) @ centred(1.0 / (limit - cold)))
+
+    # The rates fall with the temperature faster, the nearer the limit: the slope has one sign on each side.
+    hottest = float(cold.max())
+    low, high = hottest + 1e-6 * (hottest - COLDEST), hottest + _HIGHEST
+    if not slope(low) > 0.0 > slope(high):
+        raise InputError("the rates are expected to fall as the ambient temperature rises")
+    limit = bisect(slope, low, high)
+    residuals = off(limit)
+    spare = cold.size - np.unique(group).size - 1
+    steepness = float(np.sum(centred(1.0 / (limit - cold)) ** 2))
+    error = math.sqrt(float(residuals @ residuals) / spare / steepness) if spare > 0 else math.nan
+    fitted = rates / np.exp(residuals)
+    return ThermalLimit(
+        limit=limit,
+        error=error,
+        voltage=rails,
+        ambient=cold,
+        rate=rates,
+        fitted=fitted,
+        warming=(limit - cold) / fitted,
+    )
+
+
+def read_rates(path: Path) -> dict[str, list[float]]:
+    """Read a file of rates, with `COLUMNS`, the rail optional, as arguments of `thermal_limit`.
+
+    Raises
+    ------
+    InputError
+        It is no such table; the sentence names the file.
+    """
+    from printhammer.identify.tables import read_table
+
+    wanted = {name: COLUMNS[name] for name in ("ambient", "rate")}
+    table = read_table(path, wanted, optional={"voltage": COLUMNS["voltage"]})
+    return {name: values.tolist() for name, values in table.values.items()}

@@ -1,0 +1,137 @@
+"""Dead time and pulses of the same blow against rail and temperature.
+
+Thermal duty: the largest rate of a coil against the ambient temperature.
+
+Errors of times of impact that are estimated from the coil.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import heading
+from printhammer.figures.elements.scales import scale
+from printhammer.figures.elements.style import new_figure, new_panel, sign, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.control.dead_time import DeadTime
+    from printhammer.control.duty import ThermalDuty
+    from printhammer.control.impact_time import ImpactTime
+    from printhammer.control.thermal_limit import ThermalLimit
+
+
+@styled
+def plot_dead_time(table: DeadTime) -> Figure:
+    """Draw times from switching on to impact and widths against the rail, a line for each temperature.
+
+    Thin and dashed: with the hammer's own pulse. Bold: with the pulses that give the same blow.
+    """
+    figure = new_figure(5.2)
+    grid = figure.add_gridspec(2, 1)
+    times, widths = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+    ms = scale("time").factor
+    rows = np.argsort(table.voltage)
+    volts = table.voltage[rows]
+    shades = np.linspace(0.35, 1.0, table.temperature.size)
+    for j, degrees in enumerate(table.temperature.tolist()):
+        look: dict[str, Any] = {"color": style.ORANGE, "alpha": float(shades[j])}
+        times.plot(volts, ms * table.time[rows, j], ls=(0, (4, 3)), lw=style.THIN, **look)
+        name = f"{degrees:g} °C"
+        for ax, values in ((times, table.width_time), (widths, table.width)):
+            ax.plot(volts, ms * values[rows, j], "o-", ms=3.5, lw=style.LINE, label=name, **look)
+    widths.axhline(ms * table.own_width, color=style.MUTED, lw=style.THIN, ls=(0, (4, 3)))
+    times.tick_params(axis="x", labelbottom=False)
+    times.set_ylabel("To impact  [ms]")
+    widths.set_ylabel("Width  [ms]")
+    widths.set_xlabel("Rail  [V]")
+    times.legend(fontsize=style.SMALL, loc="best", frameon=False)
+    heading(times, f"Same blow, {table.blow:.3g} m/s; dashed: own pulse")
+    widths.set_xlim(*times.get_xlim())
+    sign(figure, table.hammer)
+    return figure
+
+
+_COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)
+
+
+@styled
+def plot_duty(duty: ThermalDuty) -> Figure:
+    """Draw the rate that a coil stands for ever, which falls to zero at its limit."""
+    figure, ax = new_panel(3.4)
+    ax.plot(duty.ambient, duty.rate, "o", color=style.BLUE, ms=4.5)
+    reach = np.array([min(float(duty.ambient.min()), 0.0), duty.limit])
+    ax.plot(
+        reach, (duty.limit - reach) / (duty.limit_heat * duty.coil.whole), color=style.BLUE, lw=style.THIN
+    )
+    heading(ax, f"{1e3 * duty.limit_heat:.3g} mJ a dot at {duty.limit:g} °C, {duty.coil.whole:g} K/W")
+    _axes(ax)
+    return figure
+
+
+@styled
+def plot_limit(limit: ThermalLimit) -> Figure:
+    """Draw stated rates, and the lines to the one limit at which all of them end."""
+    figure, ax = new_panel(3.4)
+    for number, rail in enumerate(np.unique(limit.voltage).tolist()):
+        rows = limit.voltage == rail
+        colour = _COLOURS[number % len(_COLOURS)]
+        name = f"{rail:g} V" if rail else "stated"
+        ax.plot(limit.ambient[rows], limit.rate[rows], "o", color=colour, ms=4.5, label=name)
+        start = float(limit.ambient[rows].min())
+        rate = (limit.limit - start) / float(limit.warming[rows][0])
+        ax.plot([start, limit.limit], [rate, 0.0], color=colour, lw=style.THIN)
+    ax.legend(fontsize=style.SMALL, loc="upper right", frameon=False)
+    heading(ax, f"One limit of the winding, {limit.limit:.1f} °C")
+    _axes(ax)
+    return figure
+
+
+def _axes(ax: Axes) -> None:
+    ax.set_ylim(bottom=0.0)
+    ax.set_xlabel("Ambient temperature  [°C]")
+    ax.set_ylabel("Dots a second, for ever  [Hz]")
+    ax.margins(x=0.03)
+
+
+_DASHES: Final = ("-", (0, (4, 2)), (0, (1, 1.5)))
+_MILLI: Final = 1e3
+_MICRO: Final = 1e6
+
+
+@styled
+def plot_impact_time(study: ImpactTime) -> Figure:
+    """Draw standard deviation and size of the bias against the noise, a line for each rate and converter.
+
+    Orange: on the nominal hammer. Blue: over units, whose differences no averaging takes away.
+    """
+    figure = new_figure(5.2)
+    grid = figure.add_gridspec(2, 1)
+    above = figure.add_subplot(grid[0])
+    below = figure.add_subplot(grid[1], sharex=above)
+    shades = np.linspace(0.4, 1.0, study.sampling_rate.size)
+    for j, k in itertools.product(range(study.sampling_rate.size), range(study.bits.size)):
+        name = f"{1e-3 * study.sampling_rate[j]:g} kHz, {study.bits[k]} bits"
+        look: dict[str, Any] = {"ls": _DASHES[k % len(_DASHES)], "alpha": float(shades[j]), "lw": style.LINE}
+        cell = slice(None), j, k
+        noise = _MILLI * study.noise
+        above.plot(noise, _MICRO * study.deviation[cell], "o", color=style.ORANGE, **look, ms=3.0, label=name)
+        above.plot(noise, _MICRO * study.unit_deviation[cell], "s", color=style.BLUE, **look, ms=3.0)
+        below.plot(noise, _MICRO * np.abs(study.bias[cell]), "o", color=style.ORANGE, **look, ms=3.0)
+        below.plot(noise, _MICRO * np.abs(study.unit_bias[cell]), "s", color=style.BLUE, **look, ms=3.0)
+    above.set_ylabel("Standard deviation  [µs]")
+    below.set_ylabel("Size of the bias  [µs]")
+    below.set_xlabel(f"Noise of a sample of the {study.signal}  [m{study.unit}]")
+    above.tick_params(axis="x", labelbottom=False)
+    for ax in (above, below):
+        ax.set_ylim(bottom=0.0)
+    above.legend(fontsize=style.SMALL, loc="best", frameon=False)
+    heading(above, "Error of the time of impact; orange: nominal hammer, blue: units")
+    sign(figure, study.hammer)
+    return figure

@@ -1,0 +1,378 @@
+"""The printed page: what came on paper, what was wanted, how far the dots are off, and the worst place.
+
+Ink on paper: round dots of given optical densities, drawn into an array.
+
+Where dots overlap, their densities add. The rim of a dot is soft over a tenth of its diameter, or a pixel and
+a half where that is more.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.figures.elements import style
+from printhammer.figures.elements.marks import dots, heading, note
+from printhammer.figures.elements.scales import Scale
+from printhammer.figures.elements.style import sign, styled
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    from matplotlib.axes import Axes
+    from matplotlib.collections import EllipseCollection
+    from matplotlib.figure import Figure
+
+    from printhammer.printing.page.page import Page
+    from printhammer.support.arrays import FloatArray
+
+PAPER: Final = (252, 250, 243)
+INK: Final = (24, 24, 38)
+"""Colours, red, green, blue, of paper and of ink that lets no light through."""
+
+MOST_PIXELS: Final = 24_000_000
+"""Size above which a sheet is drawn more coarsely."""
+
+_SOFT: Final = 0.1
+_PIXELS: Final = 1.5
+_TOGETHER: Final = 1_000_000
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A part of the paper."""
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+    """Its edges, m: across, and downward."""
+
+    @property
+    def width(self) -> float:
+        """From left to right, m."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        """From top to bottom, m."""
+        return self.bottom - self.top
+
+    def pixels(self, finest: float) -> tuple[float, int, int]:
+        """Return size, m, of a pixel, not below the finest, and number of rows and columns of pixels."""
+        size = max(finest, (self.width * self.height / MOST_PIXELS) ** 0.5)
+        return size, max(1, round(self.height / size)), max(1, round(self.width / size))
+
+
+def inked(
+    sheet: Sheet, across: FloatArray, down: FloatArray, density: FloatArray, diameter: float, finest: float
+) -> FloatArray:
+    """Return the optical density on a sheet from top left, shape (rows, columns).
+
+    Dots have middles, m, densities and one diameter, m; those off the sheet are left out as far as they are
+    off it. Pixels are not smaller than the finest, m.
+    """
+    size, rows, columns = sheet.pixels(finest)
+    radius = 0.5 * diameter / size
+    soft = max(2.0 * radius * _SOFT, _PIXELS)
+    reach = int(np.ceil(radius + soft)) + 1
+    x, y = (across - sheet.left) / size - 0.5, (down - sheet.top) / size - 0.5
+    on = (x > -reach) & (x < columns + reach) & (y > -reach) & (y < rows + reach)
+    # A border as wide as a dot reaches twice saves telling which of its pixels lie on the sheet.
+    border = 2 * reach + 1
+    x, y, ink = x[on] + border, y[on] + border, density[on]
+    wide = columns + 2 * border
+    whole = np.zeros((rows + 2 * border) * wide)
+    near = np.arange(-reach, reach + 1)
+    together = max(1, _TOGETHER // near.size**2)
+    for first in range(0, ink.size, together):
+        part = slice(first, first + together)
+        column, row = np.floor(x[part]).astype(np.int64), np.floor(y[part]).astype(np.int64)
+        from_x = near + (column - x[part])[:, np.newaxis]
+        from_y = near + (row - y[part])[:, np.newaxis]
+        far = np.sqrt(from_x[:, np.newaxis, :] ** 2 + from_y[:, :, np.newaxis] ** 2)
+        cover = np.clip((radius - far) / soft + 0.5, 0.0, 1.0) * ink[part, np.newaxis, np.newaxis]
+        place = (row * wide + column)[:, np.newaxis, np.newaxis] + (near[:, np.newaxis] * wide + near)
+        np.add.at(whole, place.reshape(-1), cover.reshape(-1))
+    return whole.reshape(-1, wide)[border : border + rows, border : border + columns]
+
+
+def coloured(density: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    """Return the picture of paper with ink of some densities, shape (rows, columns, 3)."""
+    back = np.exp(-math.log(10.0) * np.asarray(density, np.float32))[..., np.newaxis]
+    ink, paper = np.array(INK, np.float32), np.array(PAPER, np.float32)
+    return np.asarray(ink + back * (paper - ink) + np.float32(0.5), np.uint8)
+
+
+View = Literal["page", "zoom", "sheet"]
+VIEWS: Final = get_args(View)
+"""The page with all that there is to see; its worst place alone; the paper alone, at its true size."""
+
+ZOOM_SHAPE: Final = 3.5
+"""How many times wider than the height of the wires the worst place is."""
+
+_WIDTH: Final = 7.6
+_SIDE: Final = 0.2
+_LABEL: Final = 0.24
+_GAP: Final = 0.1
+_BESIDE: Final = 0.15
+_UPRIGHT: Final = 0.5
+_BAR: Final = 1.5
+_LEAST_MARK: Final = 1.8
+_NEUTRAL: Final = "#c6ccd1"
+_TALLEST: Final = 4.5
+_LARGEST: Final = 0.1
+_FOOT: Final = 0.62
+_INCH: Final = 25.4e-3
+_FINENESS: Final = 10
+_ACROSS: Final = 2000
+_ZOOM_FINENESS: Final = 50
+_SHEET_FINENESS: Final = 16
+_MICRONS: Final = Scale("Placement error", "m", "um")
+
+
+@styled
+def plot(page: Page, view: View = "page") -> Figure:
+    """Draw a page.
+
+    In the difference a dot has the colour of its placement error, and crosses are lost dots. In the worst
+    place rings are where dots are wanted, and crosses lost dots.
+
+    Parameters
+    ----------
+    view : str, optional
+        "page": from the top, what was printed, what was wanted, the difference, and the worst place; "zoom":
+        the worst place alone; "sheet": the paper alone, at its true size.
+
+    Raises
+    ------
+    InputError
+        There is no such view.
+    """
+    if view == "sheet":
+        return _sheet_alone(page)
+    if view == "zoom":
+        return _zoom_alone(page)
+    if view != "page":
+        raise InputError(f"view = {view!r}, expected one of {', '.join(VIEWS)}")
+    sheet, place = whole_sheet(page), zoomed_sheet(page)
+    # Side by side where the paper is upright, else one below the other.
+    beside = sheet.height > _UPRIGHT * sheet.width
+    wide = _WIDTH - 2.0 * _SIDE
+    each = (wide - 2.0 * _BESIDE) / 3.0 if beside else wide
+    scale = min(each / sheet.width, _TALLEST / sheet.height, _LARGEST / page.head.pitch)
+    strip = scale * sheet.height
+    sheet = replace(sheet, right=sheet.left + each / scale)
+    zoom = wide * place.height / place.width
+    rows = 1 if beside else 3
+    height = rows * (_LABEL + strip + _GAP) + (1.5 + beside) * _LABEL + zoom + _FOOT + 0.1
+    figure, top = style.new_figure(height, _WIDTH, "none"), height - 0.1
+    if beside:
+        top -= _LABEL
+        look: dict[str, Any] = {"fontsize": style.SMALL, "color": style.MUTED, "va": "center"}
+        figure.text(_SIDE / _WIDTH, (top + 0.1) / height, _printed_title(page), **look)
+    axes = []
+    for number, name in enumerate(("Printed" if beside else _printed_title(page), "Wanted", "Difference")):
+        if number == 0 or not beside:
+            top -= _LABEL
+        left = _SIDE + (number * (each + _BESIDE) if beside else 0.0)
+        axes.append(_panel(figure, sheet, top, strip, name, left))
+        if number == 2 or not beside:
+            top -= strip + _GAP
+    fine = max(page.head.pitch / _FINENESS, sheet.width / _ACROSS)
+    _paper(axes[0], sheet, page, _dots(page), fine)
+    full = np.full(page.line.shape, page.head.density)
+    _paper(axes[1], sheet, page, (*page.intended, full), fine)
+    _differences(figure, axes[2], page, beside * _LABEL)
+    top -= 1.5 * _LABEL
+    _zoom(_panel(figure, place, top, zoom, _zoom_title(page)), place, page)
+    _sign(figure, page)
+    return figure
+
+
+def whole_sheet(page: Page) -> Sheet:
+    """Return the paper of a page: all its print lines, with a margin about them."""
+    head, pattern = page.head, page.pattern
+    margin = 2.0 * head.wire_diameter
+    across = (pattern.slots - 1) * head.pitch
+    down = (pattern.lines - 1) * head.line_pitch + (head.wires - 1) * head.wire_pitch
+    return Sheet(-margin, across + margin, -margin, down + margin)
+
+
+def zoom_slots(page: Page) -> int:
+    """Return the slots of the worst place that are shown."""
+    return max(1, round(ZOOM_SHAPE * page.head.wires * page.head.wire_pitch / page.head.pitch))
+
+
+def zoomed_sheet(page: Page) -> Sheet:
+    """Return the paper about the worst place of a page."""
+    head, slots = page.head, zoom_slots(page)
+    line, first = page.worst_place(slots)
+    top = line * head.line_pitch
+    last = first + slots - 1
+    margin = 1.2 * head.pitch
+    return Sheet(
+        first * head.pitch - margin,
+        last * head.pitch + margin,
+        top - margin,
+        top + (head.wires - 1) * head.wire_pitch + margin,
+    )
+
+
+def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
+    """Return axes for a sheet: their height, their top above the bottom of the figure, their left, in."""
+    width, whole = figure.get_size_inches()
+    wide = height * sheet.width / sheet.height
+    ax = figure.add_axes((left / width, (top - height) / whole, wide / width, height / whole))
+    ax.set_xlim(sheet.left, sheet.right)
+    ax.set_ylim(sheet.bottom, sheet.top)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    for spine in ax.spines.values():
+        spine.set_color(style.FAINT)
+    heading(ax, title, color=style.MUTED, pad=3.0)
+    return ax
+
+
+def _printed_title(page: Page) -> str:
+    return f"Printed at {page.rate:.6g} Hz, {page.strategy}, carriage at {page.speed:.3g} m/s"
+
+
+def _zoom_title(page: Page) -> str:
+    line, first = page.worst_place(zoom_slots(page))
+    last = min(first + zoom_slots(page), page.pattern.slots)
+    return (
+        f"The worst place: print line {line + 1}, slots {first + 1} to {last} (rings: where dots are wanted)"
+    )
+
+
+def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return places and densities of all that is on the paper, extra contacts among it."""
+    printed, extra = (*page.places, page.density), (*page.extra_places, page.extra_density)
+    across, down, density = (
+        np.concatenate([values[page.printed], more]) for values, more in zip(printed, extra, strict=True)
+    )
+    return across, down, density
+
+
+def _paper(ax: Axes, sheet: Sheet, page: Page, dots: tuple[FloatArray, ...], finest: float) -> None:
+    """Draw a sheet with dots: places across and down, m, and densities; pixels not below the finest, m."""
+    across, down, density = dots
+    picture = coloured(inked(sheet, across, down, density, page.head.wire_diameter, finest))
+    extent = (sheet.left, sheet.right, sheet.bottom, sheet.top)
+    ax.imshow(picture, extent=extent, aspect="auto", interpolation="antialiased")
+
+
+def _discs(
+    ax: Axes, across: FloatArray, down: FloatArray, diameter: float, **options: Any
+) -> EllipseCollection:
+    from matplotlib.collections import EllipseCollection
+
+    size = np.full(across.shape, diameter)
+    where = {"offsets": np.column_stack([across, down]), "offset_transform": ax.transData}
+    discs = EllipseCollection(size, size, np.zeros(across.shape), units="xy", **where, **options)
+    ax.add_collection(discs, autolim=False)
+    return discs
+
+
+def _in_points(ax: Axes, length: float) -> float:
+    """Return how long a length on the paper, m, is drawn, points."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    width, _height = figure.get_size_inches()
+    left, right = ax.get_xlim()
+    return float(72.0 * width * ax.get_position().width * length / (right - left))
+
+
+def _differences(figure: Figure, ax: Axes, page: Page, above: float) -> None:
+    """Draw where dots are off, and a scale above the panel, by some inches more than need be."""
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    on, head, (across, down) = page.printed, page.head, page.places
+    error = _MICRONS.shown(page.placement_error[on])
+    # At least as wide as the limits, so that nothing shines that is nothing.
+    bound = float(_MICRONS.shown(page.limits.arrival * page.speed))
+    widest = max(float(np.abs(error).max(initial=0.0)), bound)
+    colours = LinearSegmentedColormap.from_list("off", [style.BLUE, _NEUTRAL, style.ORANGE])
+    off = {"array": error, "cmap": colours, "norm": Normalize(-widest, widest), "gid": "placement error"}
+    discs = _discs(ax, across[on], down[on], head.wire_diameter, linewidths=0.0, **off)
+    wanted_across, wanted_down = (part[page.lost] for part in page.intended)
+    mark = max(_in_points(ax, head.wire_diameter), _LEAST_MARK)
+    cross = {"marker": "x", "mew": 0.25 * mark, "gid": "lost"}
+    dots(ax, wanted_across, wanted_down, 0.9 * mark, style.INK, **cross)
+    width, whole = figure.get_size_inches()
+    box = ax.get_position()
+    left, bottom = (_WIDTH - _SIDE - _BAR - 0.75) / width, box.y1 + (0.06 + above) / whole
+    bar_axes = figure.add_axes((left, bottom, _BAR / width, 0.09 / whole))
+    bar = figure.colorbar(discs, cax=bar_axes, orientation="horizontal", ticks=[])
+    bar.outline.set_visible(False)
+    how = {"va": "center", "fontsize": style.TINY, "zorder": 3.0}
+    note(bar_axes, f"−{widest:.3g} µm, early", (-0.02, 0.5), ha="right", **how)
+    note(bar_axes, f"late, {widest:.3g} µm", (1.02, 0.5), ha="left", **how)
+
+
+def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
+    head = page.head
+    fine = max(head.pitch / _ZOOM_FINENESS, sheet.width / _ACROSS)
+    _paper(ax, sheet, page, _dots(page), fine)
+    across, down = page.intended
+    reach = head.pitch
+    near = (across > sheet.left - reach) & (across < sheet.right + reach)
+    near &= (down > sheet.top - reach) & (down < sheet.bottom + reach)
+    on, lost = near & page.printed, near & page.lost
+    mark = _in_points(ax, head.wire_diameter)
+    rings = {"facecolors": "none", "linewidths": min(style.THIN, 0.07 * mark)}
+    _discs(ax, across[on], down[on], head.wire_diameter, edgecolors=style.BLUE, gid="wanted", **rings)
+    _discs(ax, across[lost], down[lost], head.wire_diameter, edgecolors=style.ORANGE, gid="lost", **rings)
+    dots(ax, across[lost], down[lost], 0.4 * mark, style.ORANGE, marker="x", mew=0.1 * mark)
+    more = near[page.extra_of]
+    extra_across, extra_down = (part[more] for part in page.extra_places)
+    _discs(ax, extra_across, extra_down, head.wire_diameter, edgecolors=style.GREEN, gid="extra", **rings)
+
+
+def _sign(figure: Figure, page: Page) -> None:
+    """Write below the figure how good the page is."""
+    sign(figure, page.hammer)
+    _width, whole = figure.get_size_inches()
+    left = _SIDE / _WIDTH
+    figure.text(left, 0.4 / whole, summary(page), fontsize=style.SMALL, color=style.INK, va="center")
+
+
+def summary(page: Page) -> str:
+    """Return in a line how good a page is."""
+    lost, extra = int(page.lost.sum()), int(page.extra_contacts.sum())
+    said = [f"{page.line.size} dots wanted", f"{int(page.printed.sum())} printed", f"{lost} lost"]
+    if not page.run.all():
+        said.append(f"{int((~page.run).sum())} not run")
+    said.append(f"{extra} extra contacts")
+    if page.printed.any():
+        error = _MICRONS.shown(page.placement_error[page.printed])
+        darkness = page.darkness[page.printed]
+        said.append(f"placement ±{np.std(error):.3g} µm, worst {np.abs(error).max():.3g} µm")
+        said.append(f"darkness {darkness.min():.2f} to {darkness.max():.2f}")
+    return " · ".join(said)
+
+
+def _zoom_alone(page: Page) -> Figure:
+    place = zoomed_sheet(page)
+    wide = _WIDTH - 2.0 * _SIDE
+    height = wide * place.height / place.width
+    figure = style.new_figure(height + 2.5 * _LABEL + _FOOT, _WIDTH, "none")
+    title = f"{_printed_title(page)}\n{_zoom_title(page)}"
+    _zoom(_panel(figure, place, _FOOT + height, height, title), place, page)
+    _sign(figure, page)
+    return figure
+
+
+def _sheet_alone(page: Page) -> Figure:
+    sheet = whole_sheet(page)
+    figure = style.new_figure(sheet.height / _INCH, sheet.width / _INCH, "none")
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    ax.set_axis_off()
+    ax.set_xlim(sheet.left, sheet.right)
+    ax.set_ylim(sheet.bottom, sheet.top)
+    _paper(ax, sheet, page, _dots(page), page.head.pitch / _SHEET_FINENESS)
+    return figure

@@ -1,0 +1,228 @@
+"""Figure 4: total force on the armature against time after a single pulse.
+
+Figure 5: total force against displacement over one cycle, with the loops of settle-out in an insert.
+
+Figure 10: the phase plane of the armature after a single pulse.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.figures.elements import style
+from printhammer.figures.elements.curves import fired, orbit, places, shown_until, times_of
+from printhammer.figures.elements.curves import total_force as force_at
+from printhammer.figures.elements.marks import (
+    HALO,
+    arrows,
+    contact_spans,
+    curve,
+    drive_strip,
+    freest,
+    legend_above,
+    note,
+    occupied,
+    place_lines,
+)
+from printhammer.figures.elements.scales import Scale, label, scale
+from printhammer.figures.elements.style import (
+    BLUE,
+    FAINT,
+    HAIR,
+    MUTED,
+    TINY,
+    new_figure,
+    new_panel,
+    sign,
+    styled,
+    with_strip,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.run.motion import Motion
+    from printhammer.support.arrays import BoolArray, FloatArray
+
+
+@styled
+def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
+    """Draw Fig. 4: the sum of all forces on the armature, equation (2), after a single pulse.
+
+    The impacts on a rigid backstop have no finite force and are not drawn. The time shown ends, unless given,
+    when the armature has settled, at most after 4 ms.
+    """
+    from matplotlib.patches import Patch
+
+    motion = fired(hammer, duration=duration)
+    until = motion.end if duration is not None else shown_until(motion)
+    times = times_of(motion, 0.0, until)
+    total = force_at(motion, times)
+    time, force = scale("time", until), scale("force")
+    figure = new_figure(4.2)
+    panel, strip = with_strip(figure)
+    panel.set_xlim(0.0, float(time.shown(until)))
+    low, high = min(float(total.min()), 0.0), max(float(total.max()), 0.0)
+    room = 0.08 * (high - low) or 1.0
+    panel.set_ylim(float(force.shown(low - room)), float(force.shown(high + room)))
+    panel.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0.6)
+    contact_spans(panel, motion, until, time)
+    curve(panel, time.shown(times), force.shown(total), "total force", style.INK, lw=1.0)
+    touched = {contact.surface for contact in motion.contacts}
+    handles = [
+        Patch(color=style.SURFACES[name], alpha=0.3, lw=0.0, label=f"touches the {name}")
+        for name in ("pack", "backstop")
+        if name in touched
+    ]
+    if handles:
+        legend_above(panel, handles, handlelength=1.2)
+    drive_strip(strip, [motion], [times], until, [style.BLUE])
+    label(panel, "y", force, "Total force")
+    sign(figure, hammer, motion.message, rigid_remark(motion))
+    return figure
+
+
+def rigid_remark(motion: Motion) -> str:
+    """Return one sentence on what a force diagram cannot show of this motion; empty if nothing."""
+    impacts = any(c.surface == "backstop" and c.peak_force is None and not c.initial for c in motion.contacts)
+    return "The rigid backstop changes the velocity at once; its impulses are not drawn." if impacts else ""
+
+
+_INSERTS: Final = ((0.52, 0.46), (0.44, 0.4), (0.36, 0.32), (0.3, 0.26))
+"""Widths and heights that the insert may have, of the axes."""
+
+_NOTE: Final = (0.4, 0.09)
+
+
+@styled
+def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
+    """Draw Fig. 5: the sum of all forces, equation (2), against displacement after a single pulse.
+
+    A clockwise loop is energy given to the armature, a counter-clockwise one energy lost; arrow heads tell
+    which. The insert shows what follows the second touch of the backstop, where there is one. The motion
+    lasts 4 ms unless another duration, s, or text with a unit, is given.
+    """
+    motion = fired(hammer, duration=duration)
+    times = times_of(motion)
+    x, total = motion.at(times)[0], force_at(motion, times)
+    ends = [*places(hammer).values(), float(x.min()), float(x.max())]
+    room = 0.05 * (max(ends) - min(ends)) or 1e-6
+    way, force = scale("displacement", max(map(abs, ends))), scale("force")
+    figure, ax = new_panel(4.8)
+    ax.set_xlim(float(way.shown(min(ends) - room)), float(way.shown(max(ends) + room)))
+    low, high = float(total.min()), float(total.max())
+    above = (high - low) or 1.0
+    # The names of the places are written above the curve.
+    ax.set_ylim(float(force.shown(low - 0.08 * above)), float(force.shown(high + 0.21 * above)))
+    ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
+    place_lines(ax, hammer, way, "x")
+    curve(ax, way.shown(x), force.shown(total), "force", BLUE, lw=1.0)
+    touches = [c.t_in for c in motion.contacts if c.surface == "backstop" and not c.initial and c.peak_force]
+    settling = touches[1] if len(touches) > 1 else math.inf
+    # Settle-out runs to and fro on nearly one line: its arrows are in the insert.
+    cycle = times < settling
+    arrows(ax, way.shown(x[cycle]), force.shown(total[cycle]), 10, BLUE, 8.0)
+    _annotate(ax, motion, times >= settling, x, total, way, force)
+    label(ax, "x", way)
+    label(ax, "y", force, "Total force")
+    sign(figure, hammer, motion.message, rigid_remark(motion))
+    return figure
+
+
+def _annotate(
+    ax: Axes,
+    motion: Motion,
+    late: BoolArray,
+    x: FloatArray,
+    total: FloatArray,
+    way: Scale,
+    force: Scale,
+) -> None:
+    """Add the insert, if there is a settle-out to show, and what the loops mean, where there is room."""
+    points = occupied(ax)
+    if late.any():
+        left, bottom, width, height = box = _place(points)
+        _insert(ax, box, motion, way.shown(x[late]), force.shown(total[late]), way, force)
+        # What the insert covers, its tick labels included, is taken.
+        covered = np.meshgrid(
+            np.linspace(left - 0.07, left + width, 30), np.linspace(bottom - 0.07, bottom + height + 0.05, 30)
+        )
+        points = np.concatenate([points, np.column_stack([axis.ravel() for axis in covered])])
+    corners = [
+        (at, level) for level in (0.02, 0.1, 0.7, 0.2, 0.3, 0.42, 0.55) for at in (0.11, 0.3, 0.5, 0.6, 0.02)
+    ]
+    (left, bottom), _covered = freest(points, _NOTE, corners)
+    text = "clockwise: energy given to the armature\ncounter-clockwise: energy lost"
+    note(ax, text, (left + 0.01, bottom + 0.015), va="bottom", fontsize=TINY, bbox=HALO)
+
+
+def _place(points: FloatArray) -> tuple[float, float, float, float]:
+    """Return left, bottom, width and height of the insert: as large as fits, best at the upper right."""
+    boxes = []
+    for width, height in _INSERTS:
+        corners = [
+            (left, bottom)
+            for left in np.linspace(0.915 - width, 0.05, 12).tolist()
+            for bottom in np.linspace(0.73 - height, 0.05, 12).tolist()
+        ]
+        # Its tick labels and title need room too.
+        (left, bottom), covered = freest(points, (width + 0.07, height + 0.12), corners)
+        boxes.append((covered, (left + 0.07, bottom + 0.07, width, height)))
+        if covered == 0:
+            break
+    return min(boxes, key=lambda entry: entry[0])[1]
+
+
+def _insert(
+    ax: Axes,
+    box: tuple[float, float, float, float],
+    motion: Motion,
+    near: FloatArray,
+    push: FloatArray,
+    way: Scale,
+    force: Scale,
+) -> None:
+    inset = ax.inset_axes(box)
+    room_x, room_y = 0.06 * (np.ptp(near) or 1.0), 0.08 * (np.ptp(push) or 1.0)
+    inset.set_xlim(near.min() - room_x, near.max() + room_x)
+    inset.set_ylim(push.min() - room_y, push.max() + 2.0 * room_y)
+    inset.tick_params(labelsize=TINY, length=2.5)
+    inset.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
+    place_lines(inset, motion.hammer, way, "x")
+    curve(inset, near, push, "settle-out", BLUE, lw=0.7)
+    arrows(inset, near, push, 9, BLUE, 6.0)
+    inset.set_title(f"settle-out  [{way.sign}, {force.sign}]", fontsize=TINY, color=MUTED, pad=3.0)
+
+
+@styled
+def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
+    """Draw Fig. 10: velocity against displacement after a single pulse; arrows tell the direction of time.
+
+    The motion lasts 4 ms unless another duration, s, or text with a unit, is given.
+    """
+    motion = fired(hammer, duration=duration)
+    x, v = orbit(motion, times_of(motion))
+    ends = [*places(hammer).values(), float(x.min()), float(x.max())]
+    low, high = min(ends), max(ends)
+    room = 0.06 * (high - low) or 1e-6
+    slow, fast = float(v.min()), float(v.max())
+    above = (fast - slow) or 1e-3
+    way, speed = scale("displacement", max(abs(low), abs(high))), scale("velocity")
+    figure, ax = new_panel(4.4)
+    ax.set_xlim(float(way.shown(low - room)), float(way.shown(high + room)))
+    # The names of the places are written above the orbit.
+    ax.set_ylim(float(speed.shown(slow - 0.06 * above)), float(speed.shown(fast + 0.17 * above)))
+    ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
+    place_lines(ax, hammer, way, "x")
+    curve(ax, way.shown(x), speed.shown(v), "orbit", BLUE, lw=1.1)
+    ax.plot(way.shown(x[:1]), speed.shown(v[:1]), ls="none", marker="o", ms=4.0, color=BLUE, gid="start")
+    arrows(ax, way.shown(x), speed.shown(v), 10, BLUE)
+    label(ax, "x", way)
+    label(ax, "y", speed)
+    sign(figure, hammer, motion.message)
+    return figure

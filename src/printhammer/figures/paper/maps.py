@@ -1,0 +1,339 @@
+"""Figure 9: displacement in colours, against time and firing rate, in bursts of nine pulses.
+
+Figure 8: displacement curves at gradually rising rates, laminated into a surface, hidden lines removed.
+
+A computed and a measured frequency-time map side by side, on the same scales, and how far they differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from printhammer.figures.elements import map_marks
+from printhammer.figures.elements.marks import beside, heading
+from printhammer.figures.elements.style import BLUE, HAIR, INK, MUTED, SMALL, new_figure, new_panel, styled
+from printhammer.maps.frequency import rms_difference
+from printhammer.maps.layout import places_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from printhammer.figures.elements.scales import Scale
+    from printhammer.hammer.hammer import Hammer
+    from printhammer.support.arrays import FloatArray
+
+
+@styled
+def frequency_map(
+    hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None
+) -> Figure:
+    """Draw Fig. 9: the frequency-time map in colours.
+
+    Thin lines are firings, strong ones lost dots, or marks in each row where there are fewer than 50 rates;
+    the gids are "firing 1" and so on, and "lost dots".
+
+    Parameters
+    ----------
+    hammer : Hammer
+        Any hammer with a waveform; not looked at where a map is given.
+    chart : xarray.Dataset, optional
+        A map from `printhammer.frequency_map`; by default the one of the hammer.
+    rates : array, optional
+        Rates of the map that is computed, Hz.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state, or the map fewer than two times.
+    """
+    chart = map_marks.drawable(map_marks.chart_of(hammer, rates) if chart is None else chart)
+    scales = map_marks.scales_of(chart)
+    figure = new_figure(4.6)
+    grid = figure.add_gridspec(1, 2, width_ratios=(30.0, 1.0))
+    panel, bar = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+    map_marks.picture(panel, chart, scales)
+    map_marks.key(panel, chart)
+    map_marks.colour_bar(bar, chart, scales)
+    map_marks.sign_map(figure, chart, map_marks.failures(chart))
+    return figure
+
+
+CURVES: Final = 81
+"""Number of curves."""
+
+_TIMES: Final = 1361
+_LEAN: Final = (0.19, 0.66)
+"""Way from the first curve to the last, to the right and upward, in units of the width of the picture."""
+
+_ACROSS: Final = 0.80
+"""Width of a curve."""
+
+_TALL: Final = 0.22
+"""Height of the displacements, from the lowest to the highest place."""
+
+_TICK: Final = 0.008
+
+_SHEETS: Final = 2.0
+"""One for curves and sheets alike, so that they are drawn in the order in which they are made."""
+
+_FLAT: Final = 4e-4
+"""How far a drawn curve may be from the computed one, in the units of the picture: 0.15 points."""
+
+_NAME: Final[dict[str, Any]] = {"fontsize": "medium"}
+_POST: Final = 0.13
+"""Way from the displacement axis to the curves."""
+
+
+@dataclass(frozen=True)
+class _View:
+    """Oblique projection of time, s, displacement, m, and rate, Hz, onto the picture."""
+
+    times: tuple[float, float]
+    heights: tuple[float, float]
+    rates: tuple[float, float]
+
+    def depth(self, rate: float) -> float:
+        first, last = self.rates
+        return (rate - first) / (last - first) if last > first else 0.0
+
+    def across(self, t: npt.ArrayLike, rate: float) -> FloatArray:
+        first, last = self.times
+        way = (np.asarray(t, dtype=np.float64) - first) / (last - first)
+        return np.asarray(_ACROSS * way + _LEAN[0] * self.depth(rate))
+
+    def up(self, x: npt.ArrayLike, rate: float) -> FloatArray:
+        low, high = self.heights
+        way = (np.asarray(x, dtype=np.float64) - low) / (high - low)
+        return np.asarray(_TALL * way + _LEAN[1] * self.depth(rate))
+
+
+@styled
+def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
+    """Draw Fig. 8: displacement against time, one curve for each rate, each hiding those behind it.
+
+    The parts of a curve inside the pack are blue; the gids of the curves are "rate" and their numbers.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        Any hammer with a waveform; not looked at where a map is given.
+    chart : xarray.Dataset, optional
+        A map from `printhammer.frequency_map`, of which evenly chosen rates are drawn; by default the one of
+        the hammer.
+    rates : array, optional
+        Rates of the map that is computed, Hz.
+
+    Raises
+    ------
+    InputError
+        The hammer has no waveform or no rest state, or the map fewer than two times.
+    """
+    if chart is None:
+        wanted = np.linspace(map_marks.LOWEST, map_marks.HIGHEST, CURVES) if rates is None else rates
+        chart = map_marks.chart_of(hammer, wanted, _TIMES)
+    map_marks.drawable(chart)
+    scales = map_marks.scales_of(chart)
+    places = places_of(chart)
+    low, high = map_marks.limits_of(chart)
+    every = chart["rate"].values
+    time = chart["time"].values
+    view = _View(
+        (float(time[0]), float(time[-1])),
+        (min(low, *places.values(), high), max(high, *places.values())),
+        (float(every[0]), float(every[-1])),
+    )
+    figure, ax = new_panel(4.7)
+    ax.set_axis_off()
+    rows = np.unique(np.linspace(0, len(every) - 1, min(CURVES, len(every))).round().astype(int))
+    for row in rows[::-1]:
+        _sheet(ax, view, time, chart["displacement"].values[row], float(every[row]), places.get("pack"))
+    _time_axis(ax, view, scales.time)
+    _height_axis(ax, view, scales.way, places)
+    _rate_axis(ax, view, scales.rate)
+    ax.set_xlim(-0.26, 1.10)
+    ax.set_ylim(-0.09, _LEAN[1] + _TALL)
+    map_marks.sign_map(figure, chart, map_marks.failures(chart))
+    return figure
+
+
+def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, front: float | None) -> None:
+    """Draw one curve over a white sheet that hides what is behind."""
+    known = np.isfinite(x)
+    if not known.any():
+        return
+    t, x = time[known], x[known].astype(np.float64)
+    across, up = thinned(view.across(t, rate), view.up(x, rate), _FLAT)
+    foot = float(view.up(view.heights[0], rate))
+    ax.fill([across[0], *across, across[-1]], [foot, *up, foot], color="white", lw=0.0, zorder=_SHEETS)
+    ax.plot(across, up, color=INK, lw=0.4, zorder=_SHEETS, gid=f"rate {rate:.6g}")
+    if front is not None and (x > front).any():
+        inside = _above(across, up, float(view.up(front, rate)))
+        ax.plot(*inside, color=BLUE, lw=0.6, zorder=_SHEETS, gid=f"in the pack at {rate:.6g}")
+
+
+def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, FloatArray]:
+    """Leave out the points of a curve without which it stays within `room` of itself, measured along y.
+
+    After D. Douglas and T. Peucker, Cartographica 10 (1973) 112.
+    """
+    keep = np.zeros(len(x), dtype=np.bool_)
+    keep[[0, -1]] = True
+    pieces = [(0, len(x) - 1)]
+    while pieces:
+        first, last = pieces.pop()
+        if last - first < 2:
+            continue
+        share = (x[first : last + 1] - x[first]) / (x[last] - x[first])
+        off = np.abs(y[first : last + 1] - y[first] - share * (y[last] - y[first]))
+        far = first + int(off.argmax())
+        if off[far - first] > room:
+            keep[far] = True
+            pieces += [(first, far), (far, last)]
+    return x[keep], y[keep]
+
+
+def _above(x: FloatArray, y: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
+    """Return the parts of a curve above a level, with NaN between them."""
+    crossing = np.flatnonzero((y[1:] - level) * (y[:-1] - level) < 0.0)
+    share = (level - y[crossing]) / (y[crossing + 1] - y[crossing])
+    x = np.insert(x, crossing + 1, x[crossing] + share * (x[crossing + 1] - x[crossing]))
+    y = np.insert(y, crossing + 1, level)
+    return x, np.where(y >= level, y, np.nan)
+
+
+def _time_axis(ax: Axes, view: _View, time: Scale) -> None:
+    first, last = view.times
+    nearest = view.rates[0]
+    foot = float(view.up(view.heights[0], nearest))
+    ax.plot(view.across([first, last], nearest), [foot, foot], color=INK, lw=HAIR)
+    for tick in _ticks(time, first, last, 9):
+        at = float(view.across(tick / time.factor, nearest))
+        _mark(ax, f"{tick:g}", (at, foot), (0.0, -_TICK), (0.0, -2.0), "center top")
+    middle = float(view.across(0.5 * (first + last), nearest)), foot - _TICK
+    _text(ax, f"Time from the first firing  [{time.sign}]", middle, (0.0, -14.0), "center top", **_NAME)
+
+
+def _height_axis(ax: Axes, view: _View, way: Scale, places: dict[str, float]) -> None:
+    low, high = view.heights
+    nearest = view.rates[0]
+    at = float(view.across(view.times[0], nearest)) - _POST
+    ends = [float(view.up(end, nearest)) for end in (low, high)]
+    ax.plot([at, at], ends, color=INK, lw=HAIR)
+    for tick in _ticks(way, low, high, 4):
+        up = float(view.up(tick / way.factor, nearest))
+        _mark(ax, f"{tick:g}", (at, up), (-_TICK, 0.0), (-2.0, 0.0), "right center")
+    for name, place in places.items():
+        colour = BLUE if name == "pack" else MUTED
+        here = at, float(view.up(place, nearest))
+        _mark(ax, name, here, (_TICK, 0.0), (2.0, 0.0), "left center", colour, gid=name)
+    middle = at, 0.5 * (ends[0] + ends[1])
+    _text(ax, f"Displacement  [{way.sign}]", middle, (-26.0, 0.0), "right center", rotation=90.0, **_NAME)
+
+
+def _rate_axis(ax: Axes, view: _View, shown: Scale) -> None:
+    end, floor = view.times[1], view.heights[0]
+    across = [float(view.across(end, rate)) for rate in view.rates]
+    up = [float(view.up(floor, rate)) for rate in view.rates]
+    ax.plot(across, up, color=INK, lw=HAIR)
+    for tick in _ticks(shown, *view.rates, 5):
+        rate = tick / shown.factor
+        at = float(view.across(end, rate)), float(view.up(floor, rate))
+        _mark(ax, f"{tick:g}", at, (_TICK, 0.0), (2.0, 0.0), "left center")
+    middle = 0.5 * (across[0] + across[1]), 0.5 * (up[0] + up[1])
+    lean = float(np.degrees(np.arctan2(_LEAN[1], _LEAN[0])))
+    text = f"{shown.label}  [{shown.sign}]"
+    _text(ax, text, middle, (32.0, -4.0), "center center", rotation=lean, **_NAME)
+
+
+def _ticks(shown: Scale, first: float, last: float, most: int) -> list[float]:
+    low, high = float(shown.shown(first)), float(shown.shown(last))
+    ticks = MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+    return [float(tick) for tick in ticks if low <= tick <= high * (1.0 + 1e-12)]
+
+
+def _mark(
+    ax: Axes,
+    text: str,
+    at: tuple[float, float],
+    way: tuple[float, float],
+    shift: tuple[float, float],
+    side: str,
+    color: str = INK,
+    **options: Any,
+) -> None:
+    """Draw a tick from a place on an axis some way off, and its text beside its end."""
+    end = at[0] + way[0], at[1] + way[1]
+    ax.plot([at[0], end[0]], [at[1], end[1]], color=color, lw=HAIR, **options)
+    _text(ax, text, end, shift, side, color=color)
+
+
+def _text(
+    ax: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], side: str, **options: Any
+) -> None:
+    beside(
+        ax, text, at, shift, side, **{"fontsize": SMALL, "color": INK, "annotation_clip": False, **options}
+    )
+
+
+@styled
+def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
+    """Draw a computed and a measured map side by side, with the root mean square of their difference.
+
+    Maps are those of `printhammer.frequency_map` and `printhammer.maps.measured.load_measured_map`. In the
+    third panel, "difference" is the gid of the root mean square over time, for every rate that both have; in
+    grey areas the displacement is not known.
+
+    Raises
+    ------
+    InputError
+        A map has fewer than two times.
+    """
+    for chart in (computed, measured):
+        map_marks.drawable(chart)
+    scales = map_marks.scales_of(computed, measured)
+    figure = new_figure(4.4, 8.6)
+    grid = figure.add_gridspec(1, 4, width_ratios=(10.0, 10.0, 3.4, 0.7))
+    left = figure.add_subplot(grid[0])
+    right = figure.add_subplot(grid[1], sharex=left, sharey=left)
+    beside = figure.add_subplot(grid[2], sharey=left)
+    bar = figure.add_subplot(grid[3])
+    for ax, chart, name in ((left, computed, "computed"), (right, measured, "measured")):
+        map_marks.picture(ax, chart, scales)
+        heading(ax, name)
+    for ax in (right, beside):
+        ax.set_ylabel("")
+        ax.tick_params(axis="y", labelleft=False)
+    # Both pictures, which share their axes, show all of both maps.
+    maps = (computed, measured)
+    rows = [scales.rate.shown(map_marks.edges(chart["rate"].values)) for chart in maps]
+    ends = [scales.time.shown(chart["time"].values[[0, -1]]) for chart in maps]
+    left.set_ylim(min(row[0] for row in rows), max(row[-1] for row in rows))
+    left.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
+    remark = _difference(beside, scales, computed, measured)
+    map_marks.colour_bar(bar, computed, scales)
+    map_marks.sign_map(figure, computed, map_marks.failures(computed), remark)
+    return figure
+
+
+def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measured: xr.Dataset) -> str:
+    """Draw the root mean square of the difference against rate; say so where there is none."""
+    way = scales.way
+    rates, difference = rms_difference(computed, measured)
+    heading(ax, "difference")
+    ax.set_xlabel(f"RMS  [{way.sign}]")
+    ax.tick_params(axis="x", top=True)
+    known = np.isfinite(difference)
+    if not known.any():
+        ax.set_xticks([])
+        return "No rate is in both maps; nothing is known of their difference."
+    style: dict[str, Any] = {"color": BLUE, "lw": 0.8, "marker": "o", "ms": 2.6 if known.sum() < 80 else 0.0}
+    ax.plot(way.shown(difference[known]), scales.rate.shown(rates[known]), gid="difference", **style)
+    ax.set_xlim(0.0, 1.08 * max(float(way.shown(difference[known].max())), 1e-12))
+    return ""

@@ -1,1 +1,0 @@
-"""Pictures of printed pages, quality and tolerance."""

@@ -1,1 +1,0 @@
-"""Where the energy of a run comes from and goes."""

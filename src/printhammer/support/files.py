@@ -1,0 +1,112 @@
+"""Files that the program writes: whole or not at all, and never over what it reads.
+
+Text files that the program reads.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+
+def write_file(path: str | Path, content: str | bytes) -> None:
+    """Write a file; text in UTF-8.
+
+    It is written beside its place first and then moved there, so that what was there stays if anything fails.
+
+    Raises
+    ------
+    InputError
+        The file cannot be written.
+    """
+    target = Path(path)
+    data = content.encode("utf-8") if isinstance(content, str) else content
+    draft = None
+    try:
+        handle, draft = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        # A temporary file is for its owner only.
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(draft).chmod(0o666 & ~mask)
+        Path(draft).replace(target)
+    except OSError as error:
+        if draft is not None:
+            with suppress(OSError):
+                Path(draft).unlink()
+        raise InputError(f"{target}: the file cannot be written ({error.strerror or error})") from None
+
+
+def make_folder(path: str | Path) -> Path:
+    """Make a folder, and those above it, and make sure that files can be written there.
+
+    Raises
+    ------
+    InputError
+        It cannot be made, or nothing can be written there.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{folder}: expected a folder that can be written to ({error.strerror or error})"
+        ) from None
+    return folder
+
+
+def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
+    """Make sure, before any work, that files can be written and that none of them is read, or named twice.
+
+    Raises
+    ------
+    InputError
+        A file lies in no folder that can be written to, is a folder, is read as well, or is named twice.
+    """
+    read = {path.resolve() for path in inputs}
+    named: set[Path] = set()
+    for path in outputs:
+        place = path.resolve()
+        if place in read:
+            raise InputError(f"{path}: expected another file to write, this one is read")
+        if place in named:
+            raise InputError(f"{path}: expected a file of its own, this one is written twice")
+        named.add(place)
+        store = place.suffix.lower() == ".zarr"
+        # A Zarr store is a folder, and written over as a whole.
+        if place.is_dir() and not (store and (place / "zarr.json").is_file()):
+            wanted = "a new store, this is no Zarr store" if store else "a file to write, this is a folder"
+            raise InputError(f"{path}: expected {wanted}")
+        if not place.parent.is_dir():
+            raise InputError(f"{path}: expected a file in a folder that exists")
+        if not os.access(place.parent, os.W_OK):
+            raise InputError(f"{path}: expected a file in a folder that can be written to")
+
+
+def read_text(path: Path, what: str, *, wanted: str = "", encoding: str = "utf-8") -> str:
+    """Read a text file; `what` names it in messages, such as "the drive file".
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is not UTF-8; `wanted` may say what was expected instead.
+    """
+    try:
+        return path.read_text(encoding)
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: {wanted or f'{what} is expected to be UTF-8 text'}") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: {what} cannot be read ({reason})") from None
