@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
@@ -22,8 +23,6 @@ from typing import TYPE_CHECKING
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from pint import UnitRegistry
     from pint.util import UnitsContainer
 

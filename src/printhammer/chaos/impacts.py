@@ -15,12 +15,17 @@ Analysis of Series of Events, 1966, chapters 4 and 5).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, Unpack, get_args
+from collections.abc import Sequence
+from typing import Any, Final, Literal, SupportsIndex, Unpack, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.strobe.train import Train
+from printhammer.drive.base import Overlap
 from printhammer.drive.input import MOST_PULSES, read_array, read_count, read_positive
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
@@ -28,18 +33,8 @@ from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.regime import Firing, Regime, regimes_of
 from printhammer.run.simulate import touches_of
 from printhammer.run.start import initial_state
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress, mapped
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
 
 Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
@@ -147,12 +142,6 @@ def section(
     -------
     Section
         With a status; a run that could not go on, or has too few touches, is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; the hammer has no such surface, no waveform or no rest
-        state.
     """
     counts = _counts(touches, transient, firings)
     check_tolerance(tolerance)
@@ -189,11 +178,6 @@ def sections(
     -------
     list of Section
         One for each train.
-
-    Raises
-    ------
-    InputError
-        As for `section`, or numbers of hammers and periods that do not fit together.
     """
     counts = _counts(touches, transient, firings)
     check_tolerance(tolerance)

@@ -16,10 +16,10 @@ from printhammer.claims.judging import WHOLE, Measured, measures, spread
 from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.maps.frequency import TAIL
+from printhammer.run.motion import Motion
 
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
-    from printhammer.run.motion import Motion
 
 _CLOSER: Final = 8
 _TOGETHER: Final = 64

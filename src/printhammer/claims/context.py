@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from printhammer.drive.trains import Drive, PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import PrinthammerError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.settling import touches
+from printhammer.run.contacts import Contact, Dot
+from printhammer.run.ensemble import DotTable, EnsembleResult
+from printhammer.run.motion import Motion
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import Scheme, simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.contacts import Contact, Dot
-    from printhammer.run.ensemble import DotTable, EnsembleResult
-    from printhammer.run.motion import Motion
 
 CYCLE: Final = 20e-3
 """Duration of the single-pulse cycle, s: from rest to rest, with ample time to settle."""

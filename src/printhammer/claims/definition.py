@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 import operator
 import tomllib
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 Kind = Literal["stated", "typical", "shape"]
 KINDS: Final = get_args(Kind)

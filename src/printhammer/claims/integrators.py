@@ -10,11 +10,11 @@ import numpy as np
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria
+from printhammer.run.motion import Motion
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
-    from printhammer.run.motion import Motion
 
 REFERENCE_TOLERANCE: Final = 1e-13
 _CYCLE: Final = 10e-3

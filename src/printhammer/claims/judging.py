@@ -6,23 +6,19 @@ Numbers read off a motion or a set of points: largest values, rank correlation.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from printhammer.claims.context import Context, NotMeasurableError
 from printhammer.claims.definition import Claim, claims
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 WHOLE: Final = ("backstop", "pack", "waveform")
 """What most claims are about."""

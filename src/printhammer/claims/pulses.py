@@ -15,6 +15,8 @@ from printhammer.claims.context import TAIL, Context, NotMeasurableError
 from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, falling, largest, measures, rank_correlation
 from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.buzz import (
     BuzzSearch,
     BuzzTrain,
@@ -23,12 +25,10 @@ from printhammer.printing.dots.buzz import (
     longest_run,
 )
 from printhammer.printing.dots.settling import rebounds, touches
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 
 @measures("single_pulse_stroke", "pack", "waveform")

@@ -14,12 +14,12 @@ from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import equilibria, holding_margin, positive_intervals
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
+from printhammer.run.motion import Motion
 
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.motion import Motion
 
 
 @measures("geometry", "backstop", "pack", "platen")

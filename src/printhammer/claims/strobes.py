@@ -9,10 +9,10 @@ import numpy as np
 from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures, rank_correlation
 from printhammer.claims.verdicts import panel_name, printed_verdicts
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
-    from printhammer.support.arrays import FloatArray
 
 _ORBIT_TIME: Final = 4e-3
 _ORBIT_POINTS: Final = 200_001

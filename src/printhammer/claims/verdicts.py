@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -11,12 +12,10 @@ from printhammer.chaos.strobe.scan import scan
 from printhammer.chaos.strobe.verdict import LAST
 from printhammer.claims.definition import Claim, claims
 from printhammer.claims.judging import WHOLE, Measured, measures
+from printhammer.hammer.hammer import Hammer
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from printhammer.claims.context import Context
-    from printhammer.hammer.hammer import Hammer
 
 _CHANGE: Final = 1e-5
 _TIGHTER: Final = 0.1

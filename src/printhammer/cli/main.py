@@ -8,20 +8,16 @@ from __future__ import annotations
 
 import re
 import sys
-from typing import TYPE_CHECKING, Annotated, Final, NoReturn
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Final, NoReturn
 
 import typer
 
 from printhammer import __version__
 from printhammer.cli.registry import GROUPS, VERBS
-from printhammer.cli.runner import INTERRUPTED
+from printhammer.cli.runner import INTERRUPTED, Verb
 from printhammer.cli.terminal import allow_any_text, complain
 from printhammer.errors import PrinthammerError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from printhammer.cli.runner import Verb
 
 BAD_INPUT: Final = 2
 _COLUMNS: Final = 76

@@ -9,6 +9,7 @@ The two unit systems in which the command line shows quantities.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -19,8 +20,6 @@ import typer
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from printhammer.support.arrays import FloatArray
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from printhammer.cli.runner import Verb
 from printhammer.cli.verbs.chaos.basins import basins
 from printhammer.cli.verbs.chaos.bifurcation import bifurcation
 from printhammer.cli.verbs.chaos.continuation import continue_
@@ -30,9 +31,6 @@ from printhammer.cli.verbs.runs.run import run
 from printhammer.cli.verbs.runs.studio import studio
 from printhammer.cli.verbs.runs.sweep import sweep
 from printhammer.cli.verbs.runs.warm import warm
-
-if TYPE_CHECKING:
-    from printhammer.cli.runner import Verb
 
 VERBS: Final[tuple[Verb, ...]] = (
     *(run, figure, paper, map_, strobe, orbits, bifurcation, basins, continue_, curve, lyapunov),

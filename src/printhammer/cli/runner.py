@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import inspect
 import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from rich.console import RenderableType
 from rich.markup import escape
 
 from printhammer.cli import options as opt
@@ -28,11 +30,6 @@ from printhammer.cli.terminal import complain, console, say, warn
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-    from pathlib import Path
-
-    from rich.console import RenderableType
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
 

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions, RenderResult
 from rich.markup import escape
+from rich.table import Column as TableColumn
 from rich.table import Table
 
 from printhammer.cli.options import Units, shown, unit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from rich.console import Console, ConsoleOptions, RenderResult
-    from rich.table import Column as TableColumn
-
     from printhammer.hammer.hammer import Hammer
 
 Row = TypeVar("Row")

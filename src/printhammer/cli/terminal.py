@@ -9,16 +9,13 @@ import codecs
 import io
 import sys
 import unicodedata
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
 from rich.console import Console
 from rich.markup import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from rich.progress import Progress, ProgressColumn, Task
+from rich.progress import Progress, ProgressColumn, Task
 
 _WIDTH: Final = 120
 _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°": "deg", "→": "->"}

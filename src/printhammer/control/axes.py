@@ -5,6 +5,7 @@ Interpolation along an axis of tables as firmware does it: C99 in whole numbers,
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +28,7 @@ from printhammer.control.table.formats import HEAD, NANOSECOND, bits_of, header_
 from printhammer.control.table.tuning import tune
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError, located
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import save_dataset
@@ -35,12 +37,8 @@ from printhammer.support.c_code import identifier
 from printhammer.support.files import write_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     import pandas as pd
     import xarray as xr
-
-    from printhammer.hammer.hammer import Hammer
 
 _ADVANCE, _, _DELAY, _BRAKE = COLUMNS
 _END: Final = "\n#endif\n"
@@ -142,13 +140,7 @@ class AxisTables:
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Return the table for a value; where two ways do not belong together, that of the nearer value.
-
-        Raises
-        ------
-        InputError
-            The value is not between the first and the last.
-        """
+        """Return the table for a value; where two ways do not belong together, that of the nearer value."""
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -161,13 +153,7 @@ class AxisTables:
         return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return the table for a value as a way to drive a hammer, with the pulses of that value.
-
-        Raises
-        ------
-        InputError
-            As for `at`, or the tables are made for another hammer.
-        """
+        """Return the table for a value as a way to drive a hammer, with the pulses of that value."""
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)
@@ -229,11 +215,6 @@ class AxisTables:
         """Write the tables as a C header (.h), or as .csv, .json, .nc, .zarr or .parquet, by the ending.
 
         A header has times in ticks, s, and no more bytes than a budget.
-
-        Raises
-        ------
-        InputError
-            The name ends in none of these, or the file cannot be written.
         """
         suffix = Path(path).suffix.lower()
         if suffix == ".h":

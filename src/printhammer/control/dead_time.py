@@ -10,29 +10,26 @@ The C header of a dead time: rails, temperatures, tables of times, and a functio
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.control.duty import read_temperature
 from printhammer.control.pulses import of_width
 from printhammer.drive.input import read_positive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.files import ENDINGS
 from printhammer.run.problem import TOLERANCE
 from printhammer.support import c_code
+from printhammer.support.arrays import FloatArray, TextArray
 from printhammer.support.files import write_file
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, TextArray
 
 _NANOSECOND: Final = 1e-9
 

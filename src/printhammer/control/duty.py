@@ -26,23 +26,20 @@ Heat of one dot of a hammer: what its standard waveform leaves in the coil.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.drive.input import read_number, read_positive
+from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.parts.coil.winding import COPPER, REFERENCE
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.trains import PulseTrain
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 COLDEST: Final = REFERENCE - 1.0 / COPPER
 """Temperature at which the straight line of the resistance would reach zero, degC."""
@@ -71,13 +68,7 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Return the heat of one dot from that at 20 degC of the winding, J, and what its driver keeps the same.
-
-    Raises
-    ------
-    InputError
-        The heat is not positive, or the feed none of `FEEDS`.
-    """
+    """Return the heat of one dot from that at 20 degC, J, and the quantity that its driver keeps constant."""
     if feed not in FEEDS:
         raise InputError(f"feed = {feed!r}, expected one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
@@ -199,12 +190,6 @@ def thermal_duty(
     body_resistance, body_capacity : float or str, optional
         Thermal resistance from the body around the winding to the ambient temperature, K/W, and its heat
         capacity, J/K; both or none.
-
-    Raises
-    ------
-    InputError
-        A number is out of its bounds, only one is given of two that belong together, or there is no ambient
-        temperature.
     """
     one_dot = heat if isinstance(heat, DotHeat) else dot_heat(heat, feed)
     if (body_resistance is None) != (body_capacity is None):

@@ -23,22 +23,20 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import WAIT, pulse_of
 from printhammer.results import Declared, part, scalar
+from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from printhammer.drive.waveforms.base import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 PHASES: Final = 8  # Shifts within the time from sample to sample that are tried
 BEFORE: Final = 1.0  # What is looked at before the touch, in parts of the contact
@@ -234,13 +232,7 @@ _MOST_BITS: Final = 24
 
 
 class Sampling(Declared):
-    """A converter that samples the current in a coil, or the voltage across it, from the firing on.
-
-    Raises
-    ------
-    InputError
-        A number is not within its bounds, or the signal is not known.
-    """
+    """A converter that samples the current in a coil, or the voltage across it, from the firing on."""
 
     signal: Signal = part("what is sampled, current or voltage", default="current")
     noise: float = part("standard deviation of a sample, A or V", default=0.0)

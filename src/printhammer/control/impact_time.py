@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.impact_estimator import UNITS, ImpactEstimator, Sampling
+from printhammer.control.impact_estimator import UNITS, ImpactEstimator, Sampling, Signal
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.simulate import simulate
+from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.control.impact_estimator import Signal
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray, IntArray
 
 MOST: Final = 2000
 """Number of ways to sample above which a study is refused."""
@@ -71,11 +69,6 @@ class ImpactTime(Result, rows=_CELLS):
 
         Its noise is the standard deviation on the nominal hammer. What units differ by beside, which is the
         same for every dot of a unit, is its offset.
-
-        Raises
-        ------
-        InputError
-            There is more than one way to sample, or no impact was seen.
         """
         if self.bias.size != 1:
             raise InputError(f"{self.bias.size} ways to sample were studied, expected one for a sensor")
@@ -139,11 +132,6 @@ def impact_time(
         Of the units and of the noise.
     progress : callable, optional
         Called with ways to sample done and of all.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above, or the samples show no impact.
     """
     volts = signal == "voltage"
     levels = np.unique([read_number(each, UNITS.get(signal, "A"), "noise") for each in noise])

@@ -5,21 +5,18 @@ Pulses of a hammer with other widths.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from printhammer.drive.waveforms.base import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _SAMPLES: Final = 4001
 _SPAN: Final = 2.0  # Length of a run at first, in parts of the width
@@ -34,13 +31,7 @@ def peak_current(hammer: Hammer, pulse: Waveform) -> float:
 
 
 def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time, s, after the width of a driver's pulse when its current is first a share of its peak.
-
-    Raises
-    ------
-    InputError
-        It does not become as small.
-    """
+    """Return the time, s, from the width of a driver's pulse to a given fraction of its peak current."""
     own: Any = pulse
     for doubling in range(_DOUBLINGS):
         times, current = _course(hammer, pulse, _SPAN * 2.0**doubling)

@@ -8,7 +8,9 @@ each; both are found by least squares of the logarithms of the rates.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -16,13 +18,8 @@ from printhammer.control.duty import COLDEST, read_temperature
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.results import Result, column, scalar
+from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from printhammer.support.arrays import FloatArray
 
 COLUMNS: Final = {"voltage": "V", "ambient": "degC", "rate": "Hz"}
 """Columns of a file of rates, and their SI units."""
@@ -114,13 +111,7 @@ def thermal_limit(
 
 
 def read_rates(path: Path) -> dict[str, list[float]]:
-    """Read a file of rates, with `COLUMNS`, the rail optional, as arguments of `thermal_limit`.
-
-    Raises
-    ------
-    InputError
-        It is no such table; the sentence names the file.
-    """
+    """Read a file of rates, with `COLUMNS`, the rail optional, as arguments of `thermal_limit`."""
     from printhammer.identify.tables import read_table
 
     wanted = {name: COLUMNS[name] for name in ("ambient", "rate")}

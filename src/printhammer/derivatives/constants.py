@@ -7,8 +7,9 @@ tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md ha
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,12 +29,8 @@ from printhammer.kernel.model.layout import (
     TURN_RESISTANCE,
 )
 from printhammer.kernel.variational.layout import SPACING
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.run.problem import Problem, Record
-    from printhammer.support.arrays import FloatArray
+from printhammer.run.problem import Problem, Record
+from printhammer.support.arrays import FloatArray
 
 
 def flow(

@@ -8,23 +8,20 @@ hold.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.derivatives.constants import flow, pack_push_changes, pack_push_rate, surface_moves
+from printhammer.derivatives.flow import Flow
+from printhammer.derivatives.parameters import Parameter
 from printhammer.results import Declared, part, scalar
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.derivatives.flow import Flow
-    from printhammer.derivatives.parameters import Parameter
-    from printhammer.run.contacts import Contact
-    from printhammer.run.motion import Motion
-    from printhammer.run.problem import Problem, Record
-    from printhammer.support.arrays import FloatArray
+from printhammer.run.contacts import Contact
+from printhammer.run.motion import Motion
+from printhammer.run.problem import Problem, Record
+from printhammer.support.arrays import FloatArray
 
 DOT_QUANTITIES: Final = {
     "flight_time": ("s", "from firing to touch"),

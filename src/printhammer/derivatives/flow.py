@@ -5,7 +5,8 @@ In a second pass over the record of a run, so that runs which do not ask for der
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,12 +15,8 @@ from printhammer.kernel.model.layout import BACKSTOP_PART, COIL, DAMPING, FRONT,
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
 from printhammer.kernel.variational import layout as V
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from printhammer.run.problem import Problem, Record, Stretch
-    from printhammer.support.arrays import FloatArray
+from printhammer.run.problem import Problem, Record, Stretch
+from printhammer.support.arrays import FloatArray
 
 _VALUE_SPACING: Final = 1e-3
 """Share of the largest pulse by which a drive is moved to see what it does to the force."""

@@ -12,26 +12,23 @@ of its range. A part need not know of them.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Sequence
+from typing import Any, Final
 
 import numpy as np
 
+from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Sine, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import PERIOD, TIMING, quantities_of, unknown
 from printhammer.kernel.model.layout import SUPPLY
 from printhammer.results import Declared, part
 from printhammer.run.problem import constants_of, scales_of
 from printhammer.run.supply import inductance, typical_current
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantities
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 2e-4
 """Share of a constant, or of its scale, by which it is moved in what is packed."""
@@ -95,13 +92,7 @@ def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Param
 
 
 def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the changes [m] of the rest state with ``value / scale`` of constants, shape (n,).
-
-    Raises
-    ------
-    InputError
-        The hammer has no rest state.
-    """
+    """Return the changes [m] of the rest state with ``value / scale`` of constants, shape (n,)."""
     changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
         # A supply does not move what is at rest.

@@ -7,7 +7,8 @@ tolerances of the constants show in what is printed.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,20 +16,16 @@ from printhammer.derivatives.constants import rest_columns, without_current
 from printhammer.derivatives.dots import DOT_QUANTITIES, RUN_QUANTITIES, changes_of, dot_values
 from printhammer.derivatives.parameters import Parameter, parameter_names, parameters
 from printhammer.drive.input import read_number
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import unknown
 from printhammer.results import Column, Result, column, coordinate, derived, part, scalar
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem, check_tolerance
 from printhammer.run.simulate import end_of_run
 from printhammer.run.start import initial_state
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _IN_PARTS: Final = "change of a quantity in parts of it for a change of a constant in parts of it"
 _INDEPENDENT: Final = "standard deviation for independent constants"
@@ -287,12 +284,6 @@ def sensitivities(
     -------
     Sensitivities
         With a status; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a constant that was asked for by name is not known, or
-        nothing is differentiable with it at its value, such as a rise time of zero.
     """
     check_tolerance(tolerance)
     wanted, left_out = _constants(hammer, drive, constants)

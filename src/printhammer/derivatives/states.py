@@ -8,27 +8,23 @@ for it pay nothing.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.derivatives.flow import Flow, carry_columns
 from printhammer.drive.trains import Drive, PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.layout import CAPACITANCE, TURN_RESISTANCE
 from printhammer.kernel.model.modes import HELD_UNLOADING, OK, RELOADING, STATUS_NAMES, UNLOADING
 from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state, state_beyond
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _NODES: Final = 4096
 _WARM_UP: Final = 100
@@ -256,11 +252,6 @@ def strobe_exponent(
     -------
     Exponent
         With a status; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above.
     """
     drive, times, spacing = _strobes(waveform_or_drive, period, first, last)
     problem = _problem(hammer, drive, state, tolerance)

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import hashlib
 from copy import copy
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self, get_args
+from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.input import checked_times, read_number
 from printhammer.drive.segments import evaluate, largest, largest_sum, stacked
 from printhammer.drive.text import FORMAT, column_text, document, waveform_text
+from printhammer.drive.waveforms.base import QuantityName
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.drive.waveforms.base import QuantityName
-    from printhammer.support.arrays import FloatArray, IntArray
-
+from printhammer.support.arrays import FloatArray, IntArray
 
 Overlap = Literal["add", "replace"]
 OVERLAPS: Final = get_args(Overlap)
@@ -141,13 +137,7 @@ class Drive:
         return largest_sum(np.unique(np.add.outer(shortest.times, self._segments[:, 0])), shortest.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return the same drive with every value multiplied by a factor.
-
-        Raises
-        ------
-        InputError
-            The factor is not a finite number.
-        """
+        """Return the same drive with every value multiplied by a factor."""
         return self._with_waveform(self._waveform.scaled(read_number(factor, "1", "factor")))
 
     def to_toml(self) -> str:

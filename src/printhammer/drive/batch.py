@@ -5,11 +5,12 @@ Rows of unequal length, one after the other in one array: firing times, strobe t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self, SupportsIndex, overload
+from typing import Any, Self, SupportsIndex, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.input import (
     MOST_PULSES,
@@ -21,15 +22,9 @@ from printhammer.drive.input import (
     read_start,
 )
 from printhammer.drive.trains import Drive, Overlap, PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,11 +132,6 @@ class PulseTrains(Sequence[PulseTrain]):
         Firing times of each train, s, ascending.
     overlap
         As for `PulseTrain`.
-
-    Raises
-    ------
-    InputError
-        As for `PulseTrain`; or there is no train.
     """
 
     def __init__(self, waveform: Waveform, at: Iterable[npt.ArrayLike], overlap: Overlap = "add") -> None:
@@ -159,13 +149,7 @@ class PulseTrains(Sequence[PulseTrain]):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> Self:
-        """Make trains of so many pulses at constant rates, Hz, all of them fired first at `start`, s.
-
-        Raises
-        ------
-        InputError
-            As for `PulseTrain`; or there is no rate.
-        """
+        """Make trains of so many pulses at constant rates, Hz, all of them fired first at `start`, s."""
         grid = read_array(rates, "rates", "numbers, Hz").reshape(-1)
         steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
         with np.errstate(all="ignore"):

@@ -36,9 +36,10 @@ Every quantity is written with its unit, as a string or as ``{ value = 1.2, unit
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -50,9 +51,6 @@ from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
 from printhammer.errors import InputError, located
 from printhammer.support.constants import options, quantities, sentence, shown
 from printhammer.support.files import read_text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 _PLAIN: Final = {"pulses", "bursts", "waveforms"}
 _KEYS: Final[dict[str, dict[str, str]]] = {
@@ -88,13 +86,7 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
 def read_drive(
     text: str, waveform: Waveform | None = None, *, name: str = "drive", folder: Path | None = None
 ) -> Drive:
-    """Read the text of a drive file; `name` stands in messages, `folder` is where sampled waveforms lie.
-
-    Raises
-    ------
-    InputError
-        As for `load_drive`.
-    """
+    """Read the text of a drive file; `name` stands in messages, `folder` is where sampled waveforms lie."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -116,13 +108,7 @@ def drive_of(
 
 
 def save_drive(drive: Drive, path: str | Path) -> None:
-    """Write a drive file; reading it back gives an equal drive.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
-    """
+    """Write a drive file; reading it back gives an equal drive."""
     try:
         Path(path).write_text(drive.to_toml(), encoding="utf-8")
     except OSError as error:

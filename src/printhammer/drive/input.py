@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import TYPE_CHECKING, Final, SupportsIndex
+from collections.abc import Iterable
+from typing import Final, SupportsIndex
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.errors import InputError, located
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 PULSES: Final = 9
 """Number of firings of a train that is known by its rate or period alone, as in the bursts of the paper."""
@@ -28,13 +24,7 @@ SPACING_UNITS: Final = {"rate": "Hz", "period": "s"}
 
 
 def read_number(value: float | str, si: str, name: str) -> float:
-    """Read a number in SI or a string with a unit.
-
-    Raises
-    ------
-    InputError
-        It is not finite, or of another dimension than the unit `si`.
-    """
+    """Read a number in SI or a string with a unit."""
     if isinstance(value, str):
         from printhammer.units import parse
 
@@ -103,11 +93,6 @@ def even_times(
     Returns
     -------
     Firing times, s; "rate" or "period" with its value, as given; time between firings, s.
-
-    Raises
-    ------
-    InputError
-        Neither rate nor period is given, or it is not above 0.
     """
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:
@@ -134,13 +119,7 @@ def read_times(at: Iterable[float | str]) -> FloatArray:
 
 
 def checked_times(times: npt.ArrayLike) -> FloatArray:
-    """Check firing times, s, and return them read-only.
-
-    Raises
-    ------
-    InputError
-        There is none or more than `MOST_PULSES`, one is negative or not finite, or not above the one before.
-    """
+    """Check firing times, s, and return them read-only."""
     result = np.array(times, dtype=np.float64)
     if result.ndim != 1 or not 1 <= result.size <= MOST_PULSES:
         raise InputError(f"{result.size} firing times are expected to be a list of 1 to {MOST_PULSES}")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Iterable, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,11 +16,7 @@ from printhammer.drive.segments import evaluate, largest, largest_sum, stacked
 from printhammer.drive.text import FORMAT, column_text, document, waveform_text
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 __all__ = ["PulseSequence"]
 

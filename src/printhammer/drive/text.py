@@ -7,15 +7,12 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
+from printhammer.drive.waveforms.base import Waveform
 from printhammer.drive.waveforms.shapes import Chain, Sampled, Switched
 from printhammer.support.constants import quantities
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from printhammer.drive.waveforms.base import Waveform
 
 _BARE = re.compile("[A-Za-z0-9_-]+")
 

@@ -8,10 +8,12 @@ counts from its firing on. Every number is SI; a string with a unit ("1.2 kHz") 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from copy import copy
-from typing import TYPE_CHECKING, Any, Self, SupportsIndex
+from typing import Any, Self, SupportsIndex
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.base import Drive, Overlap
 from printhammer.drive.input import (
@@ -28,13 +30,7 @@ from printhammer.drive.input import (
 from printhammer.drive.text import quantity_text, waveform_text
 from printhammer.drive.waveforms.shapes import Sine, Waveform
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 __all__ = ["Burst", "Drive", "Overlap", "PulseTrain", "SineForce"]
 
@@ -54,26 +50,14 @@ class _Pulsed(Drive):
             raise InputError(f"a {waveform.shape} waveform is expected to end in a train of pulses")
 
     def with_waveform(self, waveform: Waveform) -> Self:
-        """Return a drive that fires another waveform at the same times.
-
-        Raises
-        ------
-        InputError
-            It is not a waveform, or never ends.
-        """
+        """Return a drive that fires another waveform at the same times."""
         if not isinstance(waveform, Waveform):
             raise InputError(f"waveform = {waveform!r} is expected to be a waveform")
         self._refuse_endless(waveform)
         return self._with_waveform(waveform)
 
     def with_times(self, times: Iterable[float | str]) -> PulseTrain:
-        """Return a drive that fires the same waveform, under the same overlap rule, at the given times, s.
-
-        Raises
-        ------
-        InputError
-            Times negative, not finite, duplicate or descending.
-        """
+        """Return a drive that fires the same waveform, under the same overlap rule, at the given times, s."""
         return PulseTrain(self._waveform, at=times, overlap=self._overlap)
 
 
@@ -167,11 +151,6 @@ class Burst(_Pulsed):
         Time from the last firing of a burst to the first of the next, s.
     overlap, start
         As for `PulseTrain`.
-
-    Raises
-    ------
-    InputError
-        As for `PulseTrain`; or the gap is not positive.
     """
 
     def __init__(

@@ -9,17 +9,16 @@ matplotlib is imported when a figure is drawn, not here.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
+from matplotlib.figure import Figure
+
 from printhammer.figures.elements.save import FORMATS, save
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.figure import Figure
-
     from printhammer.hammer.hammer import Hammer
 
 __all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]

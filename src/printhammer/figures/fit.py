@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from itertools import cycle
 from textwrap import fill
-from typing import TYPE_CHECKING, Final, cast
+from typing import Final, cast
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import beside, dots, heading, inside, note
 from printhammer.figures.elements.scales import Name, Scale, label, scale
 from printhammer.figures.elements.style import foot, new_figure, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.identify.result import Fit
-    from printhammer.support.arrays import FloatArray
+from printhammer.identify.result import Fit
+from printhammer.support.arrays import FloatArray
 
 _COLOURS: Final = (style.BLUE, style.GREEN, style.YELLOW, style.INK, "#56b4e9", "#cc79a7", style.MUTED)
 _KINDS: Final = {
@@ -48,11 +45,6 @@ def plot(fit: Fit) -> Figure:
 
     Data with the law, residuals below; on the right the correlation of the constants and the residuals
     against those of a normal distribution. Outliers that were left out are ringed.
-
-    Raises
-    ------
-    InputError
-        The fit has no data, as a stiffness computed from bodies.
     """
     if not len(fit.data):
         raise InputError("the constants were computed without a table, expected a fit to data to draw")

@@ -10,24 +10,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import dots, heading, note
 from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import sign, styled
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-    from matplotlib.axes import Axes
-    from matplotlib.collections import EllipseCollection
-    from matplotlib.figure import Figure
-
-    from printhammer.printing.page.page import Page
-    from printhammer.support.arrays import FloatArray
+from printhammer.printing.page.page import Page
+from printhammer.support.arrays import FloatArray
 
 PAPER: Final = (252, 250, 243)
 INK: Final = (24, 24, 38)
@@ -146,11 +143,6 @@ def plot(page: Page, view: View = "page") -> Figure:
     view : str, optional
         "page": from the top, what was printed, what was wanted, the difference, and the worst place; "zoom":
         the worst place alone; "sheet": the paper alone, at its true size.
-
-    Raises
-    ------
-    InputError
-        There is no such view.
     """
     if view == "sheet":
         return _sheet_alone(page)

@@ -6,8 +6,11 @@ In the text everything else stays as it is, comments and layout too.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, MutableMapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pydantic import BaseModel
+
+from printhammer.drive.waveforms.base import QuantityName
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.file import (
     SELECTORS,
@@ -22,11 +25,6 @@ from printhammer.hammer.file import (
 from printhammer.hammer.uncertainty import UNCERTAINTY
 from printhammer.support.constants import Constant, quantities, shown
 
-if TYPE_CHECKING:
-    from pydantic import BaseModel
-
-    from printhammer.drive.waveforms.base import QuantityName
-
 Edit = tuple[str, Any]
 """A dotted key and the TOML value to put there; None takes the key away."""
 
@@ -37,11 +35,6 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
     A key is such as "mass", "pack.stiffness", "pack.reloading", or a table such as "backstop". Its value is
     text with a unit, a number in SI or a `Constant`; the value of an option; a part, a waveform or a mapping
     for a whole table; None to take something away. Status and source are those of the constants.
-
-    Raises
-    ------
-    InputError
-        The key is not known, or the value is not a quantity.
     """
     section, _, name = key.rpartition(".")
     if key in SELECTORS:

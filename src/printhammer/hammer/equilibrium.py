@@ -11,18 +11,15 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.errors import InputError
 from printhammer.hammer.static_force import HammerLike, StaticForce
+from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import Root, bisect, roots
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
 
 _NEAREST: Final = 1e-18
 _LARGEST_CURRENT: Final = 1e6
@@ -72,11 +69,6 @@ def rest_state(hammer: HammerLike) -> float:
     With a backstop against which the net force presses: the equilibrium there, compressing it (on a rigid
     one, and where there is no force at all, its position). Without a magnet, and without a backstop: the
     nearest stable equilibrium otherwise.
-
-    Raises
-    ------
-    InputError
-        There is none, or a hammer with a magnet does not rest at its backstop.
     """
     force = StaticForce(hammer)
     if hammer.backstop is not None:

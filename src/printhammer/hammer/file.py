@@ -16,10 +16,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from pathlib import Path
+from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
 from printhammer.parts import PARTS, ROLES, BackstopPart, MagnetPart, PackPart, Part, laws
@@ -35,11 +37,6 @@ from printhammer.support.constants import (
     sentence,
     shown,
 )
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.drive.waveforms.shapes import Waveform
 
 FORMAT: Final = 1
 """Version of the hammer file format."""
@@ -85,13 +82,7 @@ class Contents:
 
 
 def read_document(text: str, where: str) -> dict[str, Any]:
-    """Read TOML text into plain dictionaries.
-
-    Raises
-    ------
-    InputError
-        It is not TOML.
-    """
+    """Read TOML text into plain dictionaries."""
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:

@@ -8,27 +8,24 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from pydantic import BaseModel
+
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.edit import Edit, changed, changed_text, edit_of
 from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_document
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.parts import BackstopPart, CoilPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
 from printhammer.support.constants import Constant, quantities
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pydantic import BaseModel
-
-    from printhammer.drive.waveforms.shapes import Waveform
 
 _CHANGED: Final = ", changed"
 
@@ -100,11 +97,6 @@ class Hammer:
             What to name in a message, usually the file.
         folder : path, optional
             Where a force table or a sampled waveform lies; the working directory by default.
-
-        Raises
-        ------
-        InputError
-            As for `load`.
         """
         place = Path(folder) if folder is not None else Path()
         document = read_document(text, name)
@@ -133,11 +125,6 @@ class Hammer:
         **parts
             `magnet`, `spring`, `pack`, `backstop`, `damping`, `waveform`, `platen`, `coil`, each as `replace`
             takes it.
-
-        Raises
-        ------
-        InputError
-            As for `replace`.
         """
         constant = 'mass = { value = 1.0, unit = "kg", status = "assumed", source = "to be replaced" }'
         bare = cls.from_toml(f'format = {FORMAT}\nname = "hammer"\n\n{constant}\n')
@@ -293,11 +280,6 @@ class Hammer:
             The standard errors of constants that are set go, unless "uncertainty" is set too.
         status, source : str, optional
             Of the constants set.
-
-        Raises
-        ------
-        InputError
-            The key is not known, or the hammer would not be one.
         """
         wanted = {key: value} if isinstance(key, str) else dict(key)
         return self._with(wanted, status, source, f"{self._where.removesuffix(_CHANGED)}{_CHANGED}")
@@ -362,13 +344,7 @@ class Hammer:
 
     @cached_property
     def rest(self) -> float:
-        """Displacement at which the armature rests at zero current, m.
-
-        Raises
-        ------
-        InputError
-            There is none.
-        """
+        """Displacement at which the armature rests at zero current, m."""
         from printhammer.hammer.equilibrium import rest_state
 
         return rest_state(self)
@@ -391,11 +367,6 @@ class Hammer:
 
         A sentence for each interval between backstop and platen in which the net force of magnet and spring
         at zero current is positive.
-
-        Raises
-        ------
-        InputError
-            As `check`.
         """
         from printhammer.hammer.equilibrium import positive_intervals
         from printhammer.units import from_si

@@ -17,18 +17,15 @@ whether evenly or by factors, is that of `range_of`.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError, nearest
 from printhammer.hammer.file import SELECTORS, UNSAID, Body, model_of
+from printhammer.hammer.hammer import Hammer
 from printhammer.support.constants import Quantity, quantities, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
 
 PERIOD: Final = "period"
 RATE: Final = "rate"

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart, absent
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 
 FAR: Final = 1.0
 """Distance from the origin up to which equilibria are sought where the hammer sets no limit, m."""

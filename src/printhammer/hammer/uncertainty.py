@@ -7,19 +7,15 @@ file they are a table ``[uncertainty]``: ``constants``, their ``standard_errors`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError, located
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import Constant, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Container
-
-    from printhammer.support.arrays import FloatArray
 
 UNCERTAINTY: Final = "uncertainty"
 """Name of the table in a hammer file."""

@@ -14,29 +14,25 @@ The probe is a first-order low-pass. Between moments at most 0.5 us apart the cu
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from printhammer.drive.input import read_number
 from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError, located
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import quantity_of, unknown
 from printhammer.identify.lowpass import bandwidth_of, lowpass_lines, time_constant
+from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
-from printhammer.identify.tables import read_table
+from printhammer.identify.tables import Readings, read_table
 from printhammer.results import Declared, part
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
-    from printhammer.drive.waveforms.base import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Readings
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _FINEST: Final = 0.5e-6
 """Largest step of the current that goes through the probe, s."""
@@ -49,13 +45,7 @@ _LOCKED: Final = 1e9
 
 
 def check_driver(hammer: Hammer) -> None:
-    """Refuse a hammer whose waveform is no voltage.
-
-    Raises
-    ------
-    InputError
-        As said.
-    """
+    """Refuse a hammer whose waveform is no voltage."""
     if hammer.waveform is None or hammer.waveform.unit != "V":
         raise InputError(
             f"{hammer.path}: the hammer has no [waveform] that is a voltage, expected the driver of its coil"
@@ -194,13 +184,7 @@ class CurrentLaw:
         self._slopes: dict[bytes, FloatArray] = {}
 
     def simulated(self, p: FloatArray) -> FloatArray:
-        """Return the currents.
-
-        Raises
-        ------
-        InputError
-            The constants make no circuit.
-        """
+        """Return the currents."""
         values = np.clip(p, *self.limits).tolist()
         hammer = self.hammer.replace(dict(zip(self.names, values, strict=True)))
         return np.concatenate(

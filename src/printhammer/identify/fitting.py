@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
 
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
-from printhammer.identify.result import with_error
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.result import Fit
+from printhammer.hammer.hammer import Hammer
+from printhammer.identify.result import Fit, with_error
 
 KINDS: Final = ("magnet", "solenoid", "spring", "pack", "backstop", "motion", "coil")
 

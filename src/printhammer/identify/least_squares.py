@@ -17,14 +17,12 @@ What residuals and records say of their noise: its size, its outliers, its memor
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.support.arrays import BoolArray, FloatArray
 
 _MAD: Final = 1.482602218505602
 """Standard deviation of a normal distribution over its median absolute deviation."""

@@ -11,16 +11,15 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.input import read_number
 from printhammer.drive.segments import EXPONENTIAL, POLYNOMIAL
 from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.identify.tables import Readings
-    from printhammer.support.arrays import FloatArray
 
 
 def time_constant(bandwidth: float | None) -> float:
@@ -29,13 +28,7 @@ def time_constant(bandwidth: float | None) -> float:
 
 
 def bandwidth_of(table: Readings) -> float | None:
-    """Return the bandwidth that a comment of a table tells, Hz; None where it tells of no limit.
-
-    Raises
-    ------
-    InputError
-        The comment is no positive frequency.
-    """
+    """Return the bandwidth that a comment of a table tells, Hz; None where it tells of no limit."""
     text = table.comments.get("bandwidth", "")
     if text in ("", "none", "unlimited"):
         return None

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.results import Column, Declared, Result, column, coordinate, part, scalar
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 CONFIDENCE: Final = 0.95
 """Probability with which an interval is meant to contain the constant."""

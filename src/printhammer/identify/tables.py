@@ -8,21 +8,18 @@ passed over; a comment such as ``# sampling rate: 1 MHz`` is kept as a key and i
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError, located
 from printhammer.results import Declared, part
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import describe, to_si
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from printhammer.support.arrays import FloatArray, IntArray
 
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})

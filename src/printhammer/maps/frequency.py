@@ -6,29 +6,27 @@ pulses at gradually rising rates.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
+import numpy.typing as npt
 
+from printhammer.drive.base import Overlap
 from printhammer.drive.batch import PulseTrains
 from printhammer.drive.input import PULSES, read_count, read_number
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
 from printhammer.results.provenance import provenance
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import waveform_of
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy.typing as npt
     import xarray as xr
-
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 LOWEST: Final = 500.0
 """Lowest rate of a map unless told otherwise, Hz."""
@@ -92,11 +90,6 @@ def frequency_map(
         not go on. Over `rate` and `firing`: `fired_at` [s], `struck`, `flight_time` [s] and `peak_force` [N]
         of its dot, NaN for a lost dot. Over `rate`: `status`, 0 for a run that went as asked; the codes are
         in its attributes. Provenance is in the attributes of the set.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
     from printhammer.run.ensemble import Ensemble
 

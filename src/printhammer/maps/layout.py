@@ -7,22 +7,20 @@ computed maps. A missing number is NaN.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
+from printhammer.hammer.hammer import Hammer
 from printhammer.results.declare import Column
 from printhammer.results.files import dataset_of
+from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    import numpy.typing as npt
     import xarray as xr
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
 
 _FIRED: Final = ("rate", "firing")
 

@@ -12,18 +12,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.errors import InputError, missing_extra
 from printhammer.maps.layout import interpolated, map_dataset
 from printhammer.maps.records import RateRecord, checked, read_records
 from printhammer.results.files import need_for
+from printhammer.support.arrays import FloatArray
 from printhammer.units import to_si
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     import xarray as xr
-
-    from printhammer.support.arrays import FloatArray
 
 MOST_TIMES: Final = 8192
 """Number of times of a common grid above which it is made coarser."""

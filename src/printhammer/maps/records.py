@@ -12,21 +12,18 @@ empty cell, or nan, is a gap. Blank lines and lines that begin with # are passed
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError, located
 from printhammer.results import Declared, column, scalar
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.sheets import read_sheet, split_heading
 from printhammer.units import parse, to_si
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from printhammer.support.arrays import FloatArray, IntArray
 
 _SI: Final = {"rate": "Hz", "time": "s", "displacement": "m"}
 _HEADINGS: Final = (

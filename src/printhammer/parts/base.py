@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -16,9 +17,6 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from printhammer.errors import InputError
 from printhammer.parts.functions import check_functions
 from printhammer.support.constants import sentence
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 ROLES: tuple[str, ...] = ("magnet", "coil", "spring", "pack", "backstop", "damping")
 

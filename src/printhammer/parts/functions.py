@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import inspect
 import sys
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from printhammer.errors import InputError
 from printhammer.parts import absent
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _FORCES: Final = {
     "magnet": ("magnet_force",),

@@ -58,13 +58,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
 
 @cache
 def load_installed() -> None:
-    """Import what installed packages name as their parts, once.
-
-    Raises
-    ------
-    InputError
-        An entry point cannot be imported.
-    """
+    """Import what installed packages name as their parts, once."""
     for entry in entry_points(group=GROUP):
         try:
             entry.load()

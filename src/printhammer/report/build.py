@@ -10,24 +10,21 @@ import json
 import re
 import tempfile
 import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from printhammer.claims import Context, JudgedClaim, buzz_search, judge_all
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import panel_strobes, printed_verdicts
 from printhammer.errors import InputError, PrinthammerError
+from printhammer.hammer.hammer import Hammer
 from printhammer.report.contents import Drawing, Report, cited_figures
 from printhammer.report.reconstruction.results import BaseRates, Results, shipped_results
 from printhammer.support.files import make_folder, write_file
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
-
-    from printhammer.hammer.hammer import Hammer
 
 PAGE: Final = "index.html"
 PICTURES: Final = "figures"
@@ -38,13 +35,7 @@ _PICTURE: Final = re.compile(r"figure\d\d\.(svg|pdf|png)")
 
 
 def check_place(out: str | Path) -> None:
-    """Make sure that a report writes over nothing in a folder but an earlier report, which it replaces.
-
-    Raises
-    ------
-    InputError
-        A file is there that is no part of an earlier report.
-    """
+    """Make sure that a report writes over nothing in a folder but an earlier report, which it replaces."""
     folder = Path(out)
     pictures = folder / PICTURES
     drawn = sorted(pictures.iterdir()) if pictures.is_dir() else []

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable
+from typing import Any, Final
 
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import printed_verdicts
+from printhammer.hammer.hammer import Hammer
+from printhammer.report.contents import Report
 from printhammer.report.quantities import split_name, value_text
+from printhammer.report.reconstruction.results import Family, FamilyMember
 from printhammer.report.views import SAME
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.report.contents import Report
-    from printhammer.report.reconstruction.results import Family, FamilyMember
 
 _ROOM: Final = 4.0
 """Free part of a track at each end, in percent."""

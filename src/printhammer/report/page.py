@@ -6,9 +6,11 @@ import base64
 import json
 from collections import Counter
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from printhammer.report.contents import linked_source
+from printhammer.claims import JudgedClaim
+from printhammer.hammer.hammer import Hammer
+from printhammer.report.contents import Report, linked_source
 from printhammer.report.family_views import family_view
 from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text, words_of
 from printhammer.report.views import (
@@ -19,11 +21,6 @@ from printhammer.report.views import (
     schemes_view,
     timings_view,
 )
-
-if TYPE_CHECKING:
-    from printhammer.claims import JudgedClaim
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.report.contents import Report
 
 KINDS: Final = {
     "stated": "the paper prints the number or the verdict; the band is the printed precision",

@@ -9,20 +9,17 @@ import json
 from dataclasses import fields, is_dataclass
 from importlib.resources import files
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from printhammer.claims import JudgedClaim
 from printhammer.errors import missing_extra
+from printhammer.report.contents import Report
 from printhammer.report.page import view
 from printhammer.report.quantities import percent, typeset
 from printhammer.report.reconstruction.shares import Share
 from printhammer.support.constants import Constant
 from printhammer.support.files import write_file
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.report.contents import Report
 
 _SHOWN = (
     *("has_reconstructed", "statuses", "parts", "verdicts", "kinds", "by_kind", "claims", "failing", "rates"),
@@ -31,25 +28,13 @@ _SHOWN = (
 
 
 def check_typesetter() -> None:
-    """Check that a PDF can be made here.
-
-    Raises
-    ------
-    InputError
-        Typst is not installed.
-    """
+    """Check that a PDF can be made here."""
     if find_spec("typst") is None:
         raise missing_extra("a PDF of the report needs typst", "pdf")
 
 
 def write_pdf(report: Report, path: Path) -> None:
-    """Write a report as a PDF beside its folder of figures; the same report gives the same bytes.
-
-    Raises
-    ------
-    InputError
-        Typst is not installed, or the file cannot be written.
-    """
+    """Write a report as a PDF beside its folder of figures; the same report gives the same bytes."""
     check_typesetter()
     import matplotlib as mpl
     import typst

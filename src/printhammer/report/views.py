@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from printhammer.claims import Claim
 from printhammer.claims import claims as every_claim
 from printhammer.claims.verdicts import panel_name, printed_verdicts
-from printhammer.report.contents import Miss, misses
+from printhammer.hammer.hammer import Hammer
+from printhammer.report.contents import Miss, Report, misses
 from printhammer.report.quantities import band_text, percent, split_name, value_text, words_of
-
-if TYPE_CHECKING:
-    from printhammer.claims import Claim
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.report.contents import Report
-    from printhammer.report.reconstruction.results import BestFor
-    from printhammer.report.reconstruction.shares import Share
+from printhammer.report.reconstruction.results import BestFor
+from printhammer.report.reconstruction.shares import Share
 
 SAME: Final = 1e-9
 """Relative difference up to which two constants are the same."""

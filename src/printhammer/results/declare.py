@@ -10,6 +10,7 @@ What a notebook shows of results and their parts: short tables, HTML.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
 from html import escape
@@ -27,9 +28,6 @@ from typing import (
 )
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
 
 MOST_ROWS: Final = 40
 """Rows shown of a table; of more, the first and the last."""

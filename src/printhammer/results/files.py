@@ -17,6 +17,7 @@ import json
 import math
 import shutil
 import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from io import BytesIO
@@ -33,8 +34,6 @@ from printhammer.support.files import write_file
 from printhammer.support.sheets import read_sheet
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     import pandas as pd
     import xarray as xr
 
@@ -142,13 +141,7 @@ def reopen(path: str | Path) -> Reopened:
 
 
 def need_for(path: str | Path, kind: str = "") -> None:
-    """Make sure that the optional package is there that a file needs; `kind` instead of its ending.
-
-    Raises
-    ------
-    InputError
-        It is not installed.
-    """
+    """Make sure that the optional package is there that a file needs; `kind` instead of its ending."""
     package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
         raise missing_extra(f"{path}: {what} {package}", extra)
@@ -229,13 +222,7 @@ def csv_text(table: pd.DataFrame) -> str:
 
 
 def write_csv(table: pd.DataFrame, path: str | Path) -> None:
-    """Write a table as CSV, see `csv_text`.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written; what was there stays.
-    """
+    """Write a table as CSV, see `csv_text`."""
     write_file(path, csv_text(table))
 
 

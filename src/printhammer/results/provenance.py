@@ -19,14 +19,12 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from printhammer.drive.text import inline, waveform_text
-
-if TYPE_CHECKING:
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.hammer.hammer import Hammer
 
 VERSIONS: Final = ("printhammer", "numpy", "numba", "scipy")
 """Keys that every result has."""

@@ -17,8 +17,10 @@ Many results of one class as one: their arrays stacked along a new dimension.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass, replace
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
 import numpy as np
@@ -41,14 +43,10 @@ from printhammer.results.declare import (
 from printhammer.results.provenance import provenance
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
     import pandas as pd
     import xarray as xr
 
     Entries = dict[str, tuple[Column, Any]]
-    from collections.abc import Sequence
 
 RESULTS: dict[str, type[Result]] = {}
 """All classes of results that were imported, by name."""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Self, SupportsIndex, TypeVar, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.results.declare import Declared, cell, columns_of, html_table, shortened
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    import numpy.typing as npt
     import pandas as pd
 
 _T = TypeVar("_T", bound=Declared)

@@ -11,18 +11,18 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self
 
+import numpy.typing as npt
+
 from printhammer.errors import InputError, missing_extra
 from printhammer.results.declare import Declared, part
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
-    import numpy.typing as npt
     import xarray as xr
 
 MARK: Final = "status"
@@ -108,11 +108,6 @@ class Store:
             Its place in the chunk grid of the members.
         results : mapping
             Arrays by name, of the shape of the block.
-
-        Raises
-        ------
-        InputError
-            They cannot be written; the block then counts as not done.
         """
         where = tuple(
             slice(i * size, i * size + count)
@@ -131,13 +126,7 @@ class Store:
             raise self._refusal(error) from None
 
     def finish(self, now: str) -> None:
-        """Stamp a complete store; a stamp that is there stays.
-
-        Raises
-        ------
-        InputError
-            The stamp cannot be written.
-        """
+        """Stamp a complete store; a stamp that is there stays."""
         root = _root(self.path)
         if root["attributes"].get("finished"):
             return
@@ -215,13 +204,7 @@ class Store:
 
 
 def open_store(path: str | Path) -> xr.Dataset:
-    """Open a store, complete or not; values are read when they are used.
-
-    Raises
-    ------
-    InputError
-        There is no such store.
-    """
+    """Open a store, complete or not; values are read when they are used."""
     _require_zarr()
     import xarray as xr
 

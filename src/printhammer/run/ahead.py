@@ -12,17 +12,14 @@ import atexit
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from printhammer.kernel.compile.specialise import specialise
 from printhammer.kernel.model.laws import Laws
 from printhammer.support.threads import thread_count
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def begin(laws: Laws) -> Callable[[], None]:

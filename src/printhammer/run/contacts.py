@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
 from printhammer.kernel.model.modes import PACK_SURFACE
 from printhammer.results import Declared, part, scalar
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.run.problem import Problem, Record
-    from printhammer.support.arrays import FloatArray
+from printhammer.run.problem import Problem, Record
+from printhammer.support.arrays import FloatArray
 
 
 class Contact(Declared):

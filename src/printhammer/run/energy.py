@@ -8,21 +8,19 @@ from __future__ import annotations
 import itertools
 import math
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from printhammer.drive.trains import Drive
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
 from printhammer.kernel.model import layout
 from printhammer.parts import absent
 from printhammer.results import Declared, scalar
+from printhammer.run.problem import Problem, Record
 from printhammer.run.supply import linkage, winding_of
-
-if TYPE_CHECKING:
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.problem import Problem, Record
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _SAMPLES: Final = np.array([*np.linspace(0.0, 1.0, 9)[:-1], 1.0 - 1e-9])
 _BISECTIONS: Final = 52

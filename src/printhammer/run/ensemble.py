@@ -12,26 +12,25 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.batch import PulseTrains, Ragged, firings_of
 from printhammer.drive.input import read_array
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.results import Result, column, part
 from printhammer.run.ensemble_group import MOST_COLUMNS, Fired, Group, Job
+from printhammer.run.motion import Motion
 from printhammer.run.problem import MAX_STEPS, TOLERANCE, check_tolerance, laws_of
 from printhammer.run.start import AT_REST, FORMS, check_branch, initial_state
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, thread_count
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.drive.trains import Drive
-    from printhammer.kernel.model.laws import Laws
     from printhammer.results.result import Entries
-    from printhammer.run.motion import Motion
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["DISPLAY_TOLERANCE", "MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
 
@@ -348,11 +347,6 @@ class Ensemble:
         -------
         EnsembleResult
             With a status for each member; a run that could not go on is no exception.
-
-        Raises
-        ------
-        InputError
-            An argument is not what is described above.
         """
         if engine not in ENGINES:
             raise InputError(f"engine = {engine!r}, expected one of {', '.join(ENGINES)}")

@@ -6,12 +6,18 @@ What the drives of an ensemble fire, as arrays: a few forms of pulses, and many 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.batch import PulseTrains, Ragged, firings_of, starts_of
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.base import Supply
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
+from printhammer.kernel.compile.specialise import Kernel
 from printhammer.kernel.lanes import layout as lane_layout
 from printhammer.kernel.model.layout import (
     CUBIC_PIECE,
@@ -33,18 +39,10 @@ from printhammer.run.problem import (
     scales_of,
 )
 from printhammer.run.supply import take_supply
+from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.base import Supply
-    from printhammer.hammer.hammer import Hammer
     from printhammer.kernel.compile.lanes import LaneKinds
-    from printhammer.kernel.compile.specialise import Kernel
-    from printhammer.support.arrays import FloatArray, IntArray
 
 _NODES: Final = 2048
 _CONTACTS: Final = 256

@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from importlib import import_module
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, Rows, derived, provenance
 from printhammer.results.files import write_csv, write_parquet
 from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading_works
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    import numpy.typing as npt
     import pandas as pd
     import xarray as xr
 
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray
 
 FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "drive", "total")
 """Names of the forces: equations (3), (4), (5), (6), (7), damping of the armature wherever it is, where the
@@ -204,13 +203,7 @@ class Motion(Result, fields=False):
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return displacement, m, and velocity, m/s, at any times of the run, s; after jumps.
-
-        Raises
-        ------
-        InputError
-            A time is outside the run.
-        """
+        """Return displacement, m, and velocity, m/s, at any times of the run, s; after jumps."""
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
 
@@ -235,13 +228,7 @@ class Motion(Result, fields=False):
         return (*begun, *(row[[10, 14, 13]].tolist() if self._problem.laws.circuit else ()))
 
     def forces_at(self, t: npt.ArrayLike) -> Mapping[str, FloatArray]:
-        """Return the forces by name, N, at any times of the run, s.
-
-        Raises
-        ------
-        InputError
-            A time is outside the run.
-        """
+        """Return the forces by name, N, at any times of the run, s."""
         return self._forces(self._resampled(t))
 
     @cached_property
@@ -298,11 +285,6 @@ class Motion(Result, fields=False):
         """Return time, s, and displacement, m, of the largest local maximum from a firing to the next.
 
         None if there is none; the position at the firing never counts.
-
-        Raises
-        ------
-        InputError
-            There is no firing of that number.
         """
         fired = self.drive.times
         if not 0 <= firing < len(fired):
@@ -347,23 +329,11 @@ class Motion(Result, fields=False):
         return self.to_dataframe()
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the output grid as CSV, units in the heading, provenance in lines ``# key: value`` above it.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
+        """Write the output grid as CSV: provenance in lines ``# key: value``, units in the heading."""
         write_csv(self.to_pandas(), path)
 
     def to_parquet(self, path: str | Path) -> None:
-        """Write the output grid as Parquet with provenance; needs the extra `tables`.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written, or pyarrow is not installed.
-        """
+        """Write the output grid as Parquet with provenance; needs the extra `tables`."""
         write_parquet(self.to_pandas(), path)
 
     def __repr__(self) -> str:

@@ -6,23 +6,20 @@ pack of this piece or of the next one, as soon afterwards as it is inside neithe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.contacts import Contact, Dot
 from printhammer.run.energy import Ledger
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
 from printhammer.run.start import initial_state
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.contacts import Contact, Dot
 
 _LATER: Final = 5e-6  # By how much the end of a piece is put off while the armature is inside a pack, s
 

@@ -6,13 +6,17 @@ The only place that turns the objects of the public face into what the kernel wo
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import numpy as np
 
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
+from printhammer.kernel.compile.specialise import Kernel
 from printhammer.kernel.model import layout
 from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.model.layout import CIRCUIT_NODE_WIDTH, NODE_WIDTH
@@ -21,14 +25,7 @@ from printhammer.kernel.single import carry
 from printhammer.results import Declared, part, scalar
 from printhammer.run.start import AT_REST, Beyond
 from printhammer.run.supply import take_supply, typical_current
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.kernel.compile.specialise import Kernel
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 T = TypeVar("T")
 
@@ -106,13 +103,7 @@ def fresh_carry(pause_after: float = math.inf, beyond: Beyond = AT_REST) -> Floa
 
 
 def check_tolerance(tolerance: object) -> None:
-    """Refuse a tolerance with which the integrator does not work.
-
-    Raises
-    ------
-    InputError
-        Not a number between the least and the largest.
-    """
+    """Refuse a tolerance with which the integrator does not work."""
     if not (isinstance(tolerance, float | int) and LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE):
         raise InputError(
             f"tolerance = {tolerance!r}, expected a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"

@@ -8,13 +8,17 @@ The window in which strobe points are drawn, and in whose half-widths their dist
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, Self, TypedDict
+from typing import Any, Final, Self, TypedDict
 
 import numpy as np
+import numpy.typing as npt
 
+from printhammer.drive.base import Overlap
 from printhammer.drive.input import period_of_rate, read_number, read_positive
 from printhammer.drive.trains import Drive, PulseTrain, SineForce
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import (
@@ -29,18 +33,8 @@ from printhammer.hammer.names import (
 )
 from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import scales_of
+from printhammer.support.arrays import BoolArray, FloatArray
 from printhammer.support.constants import Quantity, quantities
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray
 
 PAPER_X: Final = (38.1e-6, 88.9e-6)
 """Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
@@ -213,13 +207,7 @@ class Regime(Declared):
         return not turn and self.fired.supply().capacitance == 0.0
 
     def check_planar(self) -> None:
-        """Refuse what has more to its state than displacement and velocity.
-
-        Raises
-        ------
-        InputError
-            As `is_planar` says.
-        """
+        """Refuse what has more to its state than displacement and velocity."""
         if not self.is_planar:
             raise InputError(
                 "the state at a section is displacement and velocity: expected no shorted turn and no"
@@ -278,13 +266,7 @@ class Regime(Declared):
         return window_of(self.hammer, self.train(1)[0])
 
     def value(self, name: str) -> float:
-        """Return a constant by name, SI; see `with_`.
-
-        Raises
-        ------
-        InputError
-            There is no number of that name.
-        """
+        """Return a constant by name, SI; see `with_`."""
         if name == PERIOD:
             return self.period
         if name == RATE:
@@ -300,13 +282,7 @@ class Regime(Declared):
         return float(number)
 
     def quantity(self, name: str) -> Quantity:
-        """Return unit, meaning and symbol of a constant by name; see `with_`.
-
-        Raises
-        ------
-        InputError
-            There is no constant of that name.
-        """
+        """Return unit, meaning and symbol of a constant by name; see `with_`."""
         self.value(name)
         if name == PERIOD and self.drive is not None:
             return replace(TIMING[name], meaning="period of the force")
@@ -330,11 +306,6 @@ class Regime(Declared):
             endless force, or the dotted key of any constant of the hammer, such as "backstop.damping".
         value : float
             SI.
-
-        Raises
-        ------
-        InputError
-            There is no number of that name, or the value is not possible.
         """
         if name in (PERIOD, RATE):
             period = period_of_rate(value) if name == RATE else read_positive(value, "s", name)
@@ -391,13 +362,7 @@ def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
 
 
 def read_phase(phase: float) -> float:
-    """Read a part of the period.
-
-    Raises
-    ------
-    InputError
-        It is not from 0 up to but not including 1.
-    """
+    """Read a part of the period."""
     part = read_number(phase, "1", "phase")
     if not 0.0 <= part < 1.0:
         raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
@@ -425,11 +390,6 @@ def regimes_of(
         Instead of periods: endless forces.
     waveform, overlap, phase
         As for `Regime.of`, for all trains.
-
-    Raises
-    ------
-    InputError
-        As for `Regime.of`, or numbers of hammers and periods that do not fit together.
     """
     many = [hammers] if isinstance(hammers, Hammer | Regime) else list(hammers)
     fired: list[tuple[Any, Drive | None]] = [(None, drive) for drive in drives or ()]

@@ -9,20 +9,18 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.kernel import schemes_1983
 from printhammer.kernel.model import modes as M
 from printhammer.parts import absent
 from printhammer.run.problem import Problem, Record
-
-if TYPE_CHECKING:
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 READINGS = schemes_1983.READINGS
 """Ways to read when the short step is taken, see `printhammer.kernel.schemes_1983`."""

@@ -6,26 +6,21 @@ Touches of a surface in a long run: only they are kept, so that memory does not 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final, Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE, PAUSED, STATUS_NAMES
 from printhammer.results import Declared, part, scalar
 from printhammer.run.motion import Motion
-from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
+from printhammer.run.problem import TOLERANCE, Problem, Stretch, check_tolerance
 from printhammer.run.start import initial_state, state_beyond
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.problem import Problem, Stretch
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 CYCLE: Final = 4e-3
 """Time after the last firing, s, at which a run ends unless told otherwise."""
@@ -83,11 +78,6 @@ def simulate(
     -------
     Motion
         With a status; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above, or the hammer has no rest state to start from.
     """
     if scheme not in SCHEMES:
         raise InputError(f"scheme = {scheme!r}, expected one of {', '.join(SCHEMES)}")

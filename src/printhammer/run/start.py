@@ -6,6 +6,7 @@ In the pack its branch and memory belong to the state, under a voltage the curre
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from printhammer.errors import InputError
@@ -19,8 +20,6 @@ from printhammer.kernel.model.modes import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from printhammer.hammer.hammer import Hammer
 
 

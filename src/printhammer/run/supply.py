@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.base import Supply, Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model import layout
 from printhammer.parts import absent
 from printhammer.parts.coil.winding import Winding
-
-if TYPE_CHECKING:
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.base import Supply, Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _PLACES: Final = 33
 """Places on the way of the armature at which the inductance is looked at."""
@@ -33,13 +31,7 @@ def waveforms_of(drive: Drive) -> tuple[Waveform, ...]:
 
 
 def supply_of(drive: Drive) -> Supply:
-    """Return the supply of a drive by voltage.
-
-    Raises
-    ------
-    InputError
-        Its waveforms are on different supplies.
-    """
+    """Return the supply of a drive by voltage."""
     supplies = {waveform.supply() for waveform in waveforms_of(drive)}
     if len(supplies) > 1:
         raise InputError("the waveforms of the drive are on different supplies, expected one supply")
@@ -160,13 +152,7 @@ def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
 
 
 def check_linkage(hammer: Hammer, current: float) -> None:
-    """Refuse a coil whose flux linkage does not rise with the current on the way of the armature.
-
-    Raises
-    ------
-    InputError
-        As said.
-    """
+    """Refuse a coil whose flux linkage does not rise with the current on the way of the armature."""
     coil = winding_of(hammer)
     low = hammer.origin
     ends = [place for place in (hammer.front, hammer.platen) if place is not None]

@@ -12,18 +12,16 @@ is no context).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo
 from pydantic_core import PydanticUndefined
 
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 Status = Literal["stated", "datasheet", "derived", "reconstructed", "assumed"]
 STATUSES: tuple[str, ...] = get_args(Status)

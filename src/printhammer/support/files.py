@@ -7,26 +7,17 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
     """Write a file; text in UTF-8.
 
     It is written beside its place first and then moved there, so that what was there stays if anything fails.
-
-    Raises
-    ------
-    InputError
-        The file cannot be written.
     """
     target = Path(path)
     data = content.encode("utf-8") if isinstance(content, str) else content
@@ -48,13 +39,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Make a folder, and those above it, and make sure that files can be written there.
-
-    Raises
-    ------
-    InputError
-        It cannot be made, or nothing can be written there.
-    """
+    """Make a folder, and those above it, and make sure that files can be written there."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -9,15 +9,12 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from printhammer.errors import InputError
 from printhammer.support.files import read_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -46,13 +43,7 @@ def read_sheet(path: Path, what: str, *, gaps: bool = False) -> Sheet:
 
 
 def sheet_of(text: str, where: str, *, gaps: bool = False, delimiter: str = ",") -> Sheet:
-    """Split the text of a CSV table as `read_sheet` does; `where` stands in messages.
-
-    Raises
-    ------
-    InputError
-        It holds no comma-separated values.
-    """
+    """Split the text of a CSV table as `read_sheet` does; `where` stands in messages."""
     comments: dict[str, str] = {}
     reader = csv.reader(_uncommented(text, comments), strict=True, delimiter=delimiter)
     rows = []
@@ -75,13 +66,7 @@ def split_heading(cell: str) -> tuple[str, str]:
 
 
 def finite(cell: str, where: str) -> float:
-    """Read a finite number.
-
-    Raises
-    ------
-    InputError
-        It is none; `where` stands in the message.
-    """
+    """Read a finite number."""
     try:
         number = float(cell)
     except ValueError:

@@ -26,13 +26,7 @@ _INTERVAL: Final = 0.1
 
 
 def thread_count(threads: int | None) -> int:
-    """Return a number of threads; by default that of the cores that this process may use.
-
-    Raises
-    ------
-    InputError
-        It is less than 1.
-    """
+    """Return a number of threads; by default that of the cores that this process may use."""
     if threads is None:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from printhammer.results.files import need_for
@@ -15,8 +16,6 @@ from printhammer.sweep.spec import read_spec
 from printhammer.sweep.work import Index, run_local
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
 
     from printhammer.sweep.work import Results

@@ -12,14 +12,14 @@ import numpy as np
 
 from printhammer.errors import InputError, nearest
 from printhammer.hammer.file import kinds_of, model_of
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import FORCE, PERIOD, RATE, TIMING, in_unit_of_drive, quantity_of
 from printhammer.results import Declared, part
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import Quantity, expected, quantities, shown
 from printhammer.sweep.tables import read_quantities, read_quantity
 
 if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.tables import AxisTable
 
 Target = Literal["hammer", "waveform", "drive", "at", "state"]

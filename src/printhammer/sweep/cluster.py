@@ -8,24 +8,20 @@ import math
 import time
 from asyncio import CancelledError as TaskCancelled
 from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError as FutureCancelled
 from contextlib import contextmanager
 from importlib import import_module
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from printhammer.errors import InputError, PrinthammerError, missing_extra
 from printhammer.results.provenance import versions
+from printhammer.support.arrays import FloatArray
+from printhammer.sweep.members import Base
 from printhammer.sweep.outputs import WORKER_LOST, Outputs
-from printhammer.sweep.work import Results, run_chunk
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from printhammer.support.arrays import FloatArray
-    from printhammer.sweep.members import Base
-    from printhammer.sweep.plan import Plan
-    from printhammer.sweep.work import Index
+from printhammer.sweep.plan import Plan
+from printhammer.sweep.work import Index, Results, run_chunk
 
 ANSWER: Final = 5.0
 """Seconds in which a scheduler must answer."""
@@ -218,11 +214,6 @@ def client_of(dask: Any) -> Iterator[Any]:
     """Give a client of a cluster, by the address of its scheduler; one made here is closed, and logs nothing.
 
     A `distributed.Client` is given back as it is.
-
-    Raises
-    ------
-    InputError
-        Nobody answers at the address, or dask is not installed.
     """
     try:
         distributed: Any = import_module("distributed")

@@ -6,26 +6,23 @@ import tomllib
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.drive.batch import PulseTrains, firings_of
 from printhammer.drive.file import drive_of
 from printhammer.drive.text import FORMAT, document
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import RATE
 from printhammer.results import Declared, part, scalar
 from printhammer.run.simulate import CYCLE
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.sweep.axes import COUNTS, Axis
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
 
 KINDS: Final = ("train", "times", "burst", "sequence", "sine")
 """Tables of a drive file that say when it fires."""

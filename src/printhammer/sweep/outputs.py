@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -9,13 +10,11 @@ import numpy as np
 
 from printhammer.errors import InputError, nearest
 from printhammer.results import Declared, part
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import shown
 from printhammer.sweep.tables import read_quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.tables import OutputsTable
 
 STATUSES: Final = (

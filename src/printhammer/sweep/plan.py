@@ -6,6 +6,7 @@ Designs: the members of a grid or of a Latin hypercube, and how they are divided
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
@@ -16,13 +17,11 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.results.provenance import provenance
 from printhammer.results.store import Layout, Variable
+from printhammer.support.arrays import FloatArray
 from printhammer.sweep.members import Maker
 from printhammer.sweep.outputs import FIRING, TIME, Output
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from printhammer.support.arrays import FloatArray
     from printhammer.sweep.spec import Spec
 
 

@@ -50,13 +50,7 @@ ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
 
 
 def read_quantity(written: Any, si: str, where: str) -> float:
-    """Read one quantity into SI: "1.2 kHz" or { value = 1.2, unit = "kHz" }; a bare number if it is pure.
-
-    Raises
-    ------
-    InputError
-        It is none of these, or of another dimension than the unit `si`.
-    """
+    """Read one quantity into SI: "1.2 kHz" or { value = 1.2, unit = "kHz" }; a bare number if it is pure."""
     with located(where):
         if isinstance(written, str):
             return parse(written, si)
@@ -71,13 +65,7 @@ def read_quantity(written: Any, si: str, where: str) -> float:
 
 
 def read_quantities(written: Any, si: str, where: str) -> list[float]:
-    """Read several quantities into SI: a list of what `read_quantity` takes, or values with one unit.
-
-    Raises
-    ------
-    InputError
-        As `read_quantity`; or there is none.
-    """
+    """Read several quantities into SI: a list of what `read_quantity` takes, or values with one unit."""
     values: Iterable[Any] = written if isinstance(written, list) else ()
     if isinstance(written, Mapping):
         with located(where):
@@ -168,13 +156,7 @@ class SpecTable(_Table):
 
 
 def read_tables(document: dict[str, Any]) -> SpecTable:
-    """Check the tables of a spec.
-
-    Raises
-    ------
-    InputError
-        A key is unknown or missing, or a value is of the wrong kind.
-    """
+    """Check the tables of a spec."""
     try:
         return SpecTable.model_validate(document)
     except ValidationError as error:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable, Collection, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,6 +16,8 @@ import numpy as np
 from printhammer.drive.batch import firings_of
 from printhammer.errors import InputError
 from printhammer.run.ensemble import DotTable, Ensemble
+from printhammer.run.motion import Motion
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import in_threads, thread_count
 from printhammer.sweep.members import Base, Maker
 from printhammer.sweep.outputs import (
@@ -29,10 +32,6 @@ from printhammer.sweep.outputs import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable
-
-    from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.sweep.members import Members
     from printhammer.sweep.outputs import Outputs
     from printhammer.sweep.plan import Plan
@@ -56,11 +55,6 @@ def run_chunk(
 
     A member that cannot be made or does not get to its end is a row with a status. `progress` is called now
     and then with the share done; what it raises ends the work.
-
-    Raises
-    ------
-    InputError
-        The tables that the hammer names have changed.
     """
     if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
         raise InputError(f"{base.hammer.path}: a table that it names has changed since the sweep began")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,10 +13,8 @@ from printhammer.chaos.orbits.settled import LIES_ON, approaches, noise_about, s
 from printhammer.chaos.strobe.train import exponents_onward
 from printhammer.chaos.strobe.verdict import is_positive
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MATCH: Final = 1e-2
 """Distance, in half-widths of the window, up to which periodic orbits count as the same attractor."""

@@ -20,6 +20,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.basins.attractors import Attractor, Attractors
 from printhammer.chaos.bifurcation.columns import OK, TOLERANCE, run_columns, scales_of_columns
@@ -27,19 +28,17 @@ from printhammer.chaos.strobe.map import possible
 from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Declared, Result, column, coordinate, part
+from printhammer.results.declare import Kind
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Firing, Regime
 from printhammer.run.start import AT_REST
+from printhammer.support.arrays import FloatArray, IntArray, TextArray
 from printhammer.support.threads import Progress, shifted
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     import pandas as pd
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.results.declare import Kind
-    from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 BOX: Final = 4
 """Cells along the side of a box unless told otherwise."""
@@ -270,11 +269,6 @@ def basins(
     -------
     Basins
         With a label for each cell; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above.
     """
     regime = Regime.of(hammer, **firing).at_firings
     check_tolerance(tolerance)

@@ -14,10 +14,12 @@ the dots are told apart.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.basins.basins import Range, check_cells, read_axis
 from printhammer.drive.input import read_positive
@@ -26,19 +28,13 @@ from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, derived, part, provenance, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.regime import waveform_of
 from printhammer.run.simulate import simulate
+from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 from printhammer.support.threads import Progress, shifted
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
 TAIL: Final = 1e-3
 """Time after the second firing, s, within which a second dot is waited for unless told otherwise."""
@@ -208,12 +204,6 @@ def quench_map(
     -------
     QuenchMap
         With a status for each cell; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a hammer without a pack or a rest state; a waveform
-        without a width.
     """
     pulse = waveform_of(hammer, waveform)
     width = getattr(pulse, "width", None)

@@ -7,9 +7,10 @@ where it does at every second one, and many for a strange one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Literal, SupportsIndex, Unpack, get_args
+from typing import Final, Literal, SupportsIndex, Unpack, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.bifurcation.builder import DiagramBuilder
 from printhammer.chaos.bifurcation.columns import TOLERANCE
@@ -22,12 +23,8 @@ from printhammer.hammer.names import PERIOD, RATE
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Firing, Regime
 from printhammer.run.start import initial_state, state_beyond
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import FloatArray
+from printhammer.support.threads import Progress
 
 FIRINGS: Final = 300
 """Firings of a train unless told otherwise."""

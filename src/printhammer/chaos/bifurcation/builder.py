@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -36,14 +37,12 @@ from printhammer.chaos.bifurcation.columns import (
     state_or_rest,
 )
 from printhammer.chaos.strobe.train import exponents_onward, forgets
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
+from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from printhammer.chaos.strobe.train import State
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
 
 STRAND: Final = 16
 """Values in a strand."""

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.orbits.settled import Settled, settled, shown
 from printhammer.chaos.strobe.train import FROM_REST, NO_CURRENT, State, handed_on, pack_branches
 from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import Ensemble
-from printhammer.run.regime import window_of
+from printhammer.run.regime import Regime, window_of
 from printhammer.run.start import AT_REST, check_branch, initial_state
 from printhammer.run.supply import current_scale
+from printhammer.support.arrays import FloatArray, IntArray, TextArray
 from printhammer.support.threads import Progress, mapped, shifted
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.trains import Drive
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 TOLERANCE: Final = 1e-9
 """Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.

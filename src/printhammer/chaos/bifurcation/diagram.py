@@ -10,10 +10,12 @@ Between two neighbours there may be more than a diagram shows.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.bifurcation.builder import SAME
 from printhammer.chaos.bifurcation.columns import orbit_distance
@@ -23,14 +25,8 @@ from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.results import Column, Declared, Result, column, coordinate, derived, part, scalar
 from printhammer.run.ensemble import MODE_NAMES
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 
 SERIES: Final = (2, 4, 8)
 """Periods that, one after the other, count as a series of doublings."""
@@ -296,7 +292,7 @@ def hysteresis(diagram: Bifurcation) -> BoolArray:
     """Return at which values the directions of a diagram lead to different attractors, shape (C,).
 
     Periodic ones are different if their periods are, or if their orbits lie further apart than
-    `printhammer.chaos.bifurcation.builder.SAME`; trains without a period are only told from periodic ones. All
+    `SAME` of the builder; trains without a period are only told from periodic ones. All
     false where there is but one direction.
     """
     different = np.zeros(len(diagram.values), np.bool_)

@@ -20,18 +20,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, Node
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _GROWTH: Final = 1.5
 _LEAST_COSINE: Final = 0.97

@@ -6,10 +6,12 @@ What happens along a branch of periodic orbits, in the words of a hammer.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.continuation.branch_points import BIRTH
 from printhammer.chaos.continuation.family import Passage, Surface, Touch
@@ -19,18 +21,15 @@ from printhammer.errors import InputError
 from printhammer.results import Column, Declared, Result, column, derived, part, scalar
 from printhammer.results.declare import heading
 from printhammer.results.files import plain
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    import numpy.typing as npt
     import pandas as pd
 
     from printhammer.chaos.continuation.arclength import Curve, Stop
     from printhammer.chaos.continuation.branch_points import BranchPoint
     from printhammer.chaos.orbits.orbit import Orbit
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing", "section"]
 KINDS: Final[tuple[str, ...]] = get_args(EventKind)

@@ -21,22 +21,18 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Hashable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, Watch, follow
 from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue, Node, between
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Hashable
-
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change", "section"]
 

@@ -9,7 +9,7 @@ at its first grazing, and the stop says so.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, SupportsIndex, Unpack
+from typing import Final, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -22,13 +22,11 @@ from printhammer.chaos.strobe.map import MAP_TOLERANCE
 from printhammer.chaos.strobe.points import strobes
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Firing, Regime
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import FloatArray
+from printhammer.support.threads import Progress
 
 _SETTLE: Final = 500
 """Firings after which a train from rest is taken to have settled."""
@@ -86,12 +84,6 @@ def continuation(
     Branch
         In both directions from the start to the bounds or to another stop, which is named. Folds are located
         to about 1e-10 of the range or better, grazings to about 1e-8.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; the start lies out of bounds; there is no orbit to start
-        from.
     """
     check_tolerance(tolerance)
     if isinstance(start, Orbit):

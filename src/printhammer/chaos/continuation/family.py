@@ -6,25 +6,22 @@ Beside its value and derivatives it tells of the contacts on the way; their sequ
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, Literal
+from collections.abc import Iterable
+from typing import Final, Literal
 
 import numpy as np
 
 from printhammer.chaos.continuation.fixed_points import MapValue
 from printhammer.chaos.strobe.map import IN_PACK, image_of, margin_of, usable
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, column, part, scalar
 from printhammer.run.contacts import contacts_of
 from printhammer.run.energy import increments_of
 from printhammer.run.problem import Problem, Record
+from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 1e-6
 """Relative change of the parameter by which the slope is taken; it only steers, and need not be exact."""

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _MOST_CORRECTIONS: Final = 12
 _STAGNANT: Final = 1e3

@@ -20,11 +20,11 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
 from printhammer.run.problem import Problem
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.family import Surface
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
 
 _CURRENT: Final = "under a voltage the current at a touch belongs to the state"
 _CLOSE: Final = 0.01

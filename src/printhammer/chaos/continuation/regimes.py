@@ -8,6 +8,7 @@ between two folds and is joined to nothing, is a closed loop.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
@@ -18,24 +19,22 @@ from printhammer.chaos.continuation.branch import MOST, Branch, branches_table
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.search import orbits
 from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.drive.base import Overlap
 from printhammer.drive.input import period_of_rate, read_count, read_positive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import RATE
 from printhammer.results import Column, Result, part
 from printhammer.results.result import stacked
 from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import pandas as pd
 
     from printhammer.chaos.orbits.orbit import Orbit
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 SEEDS: Final = 6
 """Number of rates at which orbits are searched for unless told otherwise."""

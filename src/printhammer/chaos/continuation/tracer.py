@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -25,11 +25,9 @@ from printhammer.chaos.continuation.flights import grazing_of, near_touches
 from printhammer.chaos.strobe.map import quiet_section
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import Progress, mapped
-
-if TYPE_CHECKING:
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
 
 PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit is found; see `arclength`."""

@@ -8,9 +8,12 @@ To what trains from rest settle over the plane of two constants, in the lanes of
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.continuation.tracer import read_bounds
@@ -21,21 +24,15 @@ from printhammer.chaos.curves.tracing import PRECISION, CurveTracer, Traced
 from printhammer.chaos.strobe.train import States, Train, run_trains
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
-from printhammer.results import Column, Result, column, derived, part, provenance, scalar
+from printhammer.results import Column, Reopened, Result, column, derived, part, provenance, scalar
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    import numpy.typing as npt
-
     from printhammer.chaos.continuation.arclength import Stop
     from printhammer.chaos.continuation.branch import Branch, BranchEvent
     from printhammer.chaos.curves.codimension import CodimensionTwo
     from printhammer.chaos.curves.systems import Place
-    from printhammer.results import Reopened
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 SAME: Final = 1e-3
 """Distance of a multiplier from the unit circle within which it counts as on it."""
@@ -165,11 +162,6 @@ class BifurcationCurve(Result, rows="point"):
             One of the two constants.
         value : float or str
             SI or text with a unit.
-
-        Raises
-        ------
-        InputError
-            It is none of the two, or no number.
         """
         if name not in self.names:
             raise InputError(f"name = {name!r}, expected {self.names[0]} or {self.names[1]}")
@@ -298,12 +290,6 @@ def bifurcation_curve(
     BifurcationCurve
         Every point is met by Newton's method to a correction of 1e-12 of the scales, or to the noise of the
         map where that is larger.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; the branch has no such event; both constants are the same;
-        a range does not hold the start.
     """
     start = start_of(source, event, regime)
     unit = start.regime.quantity(start.first).si

@@ -20,24 +20,22 @@ touch in n periods begin.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, zero_between
 from printhammer.chaos.curves.systems import GrazingSystem, place_of
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy.typing as npt
-
     from printhammer.chaos.continuation.family import Surface
     from printhammer.chaos.continuation.fixed_points import Corrector, Node
     from printhammer.chaos.curves.systems import Place, Plane
-    from printhammer.support.arrays import FloatArray
 
 RESONANCES: Final = 3
 """Most passages of a grazing orbit that are tested for a resonance."""

@@ -25,10 +25,10 @@ import numpy as np
 
 from printhammer.chaos.strobe.map import image_of, quiet_section
 from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
     from printhammer.chaos.curves.systems import Place, Plane
-    from printhammer.support.arrays import FloatArray
 
 MOST_PERIODS: Final = 4
 """Most passages of a grazing after which an orbit with one touch is looked for."""

@@ -28,14 +28,14 @@ from printhammer.chaos.curves.systems import TESTS, Plane, check_two
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
+from printhammer.run.regime import Firing, Regime
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress, mapped, thread_count
 
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch import BranchEvent
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Firing, Regime
-    from printhammer.support.arrays import FloatArray, IntArray
 
 GRID: Final = (48, 32)
 """Numbers of values of the two constants at which trains from rest are judged."""
@@ -157,11 +157,6 @@ def stability_chart(
     StabilityChart
         With the curves on which the branch's orbit loses its stability, one through each limit of a range of
         stability that lies on no other curve, and what trains from rest settle to.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above, or both constants are the same.
     """
     if isinstance(branch, Branch):
         if first is not None or firing:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,14 +14,11 @@ from printhammer.chaos.continuation.branch import Branch, BranchEvent
 from printhammer.chaos.curves.systems import KINDS
 from printhammer.errors import InputError
 from printhammer.results import Reopened, reopen
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     from printhammer.chaos.continuation.arclength import Stop
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
 
 FIRST: Final = "first"
 LAST: Final = "last"

@@ -31,11 +31,13 @@ Where an impact meets a fixed section its state jumps, which does not happen her
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.continuation.branch_points import doubling_test, fold_test, torus_test
 from printhammer.chaos.continuation.family import cyclic
@@ -45,17 +47,13 @@ from printhammer.chaos.strobe.map import image_of
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.results import Declared, part
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy.typing as npt
-
     from printhammer.chaos.continuation.family import Surface
     from printhammer.chaos.continuation.fixed_points import Node
     from printhammer.chaos.strobe.map import Image
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
 
 TESTS: Final[dict[str, Callable[[FloatArray], float]]] = {
     "fold": fold_test,

@@ -32,12 +32,12 @@ from printhammer.chaos.curves.systems import (
 )
 from printhammer.chaos.strobe.map import quiet_section
 from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import mapped
 
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.arclength import Watch
     from printhammer.chaos.curves.starts import Start
-    from printhammer.support.arrays import FloatArray
 
 PRECISION: Final = 1e-12
 """Scaled correction of Newton's method below which a point is on the curve."""

@@ -13,9 +13,11 @@ has none.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.exponents.lyapunov import (
     EXPONENT,
@@ -27,26 +29,22 @@ from printhammer.chaos.exponents.lyapunov import (
     lyapunov,
 )
 from printhammer.chaos.strobe.train import Train
+from printhammer.drive.base import Overlap
 from printhammer.drive.input import read_count
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, coordinate, part, provenance, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime, regimes_of
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
     import pandas as pd
 
     from printhammer.chaos.exponents.lyapunov import Lyapunov
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 
 class LyapunovChart(Result, rows="period"):
@@ -134,11 +132,6 @@ def lyapunovs(
     -------
     LyapunovChart
         A row for each train, and the same that each has alone, to the last bit.
-
-    Raises
-    ------
-    InputError
-        As for `lyapunov`, or numbers of hammers and periods that do not fit together.
     """
     counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)

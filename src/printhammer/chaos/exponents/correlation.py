@@ -14,21 +14,18 @@ plateau, and for the scatter between parts of the series; without a plateau ther
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, SupportsIndex
+from typing import Final, SupportsIndex
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.exponents.recurrence import rows_of
 from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.results import Result, column, coordinate, scalar
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 
 MOST: Final = 50_000
 """Largest number of states."""

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
+from typing import Any, Final, SupportsIndex, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
 from printhammer.chaos.strobe.points import Strobe, strobe_of
@@ -21,16 +22,12 @@ from printhammer.chaos.strobe.verdict import SIGNIFICANT, Verdict, verdict
 from printhammer.derivatives.states import Exponent, standard_error
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, derived, part, scalar
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime
 from printhammer.run.supply import current_of
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 FIRINGS: Final = 1000
 """Number of firings over which growth counts unless told otherwise."""
@@ -159,11 +156,6 @@ class Lyapunov(Result, rows="firing exponent"):
             The exponents over so many firings.
         errors : array, shape (k, 2)
             Their standard errors.
-
-        Raises
-        ------
-        InputError
-            A number that there is not.
         """
         q = self.cycle
         whole = whole_cycles(self.factors, q)
@@ -241,11 +233,6 @@ def lyapunov(
     -------
     Lyapunov
         With a status; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
     counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     train = Train.of(Regime.of(hammer, **firing).at_firings, sum(counts) + 1, state)

@@ -9,21 +9,18 @@ J. Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, SupportsIndex
+from typing import Final, SupportsIndex
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
 from printhammer.drive.input import read_array, read_count
 from printhammer.errors import InputError
 from printhammer.results import Result, column, scalar
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 4096
 """Largest number of states; a matrix of so many squared has 16 million points."""

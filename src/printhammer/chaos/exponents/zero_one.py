@@ -16,22 +16,19 @@ regular one walks away too.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
+from typing import Any, Final, SupportsIndex, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.strobe.points import Strobe, points_of
 from printhammer.chaos.strobe.verdict import AGREEMENT
 from printhammer.drive.input import read_array, read_count
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, coordinate, part, scalar
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Firing, Regime
-    from printhammer.support.arrays import FloatArray
+from printhammer.run.regime import Firing, Regime
+from printhammer.support.arrays import FloatArray
 
 ANGLES: Final = 100
 """Number of angles c unless told otherwise."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,13 +12,10 @@ import numpy as np
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, orbits_table
 from printhammer.results import Column, Result, part, scalar
 from printhammer.results.result import stacked
+from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
     import pandas as pd
-
-    from printhammer.run.regime import Regime
 
 
 class Orbits(Result):

@@ -7,7 +7,8 @@ plane, so that orbits which no train from rest comes near are found too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Collection, Sequence
+from typing import Final
 
 import numpy as np
 
@@ -18,12 +19,8 @@ from printhammer.hammer.equilibrium import rest_state
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import BoolArray, FloatArray
 
 PHASES: Final = (0.0, 0.5)
 """Sections at which orbits are looked for; the second one where the first falls into the pack."""

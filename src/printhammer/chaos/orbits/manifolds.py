@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from itertools import product
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import Any, Final, SupportsIndex
 
 import numpy as np
 
@@ -27,12 +27,9 @@ from printhammer.chaos.orbits.orbit import SADDLE, Orbit, multipliers_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, part
-from printhammer.support.threads import mapped
-
-if TYPE_CHECKING:
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray, IntArray
-    from printhammer.support.threads import Progress
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.threads import Progress, mapped
 
 KINDS: Final = ("stable", "unstable")
 LENGTH: Final = 10.0

@@ -14,7 +14,7 @@ derivative from their differences: good enough for Newton's method to come close
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 
@@ -31,12 +31,10 @@ from printhammer.chaos.strobe.map import (
 )
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import Ensemble
+from printhammer.run.regime import Regime
 from printhammer.run.supply import current_scale
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 from printhammer.support.threads import mapped, thread_count
-
-if TYPE_CHECKING:
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 
 CLOSED: Final = ""
 """What is told of an orbit that closes; of others it is the reason why it does not."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.strobe.map import margin_of
 from printhammer.derivatives.states import follow
@@ -14,20 +16,17 @@ from printhammer.results import Column, Result, Rows, column, derived, part
 from printhammer.results.files import plain
 from printhammer.results.result import named_codes
 from printhammer.run.contacts import Contact, Dot
+from printhammer.run.energy import Ledger
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    import numpy.typing as npt
     import pandas as pd
 
     from printhammer.chaos.orbits.newton import Closing
-    from printhammer.run.energy import Ledger
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray, IntArray
 
 STABLE: Final = "stable"
 SADDLE: Final = "saddle"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, SupportsIndex, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.orbits.newton import ExactMaps, close_orbits
 from printhammer.chaos.orbits.orbit import Orbit, no_orbit, orbit_of
@@ -12,15 +13,13 @@ from printhammer.chaos.orbits.stages import LONE, Search, shortest
 from printhammer.chaos.strobe.map import MAP_TOLERANCE, read_state
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Firing, Regime
 from printhammer.support.threads import Progress, thread_count
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
     from printhammer.chaos.orbits.collection import Orbits
-    from printhammer.hammer.hammer import Hammer
 
 LONGEST: Final = 8
 """Largest number of firings of the orbits that are looked for unless told otherwise."""
@@ -80,11 +79,6 @@ def orbits(
     -------
     Orbits
         With a count of what became of the guesses; a search that finds nothing is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above.
     """
     regime = Regime.of(hammer, **firing)
     most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
@@ -126,11 +120,6 @@ def orbit(
     Orbit
         Of fewer firings where the motion repeats after a divisor of theirs. With a status: that there is
         none near is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above.
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     check_tolerance(tolerance)

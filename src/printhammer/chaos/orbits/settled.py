@@ -16,7 +16,7 @@ stable orbit of d firings close to the states, which these approach.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -24,10 +24,8 @@ from printhammer.chaos.orbits.newton import ExactMaps, close_orbits
 from printhammer.chaos.orbits.orbit import multipliers_of
 from printhammer.chaos.strobe.map import MAP_TOLERANCE
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import BoolArray, FloatArray
 
 AGREES: Final = 1e-8
 """Distance of states, in half-widths of the window, up to which no more is asked for."""

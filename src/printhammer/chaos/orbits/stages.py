@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -33,14 +34,12 @@ from printhammer.chaos.orbits.orbit import KINDS, Orbit, orbit_of
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD
 from printhammer.run.problem import TOLERANCE
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from printhammer.chaos.orbits.orbit import Orbit
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
 
 SHARE: Final = 0.05
 """Part of the period by which it is changed on either side."""

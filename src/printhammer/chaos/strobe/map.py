@@ -20,25 +20,22 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.derivatives.states import follow
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import Problem, Record
+from printhammer.run.regime import Regime
 from printhammer.run.start import initial_state
 from printhammer.run.supply import emf, linkage
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 MAP_TOLERANCE: Final = 1e-13
 """Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""

@@ -14,14 +14,19 @@ here a train is strange if no period up to 64 is found, which is what a reader o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.strobe.train import States, Train, run_trains
 from printhammer.chaos.strobe.verdict import FIRST, LAST, Verdict, verdict
+from printhammer.drive.base import Overlap
 from printhammer.drive.input import read_count
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
@@ -30,19 +35,11 @@ from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime, Window, regimes_of, window_of
 from printhammer.run.scheme_runs import READINGS, Reading, Scheme, SchemeProblem
 from printhammer.run.start import initial_state
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.base import Overlap
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 POINTS = 200
 """Number of points unless told otherwise, as in Fig. 11."""
@@ -148,11 +145,6 @@ def strobe(
     -------
     Strobe
         With a status; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above, or the hammer has no waveform or no rest state.
     """
     (points_of_train,) = strobes(
         Regime.of(hammer, **firing),
@@ -209,11 +201,6 @@ def strobes(
     -------
     list of Strobe
         One for each train.
-
-    Raises
-    ------
-    InputError
-        As for `strobe`, or numbers of hammers, periods and states that do not fit together.
     """
     count, skipped = read_count(points, "points"), read_count(transient, "transient", least=0)
     if not 1 <= firings[0] < firings[1]:

@@ -17,23 +17,19 @@ standard errors, more than the verdict asks for; where it is not, it is computed
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.orbits.settled import shown
 from printhammer.chaos.strobe.train import States, Train, exponents_of, exponents_onward, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, Verdict, period_of, verdict
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
 from printhammer.support.threads import Progress, mapped
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
 
 STAGES: Final = (32, 128)
 """Numbers of firings after which a train may count as periodic."""

@@ -6,30 +6,25 @@ States with which a train goes on where another ended, and which trains may be r
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.chaos.orbits.settled import Settled, settled
 from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
+from printhammer.derivatives.states import Exponent
+from printhammer.drive.trains import Drive
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import Ensemble
-from printhammer.run.regime import window_of
+from printhammer.run.regime import Regime, window_of
 from printhammer.run.start import AT_REST, HELD_BRANCHES, state_to_begin
 from printhammer.run.supply import current_scale
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress, mapped, shifted
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.derivatives.states import Exponent
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray, IntArray
 
 State = tuple[float, ...]
 """Displacement, m, velocity, m/s, and what belongs to a state beside them: `printhammer.run.start.Beyond`."""

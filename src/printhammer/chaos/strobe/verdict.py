@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.derivatives.states import Exponent
 from printhammer.results import Declared, part
+from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from printhammer.chaos.orbits.settled import Settled
-    from printhammer.derivatives.states import Exponent
-    from printhammer.support.arrays import FloatArray, IntArray
 
 LARGEST_PERIOD: Final = 64
 """Largest period that is looked for, in firings."""

@@ -6,25 +6,22 @@ shown so far, and nothing else of the hammer that is driven. What comes out is a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.control.feedback.controller import CONTACT, LEADS, WINDOW, Controller
 from printhammer.control.feedback.estimator.sensor import PositionSensor, Samples, run_key
 from printhammer.control.feedback.loop import Loop
+from printhammer.drive.sequence import PulseSequence
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.strategy import slot_times
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.sequence import PulseSequence
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.support.arrays import BoolArray, FloatArray
 
 _SOON: Final = 1e-6  # Least time by which a run is carried, s
 _LATER: Final = 5e-6  # By how much a new pack is put off while the armature is inside it or the old one, s

@@ -8,10 +8,12 @@ of eight slots; so does the open loop, and both fire two pulses at all distances
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
@@ -20,6 +22,7 @@ from printhammer.control.feedback.fronts import OFFSETS, STEPS
 from printhammer.control.feedback.plant import LARGEST_CURRENT, Driver, driver_of
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import WAIT, Nominal
 from printhammer.printing.dots.strategy import Strategy, name_of, open_loop, slots_of
@@ -28,18 +31,13 @@ from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.run.motion import Motion
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-    from printhammer.support.threads import Progress
 
 BURST: Final = "11101101"  # Pattern of the run that is shown
 MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
@@ -171,11 +169,6 @@ def feedback(
     -------
     Feedback
         A run that could not go on is no exception: its dots are lost.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above, or the driver is too weak for the hammer.
     """
     slot_rate = read_positive(rate, "Hz", "rate")
     time_constant = None if edge is None else read_positive(edge, "s", "edge")

@@ -7,31 +7,27 @@ soon, and brakes it before the backstop where there is time to come to rest.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.control.feedback.estimator.adaptation import Contacts
 from printhammer.control.feedback.estimator.flight import Expected, FreeForce, flight_from_samples
+from printhammer.control.feedback.estimator.sensor import Samples
 from printhammer.control.feedback.fronts import between_fronts, fronts
 from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, blend_known, force_map
 from printhammer.control.feedback.loop import APART, REMEMBERED, Loop, Printed, Pulse, Touched
-from printhammer.control.feedback.plant import Plant
+from printhammer.control.feedback.plant import Driver, Plant
 from printhammer.control.feedback.policy import KNOWN, Choice, Committed, Policy, between
 from printhammer.control.feedback.soft_landing import launch
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.feedback.estimator.sensor import Samples
-    from printhammer.control.feedback.plant import Driver
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.threads import Progress
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
 """Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,

@@ -8,19 +8,22 @@ that ends at the backstop.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
-from printhammer.control.feedback.impact_map import force_map, impact_map, place_of, released_forces
-from printhammer.control.feedback.soft_landing import Landing, soft_landing
-
-if TYPE_CHECKING:
-    from printhammer.control.feedback.impact_map import ForceMap, ImpactMap
-    from printhammer.control.feedback.plant import Plant
-    from printhammer.control.feedback.soft_landing import Launch
-    from printhammer.support.arrays import FloatArray, IntArray
-    from printhammer.support.threads import Progress
+from printhammer.control.feedback.impact_map import (
+    ForceMap,
+    ImpactMap,
+    force_map,
+    impact_map,
+    place_of,
+    released_forces,
+)
+from printhammer.control.feedback.plant import Plant
+from printhammer.control.feedback.soft_landing import Landing, Launch, soft_landing
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.threads import Progress
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)
 """By how much the fronts of the maps lie farther from the armature, in parts of the way to the pack; evenly

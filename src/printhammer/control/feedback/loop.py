@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
+from printhammer.control.feedback.plant import BoundedSequence, Driver
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Switched
-
-if TYPE_CHECKING:
-    from printhammer.control.feedback.plant import BoundedSequence, Driver
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 REMEMBERED: Final = 4  # Number of the latest pulses of which anything can be left
 APART: Final = 1e-9  # Least time between two switchings, s

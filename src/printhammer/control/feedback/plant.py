@@ -5,29 +5,25 @@ The driver of the coil that feedback needs: one that switches it between current
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Switched
 from printhammer.errors import InputError
-from printhammer.printing.dots.nominal import pulse_of
+from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.nominal import Nominal, pulse_of
 from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import Declared, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, DotTable, Ensemble, Strobes
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
-    from printhammer.support.arrays import BoolArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import BoolArray
+from printhammer.support.threads import Progress
 
 
 @dataclass(frozen=True)
@@ -122,11 +118,6 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
 
     Its time constant `edge`, s, is by default that with which the current of the hammer's own waveform
     decays. Its own rise is slower: that takes a supply of a higher voltage.
-
-    Raises
-    ------
-    InputError
-        A number is not positive, or the waveform of the hammer is a force.
     """
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":

@@ -11,17 +11,15 @@ last dot before a rest, then of the one before, and so on.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from printhammer.control.feedback.fronts import MIDDLE, OFFSETS, Fronts, between_fronts
 from printhammer.control.feedback.impact_map import FORCES, ImpactMap, bilinear, blend, place_of
-
-if TYPE_CHECKING:
-    from printhammer.printing.dots.judging import Limits
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.printing.dots.judging import Limits
+from printhammer.support.arrays import FloatArray, IntArray
 
 NEVER: Final = 50.0  # Cost of what leads nowhere
 # Standard deviation of the front, in parts of the way to the pack, above which it counts as not known

@@ -10,18 +10,16 @@ From rest to the first touch: a push, and its release before impact, so that the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from printhammer.control.feedback.impact_map import AHEAD, FREE, PUSHED, ForceMap
+from printhammer.control.feedback.plant import Plant
 from printhammer.drive.sequence import PulseSequence
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
-
-if TYPE_CHECKING:
-    from printhammer.control.feedback.plant import Plant
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 # Beginnings and widths of the brake pulses of the first grid, in flight times of the single pulse
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
@@ -124,11 +122,6 @@ def launch(plant: Plant, forces: ForceMap) -> Launch:
 
     The rest of the force comes from a short push into the pack, which can be measured out when the speed is
     known.
-
-    Raises
-    ------
-    InputError
-        No push does, with the current that there is.
     """
     driver, scale = plant.driver, plant.single.flight_time
     widths = _WIDTHS_LAUNCH * scale

@@ -13,22 +13,18 @@ them count for more from level to level; it ends at the last level that explains
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
 from printhammer.printing.rates.variability import WIDEST
-from printhammer.support.threads import together
+from printhammer.support.arrays import FloatArray
+from printhammer.support.threads import Work, together
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.support.arrays import FloatArray
-    from printhammer.support.threads import Work
-
     T = TypeVar("T")
-    # Asks for the readings of units, (M, readings), by their constants, (M, constants); NaN for lost dots.
     Search: TypeAlias = Work[FloatArray, FloatArray, T]
 
 LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)  # How much of what is not smooth in a reading counts as noise

@@ -12,20 +12,17 @@ Readings as quadratic functions of the constants of a hammer: to start a search,
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from printhammer.control.pulses import of_width
+from printhammer.control.table.task import Task
 from printhammer.drive.trains import PulseTrain
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from printhammer.control.table.task import Task
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _RIDGE: Final = 1e-3  # Of the regression: mean square of a coefficient that is nothing but noise
 

@@ -22,6 +22,7 @@ What a learner may change of a table, and within which bounds.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,7 +30,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from printhammer.control.learning.belief import Belief
+from printhammer.control.learning.ladder import Rung, Surrogate
 from printhammer.control.learning.lines import LINE
+from printhammer.control.learning.production import Production
 from printhammer.control.table.drive import (
     COLUMNS,
     histories,
@@ -39,22 +43,17 @@ from printhammer.control.table.drive import (
     shared_numbers,
     with_pulse,
 )
+from printhammer.control.table.task import Task
 from printhammer.control.table.tuning import tune
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import together
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.learning.belief import Belief
-    from printhammer.control.learning.ladder import Rung, Surrogate
     from printhammer.control.learning.lines import Press, Printing
-    from printhammer.control.learning.production import Production
-    from printhammer.control.table.task import Task
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 STEP: Final = 1e-6  # Unit of the corrections, s
 _LARGEST: Final = 25.0  # Largest change of an entry after a stage, in this unit

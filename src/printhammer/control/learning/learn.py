@@ -7,8 +7,9 @@ What a hammer prints while it learns its table.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex
+from typing import Any, NamedTuple, SupportsIndex
 
 import numpy as np
 
@@ -18,22 +19,16 @@ from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import LINE, Press, printed
 from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
 from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, with_pulse
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.judging import Judgement, Limits
 from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import together
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.control.learning.sensor import ImpactSensor
-    from printhammer.control.table.compensation import CompensationTable
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.judging import Judgement, Limits
-    from printhammer.printing.rates.variability import Variability
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 
 class Progress(NamedTuple):
@@ -209,11 +204,6 @@ def learn(
     -------
     Learning
         The table that is learned, and what the unit prints before, while and after.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above.
     """
     speed = read_positive(rate, "Hz", "rate")
     largest = read_positive(largest_current, "A", "largest_current")

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.control.learning.belief import Belief, Evidence, believe
-from printhammer.control.learning.law import BAD, RUNS
+from printhammer.control.learning.law import BAD, RUNS, LearningLaw
 from printhammer.control.learning.lines import LINE
+from printhammer.control.learning.sensor import Readings
+from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import translated
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.learning.law import LearningLaw
     from printhammer.control.learning.lines import Printing
-    from printhammer.control.learning.sensor import Readings
-    from printhammer.support.arrays import FloatArray
 
 # How well the laws of the model hold, a standard deviation in parts of the limits
 _FLOOR: Final = 0.01

@@ -6,33 +6,29 @@ together, and all of these are run as one ensemble. What a hammer prints does no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
+from printhammer.control.learning.ladder import Rung
 from printhammer.control.pulses import of_width
 from printhammer.control.table.drive import Settings, pulses_of, sequence
+from printhammer.control.table.task import Task
 from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Judgement, judge
 from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.strategy import cycle_with_lead_in, slot_times, slots_of
 from printhammer.run.ensemble import DotTable, Ensemble
-from printhammer.support.threads import answered
+from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.support.threads import Work, answered
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.learning.ladder import Rung
-    from printhammer.control.table.task import Task
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray
-    from printhammer.support.threads import Work
-
     T = TypeVar("T")
-    # Asks for what is printed.
     Printing: TypeAlias = "Work[Order, Printed, T]"
 
 _MOST: Final = 4096  # Hammers in an ensemble

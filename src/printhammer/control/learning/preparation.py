@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from collections.abc import Callable
+from typing import Any, Final, SupportsIndex
 
 import numpy as np
 
@@ -11,20 +12,16 @@ from printhammer.control.learning.law import Adjustable, LearningLaw
 from printhammer.control.learning.lines import printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, clearance, driven_by, print_pulse
 from printhammer.control.table.task import Task, single_of
 from printhammer.control.table.tuning import tune
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.threads import together
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from printhammer.control.table.compensation import CompensationTable
-    from printhammer.hammer.hammer import Hammer
 
 FORGETTING: Final = 0.02  # By default
 DOUBT: Final = 0.0  # By default

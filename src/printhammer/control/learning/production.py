@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.control.learning.ladder import Rung
 from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.table.task import Task
+from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.judging import Judgement
+from printhammer.printing.rates.variability import Variability
+from printhammer.run.ensemble import DotTable
+from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import together
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.learning.ladder import Rung
     from printhammer.control.learning.lines import Printing
-    from printhammer.control.learning.sensor import ImpactSensor
-    from printhammer.control.table.task import Task
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.judging import Judgement
-    from printhammer.printing.rates.variability import Variability
-    from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import FloatArray
 
 SCALE: Final = 0.01
 """Standard deviation that the scale of a sensor is taken to be off by, relative."""

@@ -7,15 +7,13 @@ the darkness of the dot the force. The noise depends on seed, unit and run only.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.results import Declared, part, scalar
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 
 class Readings(NamedTuple):
@@ -26,13 +24,7 @@ class Readings(NamedTuple):
 
 
 class ImpactSensor(Declared):
-    """A sensor that tells a time a dot, and a force where its noise is given.
-
-    Raises
-    ------
-    InputError
-        A number is not within its bounds, or the seed is not a whole number.
-    """
+    """A sensor that tells a time a dot, and a force where its noise is given."""
 
     noise: float = scalar("s", "standard deviation of the time of impact", default=5e-6)
     force: float | None = part(

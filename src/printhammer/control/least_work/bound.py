@@ -14,23 +14,21 @@ fall counts as its positive work, and a backstop gives back less of it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from printhammer.drive.trains import PulseTrain
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
+from printhammer.printing.dots.nominal import Nominal
 from printhammer.results import Declared, scalar
 from printhammer.run.energy import stored_energy
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import CYCLE
+from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
-    from printhammer.support.arrays import FloatArray
 
 _POINTS: Final = 4001  # Places at which energies and forces are summed up
 _CURRENTS: Final = 17  # Currents among which the strongest is sought

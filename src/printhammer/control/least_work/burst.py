@@ -13,20 +13,24 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.control.least_work.bound import Bound, bound
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import CoilForce, Task
 from printhammer.drive.input import read_count, read_number, read_positive
+from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Sampled, Waveform
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of
 from printhammer.printing.dots.settling import settled_from
 from printhammer.results import Declared, Result, Rows, part, scalar
@@ -36,21 +40,16 @@ from printhammer.results.provenance import provenance
 from printhammer.run.contacts import Contact
 from printhammer.run.energy import CoilWork, Ledger, coil_power, stored_energy
 from printhammer.run.ensemble import Ensemble
+from printhammer.run.motion import Motion
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import CYCLE, simulate
+from printhammer.support.arrays import FloatArray, IntArray, TextArray
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy.typing as npt
     import pandas as pd
 
-    from printhammer.drive.sequence import PulseSequence
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 FORCE: Final = 0.9  # Least force of an adequate dot, in parts of that of the single pulse
 SPACING: Final = 0.6
@@ -124,13 +123,7 @@ class LeastWork(Result, rows="node"):
 
     @property
     def nodes(self) -> tuple[list[float], list[float]]:
-        """Times, s, and currents, A, of the nodes, between which the current runs in straight lines.
-
-        Raises
-        ------
-        InputError
-            The burst is made of pulses, which have no nodes.
-        """
+        """Times, s, and currents, A, of the nodes, between which the current runs in straight lines."""
         if self.shape != "free":
             raise InputError(f"shape = {self.shape!r}: the current has no nodes, expected a free one")
         times, values = [0.0], [0.0]
@@ -211,13 +204,7 @@ class LeastWork(Result, rows="node"):
         return float(motion.t[min(place, motion.t.size - 1)])
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
-        """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it.
-
-        Raises
-        ------
-        InputError
-            A change is not a finite number above -1.
-        """
+        """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it."""
         factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
         if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
             raise InputError(f"changes = {changes!r}, expected relative changes of the current above -1")
@@ -296,13 +283,7 @@ class LeastWork(Result, rows="node"):
         }
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the nodes of the current.
-
-        Raises
-        ------
-        InputError
-            As for `nodes`.
-        """
+        """Return the nodes of the current."""
         times, values = self.nodes
         micros = [from_si(time, "s", "us") for time in times]
         columns = {"time [us]": (("node",), micros), "current [A]": (("node",), values)}

@@ -5,13 +5,12 @@ Each step takes its derivatives from differences, all runs of which are one ense
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from printhammer.support.arrays import FloatArray
 
 LOST: Final = 25.0  # What a run that failed counts as, in parts of the tolerances

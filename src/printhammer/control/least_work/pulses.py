@@ -7,7 +7,8 @@ do this. Pulses do not overlap: the next is not fired before the current of the 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
@@ -15,14 +16,10 @@ from printhammer.control.least_work.descent import ARRIVAL, LOST, best_of, desce
 from printhammer.control.least_work.slot import SlotState, Task, end_of
 from printhammer.control.pulses import of_width, widest
 from printhammer.drive.sequence import PulseSequence
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 GONE: Final = 1e-2  # The current of a pulse has gone where less than this part of its peak is left
 _PER_SLOT: Final = 2  # Number of pulses of a slot

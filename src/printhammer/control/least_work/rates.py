@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from printhammer.control.least_work.burst import NoBurstError, least_work
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray, TextArray
+from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 FOUND = "ok"
 NOT_FOUND = "no current found"
@@ -69,11 +66,6 @@ def least_work_rates(
     -------
     LeastWorkRates
         With a status for each rate; a rate at which no current was found is no exception.
-
-    Raises
-    ------
-    InputError
-        No rates, or as for `least_work`.
     """
     if isinstance(rates, str) or not len(rates):
         raise InputError(f"rates = {rates!r}, expected at least one rate in a sequence")

@@ -13,7 +13,8 @@ in one or another of many hollows, and the last bits of its numbers, which diffe
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
@@ -22,11 +23,7 @@ from printhammer.control.least_work.slot import RELOADING, Outcomes, SlotState, 
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.hammer.equilibrium import rest_state
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of shares of a profile
 _SPREAD: Final = 512  # Number of profiles that are spread evenly

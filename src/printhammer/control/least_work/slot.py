@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -19,12 +19,10 @@ from scipy.interpolate import RectBivariateSpline
 from printhammer.drive.base import Drive
 from printhammer.drive.segments import POLYNOMIAL, table
 from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
 from printhammer.run.ensemble import MODE_NAMES, Ensemble
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _SAMPLES: Final = 301  # Instants of a slot at which power and motion are looked at
 _IN_PACK: Final = {

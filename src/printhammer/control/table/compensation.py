@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -34,25 +35,23 @@ from printhammer.control.table.formats import (
     size_of,
 )
 from printhammer.drive.input import read_positive
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import nominal
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.support.arrays import FloatArray
 from printhammer.support.files import read_text, write_file
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import pandas as pd
 
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray
 
 # Difference of neighbouring advances from which on they belong to different ways to fire a dot, s
 JUMP: Final = 8e-6
@@ -164,11 +163,6 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         Between two rates of the table it is interpolated in the period, entry by entry. Where the two do not
         belong together, since their brake pulses differ or one fires before a rebound and the other after it,
         the nearer one holds.
-
-        Raises
-        ------
-        InputError
-            The table does not reach to this rate.
         """
         asked = read_positive(rate, "Hz", "rate")
         low, high = float(self.rates[0]), float(self.rates[-1])
@@ -251,11 +245,6 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             As for `strategy` and `at`.
         slots : sequence of int
             Numbers of the slots, ascending; slot 0 is at `printhammer.printing.dots.strategy.FIRST_SLOT`.
-
-        Raises
-        ------
-        InputError
-            As for `strategy` and `at`; or the slots do not ascend.
         """
         return self.strategy(hammer)(hammer, [tuple(slots)], read_positive(rate, "Hz", "rate"))[0]
 

@@ -5,6 +5,7 @@ All entries of a table made right: those of short histories first, since they co
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -26,20 +27,15 @@ from printhammer.control.table.drive import (
     sequence,
     shared_numbers,
 )
+from printhammer.control.table.task import Task
 from printhammer.control.table.ways import solve
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.table.drive import History
-    from printhammer.control.table.task import Task
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-
     Cells = Sequence[tuple[int, History]]
     """Entries by row and history."""
-    from collections.abc import Sequence
 
 VALUES: Final = (*COLUMNS, "deviation")  # Names of the arrays of a table
 # Length of the row of dots in every slot before a history, where it has to be right in long patterns too
@@ -79,13 +75,7 @@ class Draft:
         return Draft(self.task, self.rates[which], self.values[:, which])
 
     def table(self) -> CompensationTable:
-        """Return this as a table.
-
-        Raises
-        ------
-        InputError
-            The values make no table.
-        """
+        """Return this as a table."""
         task = self.task
         shared = shared_numbers(task.gaps, task.reach)
         return CompensationTable(

@@ -16,7 +16,8 @@ What switches the coil: the hammer's own pulse, or a fast switch on a higher rai
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
+from collections.abc import Sequence
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -25,17 +26,12 @@ from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.drivers import PeakAndHold, Rail
 from printhammer.drive.waveforms.shapes import Chain, Rectangle, Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settled_from
 from printhammer.printing.dots.strategy import slot_times
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 REST: Final = 0  # Gap of a dot that is printed from rest
 MOST_GAPS: Final = 4  # Largest number of gaps in a history
@@ -44,13 +40,7 @@ History = tuple[int, ...]
 
 
 def checked_size(gaps: int, reach: int) -> tuple[int, int]:
-    """Return number of gaps and reach.
-
-    Raises
-    ------
-    InputError
-        They are not whole numbers within bounds.
-    """
+    """Return number of gaps and reach."""
     for name, value, most in (("history", gaps, MOST_GAPS), ("reach", reach, MOST_REACH)):
         if isinstance(value, bool) or not 1 <= value <= most:
             raise InputError(f"{name} = {value!r}, expected a whole number from 1 to {most}")
@@ -93,11 +83,6 @@ def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
 
     The last one, of dots + 1, is that of a dot long after, which is printed from rest: all rest. `slots` are
     those at which dots are wanted, ascending.
-
-    Raises
-    ------
-    InputError
-        The slots do not ascend.
     """
     steps = np.diff(np.asarray(slots, np.int64))
     if (steps < 1).any():
@@ -281,13 +266,7 @@ _ROUNDS: Final = 7  # How often: each time between two neighbours of the one bef
 
 
 def checked_driver(driver: str) -> Driver:
-    """Return a driver by its name.
-
-    Raises
-    ------
-    InputError
-        There is none of that name.
-    """
+    """Return a driver by its name."""
     if driver not in DRIVERS:
         raise InputError(f"driver = {driver!r}, expected {', '.join(DRIVERS[:-1])} or {DRIVERS[-1]}")
     return driver  # type: ignore[return-value]
@@ -318,13 +297,7 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
 
 
 def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
-    """Return a hammer fired by a pulse of such a width, between two, s, that the dot has a force, N.
-
-    Raises
-    ------
-    InputError
-        There is none.
-    """
+    """Return a hammer fired by a pulse of such a width, between two, s, that the dot has a force, N."""
     for _ in range(_ROUNDS):
         widths = np.linspace(low, high, _GRID).tolist()
         pulses = [of_width(pulse, width) for width in widths]

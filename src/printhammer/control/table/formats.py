@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -27,16 +28,14 @@ from printhammer.control.table.drive import (
     shared_numbers,
 )
 from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 from printhammer.support.c_code import comment, identifier, nested, numbers
 from printhammer.support.constants import shown
 from printhammer.support.sheets import sheet_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     Head = dict[str, Any]
     Rows = list[dict[str, Any]]
-    from printhammer.support.arrays import FloatArray
 
 FORMAT: Final = 1  # Version of the CSV format, and of the JSON files of former versions
 KIND: Final = "printhammer compensation table"  # What the first line of a CSV file says

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Sequence
+from typing import Any, Final
 
 import numpy as np
 
+from printhammer.control.table.compensation import CompensationTable
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import LEAD_IN, Strategy, cycle_with_lead_in, open_loop, slots_of
@@ -16,13 +19,7 @@ from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.control.table.compensation import CompensationTable
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 PERTURBATIONS: Final = (
     Perturbation(),

@@ -12,11 +12,13 @@ of them lead away from the single pulse, dot by dot, and others back to it. So t
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from printhammer.control.table.compensation import JUMP
+from printhammer.control.table.task import Task
 from printhammer.control.table.ways import (
     LEAST_OF_OWN,
     Ways,
@@ -28,12 +30,7 @@ from printhammer.control.table.ways import (
     solved,
     ways_of,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.table.task import Task
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 # Between the times at which all ways are looked for; between them those of the neighbours are tried, s
 SPACING: Final = 30e-6

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.control.table.drive import fading
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.drive.waveforms.chain import TAIL
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.settling import settled_from, touches
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.judging import Limits
-    from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, in parts of the way to the pack
 QUIET: Final = 2e-4
@@ -46,13 +43,7 @@ class Single:
 
 
 def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
-    """Fire a hammer once from rest.
-
-    Raises
-    ------
-    InputError
-        It makes no dot, or does not come back to rest.
-    """
+    """Fire a hammer once from rest."""
     known = nominal(hammer, pulse, tolerance=tolerance)
     times = np.arange(0.0, _LONGEST, _SAMPLE)
     motion = simulate(hammer, PulseTrain(pulse), duration=_LONGEST, times=times, tolerance=tolerance)

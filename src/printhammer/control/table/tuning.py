@@ -5,11 +5,13 @@ Rates between the rates of a table: where the table is no good there, more rates
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final, SupportsIndex
+from typing import Final, SupportsIndex
 
 import numpy as np
 
+from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.draft import Draft, blank, polish
 from printhammer.control.table.drive import (
     LARGEST_CURRENT,
@@ -26,17 +28,11 @@ from printhammer.control.table.task import Single, Task, single_of
 from printhammer.control.table.ways import ROUNDS, costs, solved, ways_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
-from printhammer.printing.rates.variability import Perturbation, perturbed
+from printhammer.printing.rates.variability import Perturbation, Variability, perturbed
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.control.table.compensation import CompensationTable
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.rates.variability import Variability
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 HALVINGS: Final = 3  # How often the step between two rates is halved at most
 # Deviation between two rates, in parts of the limits, from which on there is one more between them
@@ -196,12 +192,6 @@ def tune(
     -------
     CompensationTable
         With the worst deviation of each entry; it is not promised to be within the limits.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a hammer that does not print or does not settle; a rate at
-        which no pulse prints a dot one slot after another.
     """
     gaps, far = checked_size(read_count(history, "history"), read_count(reach, "reach"))
     bounds = Limits() if limits is None else limits

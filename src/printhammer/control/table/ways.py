@@ -5,26 +5,21 @@ Newton's method for firing time and width of many dots at once, so that force an
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from printhammer.control.table.drive import Pulses, sequence
+from printhammer.control.table.task import Task
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.hammer.hammer import Hammer
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-
     Measure = Callable[[FloatArray, IntArray, FloatArray], FloatArray]
     Bounded = Callable[[FloatArray, IntArray, BoolArray], None]
-    from collections.abc import Iterable, Sequence
-
-    from printhammer.control.table.task import Task
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 ROUNDS: Final = 7  # Largest number of steps
 LONGEST_STEP: Final = 25e-6  # Longest change of firing time or width in one step, s

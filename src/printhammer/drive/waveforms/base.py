@@ -5,16 +5,13 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, Self
 
+import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from printhammer.drive.segments import evaluate, largest
 from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantities, sentence
-
-if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
 
 QuantityName = Literal["current", "force", "voltage"]
 QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force", "V": "voltage"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -12,9 +12,7 @@ from printhammer.drive.input import read_number
 from printhammer.drive.segments import evaluate, largest, table
 from printhammer.drive.waveforms.base import Supply, Waveform
 from printhammer.errors import InputError
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 TAIL: Final = 1e-3
 """What may be cut off of a decaying part where the next one begins, in parts of its peak."""

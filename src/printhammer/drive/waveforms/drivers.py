@@ -9,16 +9,14 @@ against a voltage, and once it is zero it stays zero until the coil would drive 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from printhammer.drive.segments import DECAY, RESERVOIR, SWITCHED, table
 from printhammer.drive.waveforms.base import QuantityName, Supply, Waveform
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity as measured
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
 
 DIODE = 0.7
 """Voltage of a silicon diode, V."""

@@ -5,25 +5,21 @@ Records of a measured current or force: checked samples, and CSV files with unit
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Self
+from pathlib import Path
+from typing import Any, ClassVar, Final, Literal, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from printhammer.drive.segments import POLYNOMIAL, table
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName, Waveform
 from printhammer.errors import InputError, located
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import folder_of
 from printhammer.support.sheets import finite, read_sheet, split_heading
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import FloatArray
 
 _UNITS: Final = {name: si for si, name in QUANTITY_UNITS.items()}
 _HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
@@ -144,11 +140,6 @@ class Sampled(Waveform):
     shape-preserving cubic (PCHIP: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238, with the slopes
     of Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300), once continuously differentiable and
     without overshoot, or a straight line.
-
-    Raises
-    ------
-    InputError
-        The file or the samples cannot be used.
     """
 
     shape: ClassVar[str] = "sampled"

@@ -8,7 +8,7 @@ a measured record. `SHAPES` maps the word in a file to the class.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, Final, Self
+from typing import ClassVar, Final, Self
 
 from printhammer.drive.segments import EXPONENTIAL, POLYNOMIAL, SINE, table
 from printhammer.drive.waveforms.base import DECAY_TIMES, QUANTITY_UNITS, QuantityName, Waveform
@@ -16,10 +16,8 @@ from printhammer.drive.waveforms.chain import Chain
 from printhammer.drive.waveforms.drivers import DRIVERS
 from printhammer.drive.waveforms.sampled import Sampled
 from printhammer.drive.waveforms.switched import Switched
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
 
 __all__ = [
     "DECAY_TIMES",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self
 
 from pydantic import model_validator
 
@@ -18,10 +18,8 @@ from printhammer.drive.input import read_number
 from printhammer.drive.segments import EXPONENTIAL, table
 from printhammer.drive.waveforms.base import DECAY_TIMES, QUANTITY_UNITS, Waveform
 from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity
-
-if TYPE_CHECKING:
-    from printhammer.support.arrays import FloatArray
 
 _KEPT: Final = 256
 
@@ -40,11 +38,6 @@ class Switched(Waveform):
         Time constant of the edges, s.
     initial : float
         Value at the firing, A or N, which is 0 unless a run begins within a pulse.
-
-    Raises
-    ------
-    InputError
-        A value is not what is described above.
     """
 
     shape: ClassVar[str] = "switched"

@@ -7,9 +7,13 @@ The quench map: where the second dot is lost and how high the hammer comes; else
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.map_marks import edges
@@ -19,12 +23,6 @@ from printhammer.figures.elements.style import BLUE, INK, MUTED, ORANGE, SMALL, 
 from printhammer.figures.paper.motion import DELAYS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-
     from printhammer.chaos.basins.basins import Basins
     from printhammer.chaos.basins.quench import QuenchMap
     from printhammer.chaos.orbits.manifolds import Manifolds

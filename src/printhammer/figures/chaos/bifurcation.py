@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal
+from collections.abc import Iterable
+from typing import Any, Final, Literal
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.chaos.bifurcation.diagram import Bifurcation, cells, hysteresis
 from printhammer.errors import InputError
@@ -13,14 +16,7 @@ from printhammer.figures.elements.marks import dots, legend_below, note
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.hammer.names import PERIOD
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 SHADES: Final = {
     "period-1": style.BLUE,

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import legend_in_columns
 from printhammer.figures.elements.style import new_panel, sign, styled
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.regimes import Branches
-    from printhammer.support.arrays import FloatArray
 
 _COLOURS: Final = {1: style.BLUE, 2: style.ORANGE, 3: style.GREEN, 4: style.YELLOW}
 _SHOWN: Final = {
@@ -64,11 +62,6 @@ def plot(
         Whether grazings are marked beside folds, period doublings and the like.
     limits : tuple of float, optional
         Ends of the upward axis, SI.
-
-    Raises
-    ------
-    InputError
-        There is nothing to draw, or no such quantity.
     """
     drawn: list[Branch] = list(getattr(branches, "found", [branches]))
     if not drawn:

@@ -8,6 +8,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from printhammer.errors import InputError
 from printhammer.figures.chaos.continuation import axis_of
@@ -16,10 +19,6 @@ from printhammer.figures.elements.marks import legend_in_columns
 from printhammer.figures.elements.style import new_panel, sign, styled
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.patches import Patch
-
     from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve
     from printhammer.chaos.curves.stability_chart import StabilityChart
 
@@ -108,11 +107,6 @@ def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
     attractors : bool, optional
         Whether the plane is coloured by what trains from rest settle to, where that is known: see `grid` of
         `printhammer.bifurcation_curve`.
-
-    Raises
-    ------
-    InputError
-        The curve has fewer than two points.
     """
     from matplotlib.lines import Line2D
 

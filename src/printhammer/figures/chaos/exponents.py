@@ -10,10 +10,20 @@ Recurrence plots with what is counted in them.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from printhammer.chaos import (
+    CorrelationDimension,
+    FiniteTime,
+    Lyapunov,
+    LyapunovChart,
+    Recurrence,
+    ZeroOne,
+)
 from printhammer.chaos.exponents.zero_one import CHAOTIC, REGULAR
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements import style
@@ -30,20 +40,7 @@ from printhammer.figures.elements.style import (
     sign,
     styled,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.chaos import (
-        CorrelationDimension,
-        FiniteTime,
-        Lyapunov,
-        LyapunovChart,
-        Recurrence,
-        ZeroOne,
-    )
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _COLOURS: Final = (style.BLUE, style.ORANGE)
 _SIGMAS: Final = 3.0

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from printhammer.chaos.orbits.collection import Orbits
+from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.strobe.points import strobe as strobed
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import shown_period
@@ -22,16 +26,9 @@ from printhammer.figures.elements.marks import (
 )
 from printhammer.figures.elements.scales import Scale, label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.chaos.orbits.collection import Orbits
-    from printhammer.chaos.orbits.orbit import Orbit
-    from printhammer.run.motion import Motion
-    from printhammer.run.regime import Regime
-    from printhammer.support.arrays import FloatArray
+from printhammer.run.motion import Motion
+from printhammer.run.regime import Regime
+from printhammer.support.arrays import FloatArray
 
 POINTS: Final = 600
 """Strobe points below the orbits, after a third as many firings that are left out."""
@@ -72,11 +69,6 @@ def plot_orbit(orbit: Orbit) -> Figure:
     """Draw one orbit: its curve in the plane of displacement and velocity, and displacement against time.
 
     Marks are the states at the firings.
-
-    Raises
-    ------
-    InputError
-        There is no such orbit.
     """
     if not orbit.ok:
         raise InputError(f"orbit: expected one that there is, not {orbit.name}: {orbit.status}")

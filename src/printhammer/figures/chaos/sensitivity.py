@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from printhammer.derivatives.sensitivities import Sensitivities
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import beside, heading, note
 from printhammer.figures.elements.style import new_figure, sign, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.derivatives.sensitivities import Sensitivities
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")
 """Quantities drawn unless told otherwise."""
@@ -45,11 +41,6 @@ def plot(
         Quantities of a dot or of the run, one panel each.
     bars : int, optional
         Largest number of constants in a panel.
-
-    Raises
-    ------
-    InputError
-        There is no such dot, it is lost, or a quantity is not known.
     """
     if bars < 1:
         raise InputError(f"bars = {bars}, expected at least 1")

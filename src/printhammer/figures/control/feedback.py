@@ -5,20 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import dashed, dots, heading
 from printhammer.figures.elements.scales import scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
 from printhammer.figures.elements.timeline import between_surfaces, current_between
+from printhammer.support.arrays import FloatArray
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from printhammer.control.feedback.comparison import Feedback
-    from printhammer.support.arrays import FloatArray
 
 _COLOURS: Final = (style.ORANGE, style.YELLOW, style.GREEN)
 _MARKS: Final = ("s", "^", "D")

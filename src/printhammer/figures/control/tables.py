@@ -5,10 +5,14 @@ What a hammer prints before, while and after it learns its table.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from printhammer.control.learning.learn import Learning
+from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import REST, gap_text, histories, number_of
 from printhammer.control.table.report import STRATEGIES, TableReport
 from printhammer.figures.elements import style
@@ -17,15 +21,8 @@ from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import foot, new_figure, sign, styled
 from printhammer.printing.dots.strategy import LEAD_IN
 from printhammer.printing.rates.quality import PITCH
+from printhammer.support.arrays import FloatArray
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.control.learning.learn import Learning
-    from printhammer.control.table.compensation import CompensationTable
-    from printhammer.support.arrays import FloatArray
 
 _FEW: Final = 4
 _LINES: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)

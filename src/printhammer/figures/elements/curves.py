@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from printhammer.drive.waveforms.shapes import Waveform
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.motion import Motion
-    from printhammer.support.arrays import FloatArray
 
 SETTLED: Final = 0.01
 """Part of the stroke within which the armature counts as settled in a figure."""
@@ -25,13 +24,7 @@ _PER_PIECE: Final = 60
 
 
 def waveform_of(hammer: Hammer) -> Waveform:
-    """Return the standard waveform of a hammer.
-
-    Raises
-    ------
-    InputError
-        It has none.
-    """
+    """Return the standard waveform of a hammer."""
     if hammer.waveform is None:
         raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
     return hammer.waveform
@@ -41,11 +34,6 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
     """Return the motion of a hammer whose waveform is fired at given times, s.
 
     The run ends at `duration`, s, or text with a unit; by default as that of `printhammer.simulate`.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.simulate import simulate

@@ -6,23 +6,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements.marks import ALONG_Y, beside, legend_above
 from printhammer.figures.elements.scales import Scale, scale
 from printhammer.figures.elements.style import HAIR, INK, MUTED, ORANGE, SMALL, foot
+from printhammer.hammer.hammer import Hammer
 from printhammer.maps.layout import failed_rates, places_of
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.collections import QuadMesh
-    from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 COLOURS: Final = "viridis"
 """Perceptually uniform, and told apart by the colour-blind (N. Smith and S. van der Walt, 2015)."""
@@ -62,13 +61,7 @@ def chart_of(
 
 
 def drawable(chart: xr.Dataset) -> xr.Dataset:
-    """Return a map that has an axis of time.
-
-    Raises
-    ------
-    InputError
-        It has fewer than two times.
-    """
+    """Return a map that has an axis of time."""
     if chart["time"].size < 2:
         raise InputError(f"the map has {chart['time'].size} times, expected at least 2 to draw it")
     return chart

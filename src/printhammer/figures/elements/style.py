@@ -9,21 +9,18 @@ The kind of all figures: one of matplotlib's that a notebook shows, although pyp
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from functools import wraps
 from io import BytesIO
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final, Literal, ParamSpec
 
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from contextlib import AbstractContextManager
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from printhammer.hammer.hammer import Hammer
 
 _P = ParamSpec("_P")
@@ -113,7 +110,6 @@ def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
 def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:
     """Return an empty figure, sizes in inches, whose axes will be laid out without overlap; or by hand."""
-
     figure = Picture(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
     figure.settings = RC
     return figure

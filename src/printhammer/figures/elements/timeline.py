@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.figures.elements import marks, style
 from printhammer.figures.elements.curves import places, times_of
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_figure, sign, styled, with_strip
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.motion import Motion
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.motion import Motion
 
 _COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN)
 _HEADROOM: Final = 0.08

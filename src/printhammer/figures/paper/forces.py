@@ -8,9 +8,11 @@ Figure 10: the phase plane of the armature after a single pulse.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import fired, orbit, places, shown_until, times_of
@@ -40,14 +42,9 @@ from printhammer.figures.elements.style import (
     styled,
     with_strip,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.motion import Motion
-    from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.motion import Motion
+from printhammer.support.arrays import BoolArray, FloatArray
 
 
 @styled

@@ -11,23 +11,22 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from printhammer.figures.elements import map_marks
 from printhammer.figures.elements.marks import beside, heading
+from printhammer.figures.elements.scales import Scale
 from printhammer.figures.elements.style import BLUE, HAIR, INK, MUTED, SMALL, new_figure, new_panel, styled
+from printhammer.hammer.hammer import Hammer
 from printhammer.maps.frequency import rms_difference
 from printhammer.maps.layout import places_of
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.figures.elements.scales import Scale
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 
 @styled
@@ -289,11 +288,6 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     Maps are those of `printhammer.frequency_map` and `printhammer.maps.measured.load_measured_map`. In the
     third panel, "difference" is the gid of the root mean square over time, for every rate that both have; in
     grey areas the displacement is not known.
-
-    Raises
-    ------
-    InputError
-        A map has fewer than two times.
     """
     for chart in (computed, measured):
         map_marks.drawable(chart)

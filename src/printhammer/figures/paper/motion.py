@@ -9,7 +9,10 @@ Any motion against time: displacement with the places of the hammer, firings, an
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
+
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements.curves import fired, shown_until
@@ -17,16 +20,10 @@ from printhammer.figures.elements.marks import beside
 from printhammer.figures.elements.scales import scale
 from printhammer.figures.elements.style import INK, in_style
 from printhammer.figures.elements.timeline import timeline
+from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain
+from printhammer.run.motion import Motion
 from printhammer.units import from_si, parse
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.figure import Figure
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain
-    from printhammer.run.motion import Motion
 
 
 def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
@@ -82,11 +79,6 @@ def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | 
         Result of a search made before.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform, pack, backstop or rest state.
     """
     from printhammer.printing.dots.buzz import find_buzz_train
 
@@ -142,11 +134,6 @@ def plot(motion: Motion, *, until: float | str | None = None, heading: str = "")
         End of the time axis, s, or text with a unit; by default the end of the motion.
     heading : str, optional
         What is shown, written above the panel.
-
-    Raises
-    ------
-    InputError
-        `until` is not a positive time.
     """
     end = parse(until, "s") if isinstance(until, str) else until
     if end is None:

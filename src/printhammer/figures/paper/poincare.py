@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Final, Literal
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
@@ -12,16 +16,11 @@ from printhammer.figures.elements.curves import waveform_of
 from printhammer.figures.elements.marks import note
 from printhammer.figures.elements.scales import Scale, label
 from printhammer.figures.elements.style import INK, SMALL, new_figure, sign, styled
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.scheme_runs import Reading, Scheme
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from printhammer.chaos import Strobe
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.scheme_runs import Reading, Scheme
 
 PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
 """Strobe times of the panels, s: from 1.35 ms down to 0.80 ms."""

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
@@ -12,15 +15,8 @@ from printhammer.figures.elements.curves import places, reach
 from printhammer.figures.elements.marks import curve, place_lines
 from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_panel, sign, styled
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.hammer.hammer import Hammer
+from printhammer.support.arrays import FloatArray
 
 CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
 """Currents of the paper's Fig. 2, A."""

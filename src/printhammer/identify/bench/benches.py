@@ -17,12 +17,16 @@ current
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce, law_of
+from printhammer.identify.bench.sensor import Sensor
 from printhammer.identify.coil import check_driver, probe_current
 from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_constant
 from printhammer.parts.backstop._hertz import damping_from_restitution
@@ -30,15 +34,7 @@ from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.results import Declared, part
 from printhammer.run.simulate import CYCLE, simulate
 from printhammer.run.supply import typical_current
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.bench.sensor import Sensor
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 DISPLACEMENTS: Final = 31
 """Places at which the armature is held, from the backstop to the platen."""

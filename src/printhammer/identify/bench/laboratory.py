@@ -7,11 +7,14 @@ numbers, so that none disturbs another.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.identify.bench.benches import BENCHES
 from printhammer.identify.bench.sensor import (
     FULL_SCALE,
@@ -24,14 +27,10 @@ from printhammer.identify.bench.sensor import (
     wrong_rows,
 )
 from printhammer.results import Column, Result, part, scalar
+from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import FloatArray, IntArray
 
 KINDS: Final = tuple(BENCHES)
 """What can be measured."""
@@ -119,13 +118,7 @@ class Measurement(Result):
         return "\n".join(lines) + "\n"
 
     def write(self, path: str | Path) -> None:
-        """Write the table as CSV.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written.
-        """
+        """Write the table as CSV."""
         from printhammer.support.files import write_file
 
         write_file(path, self.to_csv())

@@ -14,18 +14,14 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 FULL_SCALE: Final = "of full scale"
 READING: Final = "of reading"
@@ -45,13 +41,7 @@ class Amount:
 
     @classmethod
     def read(cls, text: str | float, si: str, name: str, *, signed: bool = False) -> Amount:
-        """Read a quantity such as "0.2 um", "0.5 %" (of full scale) or "1 % of reading", or a number in SI.
-
-        Raises
-        ------
-        InputError
-            It is none, of another dimension, or negative.
-        """
+        """Read a quantity such as "0.2 um", "0.5 %" (of full scale), "1 % of reading", or a number in SI."""
         of = ""
         if isinstance(text, str) and "%" in text:
             share, _percent, tail = text.partition("%")
@@ -196,13 +186,13 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
     if settings.get("exact"):
         sensor = sensor.exact()
     channels = dict(sensor.channels)
-    for part in PARTS:
-        for name, written in _quantities(part, settings.get(part)).items():
+    for role in PARTS:
+        for name, written in _quantities(role, settings.get(role)).items():
             if name not in channels:
                 known = ", ".join(channels)
-                raise InputError(f"{part}: the quantity {name!r} is not measured, expected one of {known}")
-            amount = Amount.read(written, units[name], f"{part} of {name}", signed=part == "offset")
-            channels[name] = replace(channels[name], **{part: amount})
+                raise InputError(f"{role}: the quantity {name!r} is not measured, expected one of {known}")
+            amount = Amount.read(written, units[name], f"{role} of {name}", signed=role == "offset")
+            channels[name] = replace(channels[name], **{role: amount})
     changes: dict[str, Any] = {"channels": channels}
     for name, read in _READ.items():
         if settings.get(name) is not None:
@@ -215,10 +205,10 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings that are about what a sensor has: its quantities, and records if it makes them."""
     kept = dict(settings)
-    for part in PARTS:
-        if part in kept:
-            amounts = _quantities(part, kept[part])
-            kept[part] = {name: value for name, value in amounts.items() if name in sensor.channels}
+    for role in PARTS:
+        if role in kept:
+            amounts = _quantities(role, kept[role])
+            kept[role] = {name: value for name, value in amounts.items() if name in sensor.channels}
     if sensor.sampling_rate is None:
         kept = {name: value for name, value in kept.items() if name not in ("sampling_rate", "bandwidth")}
     return kept

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,14 +17,11 @@ from printhammer.errors import InputError, located
 from printhammer.hammer.file import FORMAT
 from printhammer.hammer.hammer import Hammer
 from printhammer.identify.datasheet.magnet import Sheet, SheetMagnet, fit_magnet
-from printhammer.identify.datasheet.sheet import plain
+from printhammer.identify.datasheet.sheet import DataSheet, plain
 from printhammer.parts.magnet import reluctance as law
 from printhammer.support.constants import quantities, shown
 from printhammer.support.roots import bisect
 from printhammer.units import split
-
-if TYPE_CHECKING:
-    from printhammer.identify.datasheet.sheet import DataSheet
 
 RESTITUTION: Final = 0.3
 """Of a stop whose sheet does not tell: steel on steel with a thin film between."""

@@ -9,18 +9,15 @@ less uncertain than its guess was is derived; another one is assumed.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from printhammer.parts.magnet import reluctance as law
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 FORCE_ERROR: Final = 0.03
 """Relative error of a printed force."""

@@ -6,18 +6,15 @@ corrected by what each stretch by itself shows, before errors can grow from cont
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.shots.shooting import Chain, Shooting
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.identify.shots.shooting import Chain, Shooting
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0
 """Price of gaps at first: those of so many times the largest gap cost as much as all data together."""

@@ -10,8 +10,9 @@ What records of motion can and cannot tell: degenerate constants, weak ones, fur
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -19,13 +20,9 @@ from printhammer.errors import InputError
 from printhammer.identify.least_squares import memory_factor, outliers_of, spikes_of
 from printhammer.identify.result import Profile, student
 from printhammer.identify.shots.approach import Approach, Prior, Priors, largest_gap
+from printhammer.identify.shots.shooting import Chain, Shooting
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.identify.shots.shooting import Chain, Shooting
-    from printhammer.support.arrays import BoolArray, FloatArray
+from printhammer.support.arrays import BoolArray, FloatArray
 
 _DEGENERATE: Final = 1e5
 """Condition number from which on difference quotients no longer tell the columns of a Jacobian apart."""
@@ -59,11 +56,6 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     """Refuse constants that can change together without any change of the motion.
 
     `where` names the files; the design is the Jacobian over the standard errors of the data, shape (m, p).
-
-    Raises
-    ------
-    InputError
-        There are such constants; the sentence names them.
     """
     sizes = np.sqrt((design * design).sum(axis=0))
     blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
@@ -179,13 +171,7 @@ class GaussNewton:
         self.floor = _FLOOR * shooting.stroke
 
     def design(self, values: FloatArray, states: Sequence[FloatArray]) -> FloatArray:
-        """Return the rows of data and priors over their standard errors, shape (m, p), at some values.
-
-        Raises
-        ------
-        InputError
-            There is no motion to compare the records with.
-        """
+        """Return the rows of data and priors over their standard errors, shape (m, p), at some values."""
         chains = self.shooting.chains(values, states, derivatives=True)
         if chains is None:
             raise InputError(_NO_MOTION)
@@ -203,11 +189,6 @@ class GaussNewton:
 
         Parameters that are held stay where they are. With the noise of a solution near by its outliers are
         taken as known too.
-
-        Raises
-        ------
-        InputError
-            There is none near.
         """
         scales = self.shooting.parameters.scales
         # A profile begins where all is near.

@@ -7,13 +7,15 @@ forces only over the mass: if the mass and all forces are multiplied by one numb
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError, located, nearest
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.uncertainty import Uncertainty
 from printhammer.identify.lowpass import time_constant
 from printhammer.identify.result import REPLACED, Fit, FittedConstant
@@ -29,12 +31,7 @@ from printhammer.identify.shots.gauss_newton import (
 from printhammer.identify.shots.notes import further, remembered, rests, tested
 from printhammer.identify.shots.shooting import Parameters, Shooting
 from printhammer.identify.shots.shot import FEWEST, Pulse, Shot, fit_pulse, read_shot
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _DAMPING: Final = "backstop.damping"
 _FIRST_GUESS: Final = 0.3

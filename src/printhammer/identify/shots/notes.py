@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
-from printhammer.identify.shots.gauss_newton import would_be_found
+from printhammer.hammer.hammer import Hammer
+from printhammer.identify.shots.gauss_newton import GaussNewton, Solution, would_be_found
 from printhammer.identify.shots.shooting import Parameters, Shooting
 from printhammer.identify.shots.shot import FEWEST, Shot
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.shots.gauss_newton import GaussNewton, Solution
 
 _REJECTED: Final = 0.01
 """Probability below which the model is rejected."""

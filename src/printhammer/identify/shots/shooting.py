@@ -9,24 +9,20 @@ Chemical Reaction Systems, Springer 1981, 102), so that a step costs no more tha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.hammer import Hammer
 from printhammer.identify.lowpass import lowpass_motion, time_constant
-from printhammer.identify.shots.shot import Shot, stroke_of
+from printhammer.identify.shots.shot import Pulse, Shot, stroke_of
 from printhammer.run.ensemble import Ensemble
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.identify.shots.shot import Pulse
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 _STEP: Final = 1e-7
 """Change for a difference quotient: relative of a constant, of a state in strokes and typical speeds."""

@@ -8,27 +8,24 @@ The current of a recorded shot: the waveform of the hammer fitted to it, or the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final, Literal
+from pathlib import Path
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from printhammer.drive.segments import evaluate
 from printhammer.drive.waveforms.shapes import Sampled, Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.identify.least_squares import noise_of_record, outliers_of, robust_scale, running_median
 from printhammer.identify.lowpass import bandwidth_of, lowpass_waveform
 from printhammer.identify.tables import read_table
 from printhammer.results import Declared, part, scalar
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.constants import quantities
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray, IntArray
 
 Surface = Literal["pack", "backstop"]
 
@@ -275,11 +272,6 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
     The record has times, s, ascending, of which the firing is 0, and currents, A, both of shape (n,); the
     waveform has constants near which to look, and `tau` is the time constant of the sensor, s. Messages begin
     with `where`.
-
-    Raises
-    ------
-    InputError
-        The record shows no current.
     """
     noise = noise_of_record(current)
     top = float(np.percentile(np.abs(current[t >= 0.0]), 98.0)) if (t >= 0.0).any() else 0.0

@@ -6,21 +6,17 @@ What residuals say of a law: a test against richer laws, a runs test, constants 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import NoSolutionError, Solution, lengths_of, sandwich, solve
+from printhammer.identify.least_squares import Law, NoSolutionError, Solution, lengths_of, sandwich, solve
 from printhammer.identify.result import Fit, FittedConstant, Profile, student
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from printhammer.identify.least_squares import Law, Solution
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 LEVEL: Final = 0.01
 """A law is said to be rejected where its data have less than this probability."""
@@ -283,13 +279,7 @@ def _crossing(values: FloatArray, increase: FloatArray, level: float, never: flo
 
 
 def enough(data: Data, needed: int, what: str) -> None:
-    """Refuse data with fewer rows than a fit needs.
-
-    Raises
-    ------
-    InputError
-        Names the file, the number of rows and the number expected.
-    """
+    """Refuse data with fewer rows than a fit needs."""
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
         raise InputError(f"{where}: {len(data.values)} rows, too few for {what}, expected {needed} or more")

@@ -17,23 +17,20 @@ stiffness.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.least_squares import Solution
 from printhammer.identify.result import Fit, FittedConstant
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
 from printhammer.identify.tables import read_table
 from printhammer.parts.backstop._hertz import damping_from_restitution, stiffness_from_bodies
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from printhammer.identify.least_squares import Solution
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _SERIES: Final = (1.0, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225)
 """y / z in powers of z, from the law by comparing coefficients."""
@@ -133,11 +130,6 @@ class Stiffness:
             Young's moduli of both and their standard errors, Pa.
         ratios : sequence of tuple
             Poisson ratios of both and their standard errors.
-
-        Raises
-        ------
-        InputError
-            The number of values is another, or one is out of range.
         """
         for name, pairs, counts in (
             ("radius", radii, (1, 2)),

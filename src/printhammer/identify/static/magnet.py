@@ -11,21 +11,17 @@ The force of magnet and spring together, equations (3) and (4), as a law to be f
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
 from printhammer.identify.static.spring import start_of as spring_start
 from printhammer.identify.tables import Readings, read_table
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Readings
-    from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import FloatArray, IntArray
 
 
 class TotalLaw:

@@ -13,23 +13,19 @@ Load cycles of a pack: which rows are loading, which unloading, and whether the 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.identify.least_squares import NoSolutionError, Solution, robust_scale, solve
+from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
 from printhammer.identify.tables import Readings, read_table
 from printhammer.results import Declared, part
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.units import from_si
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.identify.result import Fit
-    from printhammer.identify.tables import Readings
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _TURN: Final = 0.05
 """Part of the largest indentation by which it has to turn back before the sense counts as changed."""

@@ -9,20 +9,17 @@ their logarithms, so that each row counts by its relative error.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, solved
 from printhammer.identify.tables import read_table
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet, magnet_force, magnet_linkage
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.identify.result import Fit
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 CONSTANTS: Final = {
     "pole_area": "m^2",

@@ -7,19 +7,15 @@ Data: the columns ``displacement``, ``force``, the spring alone, positive toward
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
 from printhammer.identify.tables import read_table
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.identify.result import Fit
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 _ROWS = 5
 
@@ -90,13 +86,7 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
 
 
 def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
-    """Return Bs and As of a line that half of the rows may lie off.
-
-    Raises
-    ------
-    InputError
-        The line does not fall, or is not positive at the backstop.
-    """
+    """Return Bs and As of a line that half of the rows may lie off."""
     from scipy.stats import theilslopes
 
     slope, height = (float(part) for part in theilslopes(force, travel)[:2])

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
@@ -14,9 +16,6 @@ from printhammer.support.constants import folder_of
 from printhammer.support.sheets import finite, read_sheet, split_heading
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-    from pathlib import Path
-
     from printhammer.support.arrays import FloatArray
 
 UNITS: Final = {"force": "N", "linkage": "Wb"}
@@ -159,13 +158,7 @@ def cell_at_zero(table: Grid) -> tuple[int, float]:
 
 
 class GridMagnet(MagnetPart):
-    """A magnet whose law is the spline through a table read from a CSV file.
-
-    Raises
-    ------
-    InputError
-        The file or its grid cannot be used.
-    """
+    """A magnet whose law is the spline through a table read from a CSV file."""
 
     quantity: ClassVar[str]
     """What the table holds, a key of `UNITS`."""
@@ -206,11 +199,6 @@ class GridMagnet(MagnetPart):
             Forces, N, or flux linkages, Wb, shape (len(x), len(current)).
         file : str, optional
             File name, only remembered.
-
-        Raises
-        ------
-        InputError
-            If the arrays do not make a grid.
         """
         what = f"{cls.quantity} table"
         if len(values) != len(x) or any(len(line) != len(current) for line in values):

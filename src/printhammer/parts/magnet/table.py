@@ -162,13 +162,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 @register
 class TableMagnet(GridMagnet):
-    """Force table read from a CSV file.
-
-    Raises
-    ------
-    InputError
-        The file or its grid cannot be used.
-    """
+    """Force table read from a CSV file."""
 
     law: ClassVar[str] = "table"
     quantity: ClassVar[str] = "force"

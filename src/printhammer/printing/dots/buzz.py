@@ -12,24 +12,21 @@ backstop once before the dots that count, and settles into the buzz afterwards.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final, Literal
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.printing.dots.settling import touches
 from printhammer.results import Declared, part
 from printhammer.run.ensemble import DotTable, Ensemble
+from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.motion import Motion
-    from printhammer.support.arrays import BoolArray
+from printhammer.support.arrays import BoolArray
 
 MAX_CURRENT: Final = 2.0  # Largest coil current of a train, A: the range of the paper's Fig. 2
 
@@ -194,11 +191,6 @@ def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[
     """Return firing times, s, of which each but the first follows the leaving of the pack by a delay, s.
 
     There are fewer firings than `pulses` where one of them makes no dot, so that no leaving follows it.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform or no rest state.
     """
     leaving = _leaving(_run(hammer, [0.0], None))
     return (0.0,) if leaving is None else delayed_trains([hammer], [delay], [PATIENCE * leaving], pulses)[0]

@@ -7,20 +7,17 @@ second ones, and so on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from printhammer.drive.trains import Drive
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, column
 from printhammer.run.ensemble import DotTable, Ensemble
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 20
 """Extra contacts of one firing that are looked at; what a hammer that chatters on the pack adds is next to

@@ -5,19 +5,16 @@ How far a dot may be off: limits on force, arrival and extra contacts.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.results import Declared, column, part
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.run.ensemble import DotTable
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.run.ensemble import DotTable
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
 """What may be wrong with a wanted dot, in the order of the search; "not run": the run ended before."""
@@ -82,11 +79,6 @@ def judge(
     `slot_times` (members, firings), s, need not be those of the firings, and are of no matter where no dot is
     judged. The `nominal` dot, of the single pulse, is one for all members, or one for each. `ok` (members,)
     says which runs reached their ends: the last dot of one that did not is not run, its contact may be open.
-
-    Raises
-    ------
-    InputError
-        Arrays whose shapes do not fit together.
     """
     shape = dots.fired.shape
     for name, values in (("wanted", wanted), ("slot_times", slot_times)):
@@ -116,13 +108,7 @@ def judge(
 
 
 class Limits(Declared):
-    """How far a dot may differ from that of the single pulse. A lost dot is never within limits.
-
-    Raises
-    ------
-    InputError
-        A limit is negative or not a number.
-    """
+    """How far a dot may differ from that of the single pulse. A lost dot is never within limits."""
 
     force: float = part(
         "largest deviation of the peak force to either side, in parts of the single-pulse force", default=0.1
@@ -166,13 +152,7 @@ PRESETS: Final = {
 
 
 def limits_named(name: str) -> Limits:
-    """Return the limits of a name.
-
-    Raises
-    ------
-    InputError
-        There are none of that name.
-    """
+    """Return the limits of a name."""
     if name not in PRESETS:
         raise InputError(f"limits = {name!r}, expected one of {', '.join(PRESETS)}")
     return PRESETS[name]

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, scalar
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
 
 WAIT: Final = 4e-3
 """Time after the last firing of a run, s, within which its dot and extra contacts are waited for."""
@@ -75,11 +72,6 @@ def single_pulses(
     """Fire many hammers that have packs once each from rest, their own waveforms or others.
 
     Where there is no dot, or the run ended early, None is returned.
-
-    Raises
-    ------
-    InputError
-        A hammer has no waveform or no rest state.
     """
     if not hammers:
         return []
@@ -98,13 +90,7 @@ def single_pulses(
 
 
 def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:
-    """Return a waveform, by default that of the hammer.
-
-    Raises
-    ------
-    InputError
-        There is none.
-    """
+    """Return a waveform, by default that of the hammer."""
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None:
         raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")

@@ -17,32 +17,24 @@ import math
 import tomllib
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError, located
+from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, part, scalar
+from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import shown
 from printhammer.support.files import read_text
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
 
 _WIDEST: Final = 3.0  # Standard deviations at which a draw is cut off
 _UNITS: Final = {"stiffness": "1", "front": "m", "length": "m"}
 
 
 class Paper(Declared):
-    """How pack stiffness and front vary along a line, about what the hammer has.
-
-    Raises
-    ------
-    InputError
-        A number is negative or not finite, the stiffness not below a third, or the seed no whole number.
-    """
+    """How pack stiffness and front vary along a line, about what the hammer has."""
 
     stiffness: float = part("standard deviation of the stiffness of the pack, relative", default=0.05)
     front: float = scalar("m", "standard deviation of the front of the pack", default=3e-6)
@@ -104,13 +96,7 @@ class Paper(Declared):
         return np.asarray(np.clip(off, -_WIDEST, _WIDEST))
 
     def hammers(self, hammer: Hammer, slots: int, pitch: float) -> tuple[Hammer, ...]:
-        """Return the hammer as it is at each slot, slots a pitch, m, apart; the platen stays.
-
-        Raises
-        ------
-        InputError
-            The hammer has no pack, or one without what varies.
-        """
+        """Return the hammer as it is at each slot, slots a pitch, m, apart; the platen stays."""
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.results import Declared, part, scalar
+from printhammer.run.contacts import Contact
+from printhammer.run.motion import Motion
+from printhammer.run.pieces import PiecewiseMotion
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.run.contacts import Contact
-    from printhammer.run.motion import Motion
-    from printhammer.run.pieces import PiecewiseMotion
-    from printhammer.support.arrays import BoolArray
+from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
 """Distance from rest, in parts of the stroke, within which the armature counts as settled."""
@@ -78,13 +76,7 @@ class Settling(Declared):
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
-    """Fire a hammer once from rest, its own waveform or another, and watch it settle.
-
-    Raises
-    ------
-    InputError
-        The hammer has no backstop, no waveform or no rest state.
-    """
+    """Fire a hammer once from rest, its own waveform or another, and watch it settle."""
     if hammer.position is None:
         raise InputError(f"{hammer.path}: the hammer has no backstop, expected one to settle on")
     rest = rest_state(hammer)

@@ -5,24 +5,20 @@ Patterns of slots: times, one period apart, at each of which a dot is wanted or 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.batch import PulseTrains, firings_of
+from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import pulse_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.trains import Drive
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the cycle
 
@@ -51,11 +47,6 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
     It is the least one in the order of a dictionary: the Lyndon words whose length divides the order, one
     after another (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is from 1 to 16,
     the shape (2**order,); read-only.
-
-    Raises
-    ------
-    InputError
-        The order is out of bounds.
     """
     if not 1 <= order <= 16:
         raise InputError(f"order = {order!r} of a de Bruijn cycle, expected 1 to 16")
@@ -114,13 +105,7 @@ class Strategy(Protocol):
 
 
 def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> Sequence[Drive]:
-    """Fire the waveform of the hammer at every slot at which a dot is wanted, whatever the hammer does.
-
-    Raises
-    ------
-    InputError
-        The hammer has no waveform.
-    """
+    """Fire the waveform of the hammer at every slot at which a dot is wanted, whatever the hammer does."""
     return OpenLoop()(hammer, patterns, rate)
 
 

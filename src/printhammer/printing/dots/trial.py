@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from printhammer.drive.batch import firings_of, joined
-from printhammer.printing.dots.judging import Judgement, judge
+from printhammer.drive.trains import Drive
+from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.judging import Judgement, Limits, judge
 from printhammer.printing.dots.nominal import WAIT, SinglePulse
 from printhammer.printing.dots.strategy import FIRST_SLOT, Strategy, checked_drives, open_loop
 from printhammer.results import Declared, column, part
 from printhammer.run.ensemble import DotTable, Ensemble
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.judging import Limits
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.threads import Progress
 
 
 class Case(NamedTuple):
@@ -71,11 +67,6 @@ def attempt(
 
     Patterns are numbers of the slots at which dots are wanted, at least one each; slots before `judged_from`
     are a lead-in. Each member has a status: a run that could not go on is no exception, and does not pass.
-
-    Raises
-    ------
-    InputError
-        The strategy gives drives that do not fit.
     """
     drives = joined([checked_drives(strategy, case.hammer, patterns, case.rate) for case in cases])
     every = list(patterns) * len(cases)

@@ -25,13 +25,7 @@ LINE_GAP: Final = 1 / 3
 
 
 class Head(Declared):
-    """A print head: one column of wires on a carriage.
-
-    Raises
-    ------
-    InputError
-        A number is not positive, or the gap not at least 0, or one is not finite.
-    """
+    """A print head: one column of wires on a carriage."""
 
     wires: int = part("number of wires")
     wire_pitch: float = scalar("m", "from wire to wire")
@@ -86,11 +80,6 @@ def head_of(
     wire_diameter : float, optional
         Thickness of the wires, m; by default 0.35, 0.25 and 0.2 mm for 9, 18 and 24 wires, else a third more
         than from wire to wire.
-
-    Raises
-    ------
-    InputError
-        As for `Head`.
     """
     if wires < 1:
         raise InputError(f"head: wires = {wires!r}, expected a positive number")

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 import string
 import textwrap
+from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from importlib.resources import files
 from importlib.util import find_spec
@@ -27,14 +28,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.support.arrays import BoolArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from pathlib import Path
-
     from PIL.ImageFont import FreeTypeFont
-
-    from printhammer.support.arrays import BoolArray
 
 NAME: Final = "nine-wire"
 WIRES: Final = 9

@@ -16,9 +16,12 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.input import read_positive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.extra_dots import extra_dots
 from printhammer.printing.dots.judging import FAULTS, PRESETS, Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
@@ -28,15 +31,11 @@ from printhammer.printing.page.head import Head, head_of
 from printhammer.printing.page.pattern import Pattern
 from printhammer.results import Column, Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
+from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.drive.waveforms.shapes import Waveform
-    from printhammer.hammer.hammer import Hammer
     from printhammer.results.result import Entries
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
-    from printhammer.support.threads import Progress
 
 _HEAD: Final = ("wire_pitch", "pitch", "line_pitch", "wire_diameter", "density")
 _FAULTS: Final = np.array([*FAULTS, "none"], "U16")
@@ -249,12 +248,6 @@ def print_page(
     -------
     Page
         With a status for each run; a run that could not go on is no exception.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy that
-        gives drives that do not fit.
     """
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):

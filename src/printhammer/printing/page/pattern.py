@@ -26,7 +26,7 @@ import json
 import tomllib
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -34,13 +34,9 @@ from printhammer.errors import InputError
 from printhammer.printing.page import lettering
 from printhammer.printing.page.lettering import COLUMNS, lettered
 from printhammer.results import Declared, column, part
+from printhammer.support.arrays import BoolArray
 from printhammer.support.constants import shown
 from printhammer.support.files import read_text, write_file
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.support.arrays import BoolArray
 
 FORMAT: Final = 1  # Version of the pattern file format
 
@@ -250,22 +246,11 @@ class Pattern(Declared):
             The file.
         wires : int, optional
             Number of wires: for a bitmap 9 by default; a pattern file states it, and then it has to be that.
-
-        Raises
-        ------
-        InputError
-            The file cannot be read, or is no such file.
         """
         return cls(*read_pattern(path, wires))
 
     def save(self, path: str | Path) -> None:
-        """Write a pattern file (.toml) or a bitmap (.png, .pbm, .bmp), whole or not at all.
-
-        Raises
-        ------
-        InputError
-            The name ends in none of these, or the file cannot be written.
-        """
+        """Write a pattern file (.toml) or a bitmap (.png, .pbm, .bmp), whole or not at all."""
         write_pattern(path, self.name, self.dots)
 
     @property

@@ -11,12 +11,14 @@ Backstops and packs of other materials, for the damping study.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.pack.dashpot import DashpotPack
@@ -29,14 +31,8 @@ from printhammer.printing.rates.variability import changed
 from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.results.declare import columns_of
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import Nominal
-    from printhammer.support.arrays import FloatArray, TextArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import FloatArray, TextArray
+from printhammer.support.threads import Progress
 
 KINDS: Final = ("as it is", "hard", "elastomer", "pack")
 """What may be changed: nothing, the constants of the hard backstop, the backstop for an elastomer, the
@@ -247,12 +243,6 @@ def damping_study(
     -------
     DampingStudy
         With a status for each material.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a hammer without a backstop, or whose single pulse makes
-        no dot; a waveform that is a force.
     """
     allowed = read_positive(current, "A", "current")
     grid = rate_grid(first, last, step)

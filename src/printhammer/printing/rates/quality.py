@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.input import read_positive
+from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, FAULTS, Limits, judge
 from printhammer.printing.dots.nominal import Nominal, wait_of
 from printhammer.printing.dots.nominal import nominal as single_pulse
+from printhammer.printing.dots.paper import Paper
 from printhammer.printing.dots.settling import Wear, wear_of
 from printhammer.printing.dots.strategy import (
     LEAD_IN,
@@ -24,25 +29,14 @@ from printhammer.printing.dots.strategy import (
     slots_of,
 )
 from printhammer.results import Declared, Result, column, derived, part, scalar
-from printhammer.run.energy import squared_current
+from printhammer.run.contacts import Dot
+from printhammer.run.energy import Ledger, squared_current
 from printhammer.run.ensemble import DotTable
-from printhammer.run.pieces import simulate_pieces
+from printhammer.run.motion import Motion
+from printhammer.run.pieces import PiecewiseMotion, simulate_pieces
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.drive.trains import Drive
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.paper import Paper
-    from printhammer.run.contacts import Dot
-    from printhammer.run.energy import Ledger
-    from printhammer.run.motion import Motion
-    from printhammer.run.pieces import PiecewiseMotion
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 PITCH: Final = 25.4e-3 / 60.0  # Distance of neighbouring slots on the paper by default, m: sixty to the inch
 
@@ -261,12 +255,6 @@ def quality(
     -------
     Quality
         The dots, their spreads, wear and energy; with a status.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy whose
-        drives do not fit; paper that varies under a voltage, or without a pack.
     """
     slot_rate = read_positive(rate, "Hz", "rate")
     slot_pitch = read_positive(pitch, "m", "pitch")
@@ -327,13 +315,7 @@ def quality(
 
 
 def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
-    """Read a pattern as `quality` takes it: where dots are wanted, slot by slot.
-
-    Raises
-    ------
-    InputError
-        It is none of these, wants no dot, or is too long.
-    """
+    """Read a pattern as `quality` takes it: where dots are wanted, slot by slot."""
     if isinstance(pattern, str):
         if not pattern or set(pattern) - {"0", "1"}:
             raise InputError(f"pattern = {pattern!r}, expected slots such as '10110111'")

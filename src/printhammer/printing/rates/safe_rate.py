@@ -11,13 +11,17 @@ hammer settles, so that below that every dot is a single pulse from rest.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Sequence
+from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import FAULTS, Limits
+from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.strategy import (
     LEAD_IN,
@@ -32,16 +36,8 @@ from printhammer.printing.dots.strategy import (
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.run.problem import TOLERANCE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    import numpy.typing as npt
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.dots.nominal import SinglePulse
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.threads import Progress
 
 FIRST: Final = 100.0  # First rate of the grid, Hz
 
@@ -196,12 +192,6 @@ def safe_rate(
     -------
     SafeRate
         The rate, what limits it, and the deviations at every rate that was run.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a hammer whose single pulse makes no dot; a strategy whose
-        drives do not fit.
     """
     grid = rate_grid(first, last, step)
     bounds = Limits() if limits is None else limits
@@ -256,13 +246,7 @@ def safe_rate(
 
 
 def rate_grid(first: float | str, last: float | str, step: float | str) -> FloatArray:
-    """Return a grid of rates, Hz.
-
-    Raises
-    ------
-    InputError
-        A number is not positive, the last rate is below the first, or there are too many.
-    """
+    """Return a grid of rates, Hz."""
     low, high, apart = (
         read_positive(value, "Hz", name) for value, name in ((first, "first"), (last, "last"), (step, "step"))
     )

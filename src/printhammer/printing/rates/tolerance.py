@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+from typing import Any, Final, Literal, SupportsIndex, get_args
 
 import numpy as np
 
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import unknown
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
@@ -19,11 +20,8 @@ from printhammer.printing.rates.safe_rate import FIRST, LAST, all_pass, grid_not
 from printhammer.printing.rates.variability import changed
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-
-if TYPE_CHECKING:
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import BoolArray, FloatArray, TextArray
-    from printhammer.support.threads import Progress
+from printhammer.support.arrays import BoolArray, FloatArray, TextArray
+from printhammer.support.threads import Progress
 
 SPREAD: Final = 0.01  # Relative spread of a constant, to either side, by default
 
@@ -173,12 +171,6 @@ def tolerance_yield(
     -------
     ToleranceYield
         With a status for each hammer.
-
-    Raises
-    ------
-    InputError
-        An argument is not what is described above; a constant that the hammer does not have; a design whose
-        single pulse makes no dot.
     """
     count = read_count(number, "number")
     if count > MOST:
@@ -266,11 +258,6 @@ def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
     """Draw factors on constants, (number, constants), evenly within their spreads to either side.
 
     They come from a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
-
-    Raises
-    ------
-    InputError
-        The seed is negative.
     """
     from scipy.stats import qmc
 

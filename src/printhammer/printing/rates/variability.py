@@ -9,24 +9,21 @@ Hammers that differ a little from the one that a drive was made for: supply, tra
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.results import Declared, part
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 
 class Perturbation(Declared):
@@ -68,12 +65,6 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
 
     The current enters equation (3) as Bm I. Every current a factor larger is therefore the same as Bm that
     factor larger, and a strategy that knows nothing of it stays as it is.
-
-    Raises
-    ------
-    InputError
-        A number is not finite, a relative change is not above -1, the hammer does not have the constant that
-        changes, or would not be one any more.
     """
     changes: dict[str, Any] = {}
     for key, value in asdict(by).items():
@@ -148,13 +139,7 @@ WIDEST: Final = 3.0
 
 
 class Variability(Declared):
-    """Standard deviations of the constants of a production, each constant independent of the others.
-
-    Raises
-    ------
-    InputError
-        A number is negative or not finite, or a relative one not below a third.
-    """
+    """Standard deviations of the constants of a production, each constant independent of the others."""
 
     magnet: float = part(
         "of F0 and Am of equation (3), of the area of a pole or the force constant, relative", default=0.01
@@ -227,22 +212,11 @@ class Variability(Declared):
         """Return random hammers, normally distributed, no constant beyond three standard deviations.
 
         Those that are no hammers, or do not rest at the backstop, are drawn again.
-
-        Raises
-        ------
-        InputError
-            As for `constants`; or hardly any of those drawn is a hammer that rests.
         """
         return [drawn for _row, drawn in self.draw_rows(hammer, count, seed)]
 
     def draw_rows(self, hammer: Hammer, count: int, seed: int) -> list[tuple[FloatArray, Hammer]]:
-        """Return what `draw` does, each hammer after the standard deviations that its constants are off by.
-
-        Raises
-        ------
-        InputError
-            As for `draw`.
-        """
+        """Draw hammers as `draw` does, each after the deviations of its constants in standard deviations."""
         rng = np.random.default_rng(seed)
         drawn: list[tuple[FloatArray, Hammer]] = []
         for _ in range(_TRIES):

@@ -10,7 +10,9 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
+from importlib.resources.abc import Traversable
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -18,10 +20,6 @@ from printhammer.claims.definition import KINDS, claims
 from printhammer.errors import InputError
 from printhammer.report.reconstruction.shares import Share
 from printhammer.support.constants import shown
-
-if TYPE_CHECKING:
-    from importlib.resources.abc import Traversable
-    from pathlib import Path
 
 _Count = Annotated[int, Field(ge=0)]
 _Some = Annotated[int, Field(ge=1)]
@@ -231,13 +229,7 @@ class Results:
     schemes = _file("schemes", Schemes, "What the integrators of 1983 do to verdicts.")
 
     def check(self) -> None:
-        """Read all files.
-
-        Raises
-        ------
-        InputError
-            A file is not what it should be.
-        """
+        """Read all files."""
         for name in FILES:
             getattr(self, name)
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
+from rich.table import Table
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
@@ -14,10 +16,6 @@ from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rich.table import Table
-
     from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.console import RenderableType
 from rich.markup import escape
 
 from printhammer.cli import options as opt
@@ -12,8 +13,6 @@ from printhammer.cli.screen import Column, multiplier, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.regimes import Branches
     from printhammer.hammer.hammer import Hammer

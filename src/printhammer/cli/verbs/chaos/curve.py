@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.console import RenderableType
 from rich.markup import escape
 
 from printhammer.cli import options as opt
@@ -13,10 +15,6 @@ from printhammer.cli.verbs.chaos.continuation import both, read_state
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rich.console import RenderableType
-
     from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve
     from printhammer.hammer.hammer import Hammer
 

@@ -6,14 +6,14 @@ import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.table import Table
+
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
 from printhammer.cli.screen import Column, coloured, facts, table, train_line
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from printhammer.chaos import Lyapunov, LyapunovChart
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray

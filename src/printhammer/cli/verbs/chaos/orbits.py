@@ -5,15 +5,15 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.table import Table
+
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
 from printhammer.cli.screen import Column, multiplier, table, train_line
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from printhammer.chaos.orbits.orbit import Orbit
-    from printhammer.cli.options import Units
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Regime
 

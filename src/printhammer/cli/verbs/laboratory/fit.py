@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
@@ -10,9 +12,6 @@ from printhammer.cli.runner import Answer, Content, Job, announce_compiling, ver
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.result import Fit
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
+from rich.console import RenderableType
 from rich.markup import escape
 
 from printhammer.cli.screen import Column, facts, repeated, table
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from printhammer.identify.result import Fit, FittedConstant
 
 _SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 import typer
+from rich.console import RenderableType
 from rich.markup import escape
 from rich.padding import Padding
+from rich.table import Table
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units, with_unit
@@ -15,9 +17,6 @@ from printhammer.cli.screen import STATUS_STYLES, Column, coloured, facts, hones
 from printhammer.cli.terminal import warn
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.table import Table
-
     from printhammer.hammer.equilibrium import EquilibriumPicture
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.constants import Constant

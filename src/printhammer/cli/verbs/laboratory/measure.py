@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
@@ -13,8 +14,6 @@ from printhammer.cli.terminal import say
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from printhammer.hammer.hammer import Hammer
 
 ALL: Final = "all"

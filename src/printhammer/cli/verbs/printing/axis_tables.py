@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rich.table import Table
+
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, check_endings
 from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rich.table import Table
-
-    from printhammer.cli.options import Units
     from printhammer.control.axes import AxisTables
     from printhammer.hammer.hammer import Hammer
 

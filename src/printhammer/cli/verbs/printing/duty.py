@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
@@ -11,8 +12,6 @@ from printhammer.cli.screen import Column, facts, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from printhammer.control.duty import ThermalDuty
     from printhammer.control.thermal_limit import ThermalLimit
 

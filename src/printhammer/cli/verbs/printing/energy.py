@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.table import Table
+
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units, with_unit
 from printhammer.cli.runner import Answer, Content, Job, verb
@@ -11,8 +13,6 @@ from printhammer.cli.screen import Column, facts, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from printhammer.control.least_work.burst import LeastWork, SupplyCheck
     from printhammer.hammer.hammer import Hammer
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units, with_unit
@@ -11,10 +14,6 @@ from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rich.table import Table
-
     from printhammer.control.feedback.comparison import Feedback
     from printhammer.hammer.hammer import Hammer
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
 
 if TYPE_CHECKING:
-    from printhammer.cli.options import Units
     from printhammer.control.impact_time import ImpactTime
     from printhammer.hammer.hammer import Hammer
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.table import Table
+
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rich.table import Table
-
-    from printhammer.cli.options import Units
     from printhammer.control.learning.learn import Learning
     from printhammer.hammer.hammer import Hammer
 

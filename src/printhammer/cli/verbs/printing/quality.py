@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.verbs.printing.strategy import FEEDBACK, SERIAL, TABLE, chosen_strategy
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.cli.options import Units
     from printhammer.hammer.hammer import Hammer
 
 _MORE: Final = "Instead of the report"

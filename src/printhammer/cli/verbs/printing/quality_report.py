@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from rich.markup import escape
+from rich.table import Table
 
 from printhammer.cli.options import Units, shown, unit, with_unit
 from printhammer.cli.screen import Column, coloured, facts, table
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from printhammer.printing.dots.judging import Limits
     from printhammer.printing.rates.damping import DampingStudy
     from printhammer.printing.rates.quality import Quality, Spread

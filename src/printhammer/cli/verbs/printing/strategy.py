@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from printhammer.cli.runner import Job
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from rich.table import Table
+
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
 from printhammer.cli.screen import Column, table
 from printhammer.cli.verbs.printing.axis_tables import tuned_along
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rich.table import Table
-
-    from printhammer.cli.options import Units
     from printhammer.control.table.compensation import CompensationTable
     from printhammer.control.table.report import TableReport
     from printhammer.hammer.hammer import Hammer

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
+from printhammer.results import Rows
 from printhammer.results.declare import columns_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from printhammer.results import Rows
-    from printhammer.run.contacts import Contact, Dot
-    from printhammer.run.motion import Motion
+from printhammer.run.contacts import Contact, Dot
+from printhammer.run.motion import Motion
 
 
 def write_rows(rows: Rows[Any], path: Path) -> None:

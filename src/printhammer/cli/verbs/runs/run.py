@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
+from rich.table import Table
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units, with_unit
@@ -14,10 +16,6 @@ from printhammer.cli.screen import Column, coloured, facts, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rich.table import Table
-
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.contacts import Dot

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, verb
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from printhammer.hammer.hammer import Hammer
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+from rich.console import RenderableType
 from rich.markup import escape
 
 from printhammer.cli import options as opt
@@ -19,7 +20,6 @@ from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.console import RenderableType
 
     from printhammer.sweep.plan import Plan
 

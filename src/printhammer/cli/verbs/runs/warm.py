@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing.queues import SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Final
 
@@ -13,9 +15,6 @@ from printhammer.cli.screen import Column, table
 from printhammer.cli.terminal import say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from multiprocessing.queues import SimpleQueue
-
     from printhammer.hammer.hammer import Hammer
 
 

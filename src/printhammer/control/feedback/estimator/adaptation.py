@@ -14,21 +14,18 @@ follow by least squares. A weak supply is not taken for a distant pack: both are
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from printhammer.control.feedback.estimator.flight import least_squares
+from printhammer.control.feedback.estimator.sensor import Samples
+from printhammer.control.feedback.loop import Loop, Touched
+from printhammer.control.feedback.plant import Plant
+from printhammer.hammer.hammer import Hammer
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from printhammer.control.feedback.estimator.sensor import Samples
-    from printhammer.control.feedback.loop import Loop, Touched
-    from printhammer.control.feedback.plant import Plant
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray
 
 # Standard deviation of what the nominal hammer says of a contact, in parts of the way to the pack
 _MODEL_ERROR: Final = 0.003

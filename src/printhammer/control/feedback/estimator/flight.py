@@ -9,21 +9,19 @@ nearly so in s: they follow from the samples by least squares, together with wha
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.control.feedback.estimator.sensor import Samples
 from printhammer.control.feedback.impact_map import bilinear, blend
+from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
+from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from printhammer.control.feedback.estimator.sensor import Samples
-    from printhammer.hammer.hammer import Hammer
-    from printhammer.support.arrays import FloatArray
-
     Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 _ROUNDS: Final = 3  # Iterations: of a path, of a fit, and of the time of a touch

@@ -10,15 +10,13 @@ import math
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from printhammer.errors import InputError
 from printhammer.results import Declared, part, scalar
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    import numpy.typing as npt
-
-    from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-
     Words = npt.NDArray[np.uint64]
 
 
@@ -46,13 +44,7 @@ class Samples(NamedTuple):
 
 
 class PositionSensor(Declared):
-    """A position sensor.
-
-    Raises
-    ------
-    InputError
-        A number is negative or not finite, an interval not positive, or the seed is not a whole number.
-    """
+    """A position sensor."""
 
     noise: float = part(
         "standard deviation of a sample, in parts of the way from backstop to pack; normal, white",
