@@ -104,7 +104,7 @@ def main() -> None:
         Column(name="standard error", unit="%", format=".2g"),
         Column(name="mean error in standard errors", format="+.2f"),
     ]
-    rooms = (*MOTION, "identify")
+    rooms = (*MOTION, "identify", "studies/recovery")
     write("recipe", columns, table(made, truth), {"laboratories": options.labs}, rooms)
 
 

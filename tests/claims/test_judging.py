@@ -74,12 +74,6 @@ def test_a_hammer_without_a_rest_state_fails_with_the_reason(hammer: "ph.Hammer"
         assert "no rest state" in result.detail
 
 
-def test_the_former_name_of_a_judged_claim_is_understood() -> None:
-    from printhammer import claims as room
-
-    assert room.Result is JudgedClaim
-
-
 def assert_complete(result: JudgedClaim) -> None:
     assert result.detail.endswith(".")
     if result.verdict == "not yet":

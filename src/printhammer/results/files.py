@@ -112,8 +112,8 @@ def reopen(path: str | Path) -> Reopened:
     Parameters
     ----------
     path : path
-        A file that `Result.save` wrote. A CSV file without the lines ``# key: value``, as former versions
-        wrote it, opens as well, and has no provenance.
+        A file that `Result.save` wrote. A CSV file without the lines ``# key: value`` opens as
+        well, and has no provenance.
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """Tables made by hand. Helpers only."""
 
-import json
-import math
 from typing import Any
 
 import numpy as np
@@ -10,10 +8,8 @@ from tests.hammers import CRUDE
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import (
-    COLUMNS,
     REST,
     entries_of,
-    gap_text,
     histories,
     number_of,
     shared_numbers,
@@ -47,18 +43,3 @@ def by_hand(
         **{name: array[:, shared] for name, array in values.items()},
     }
     return CompensationTable(**{**settings, **changes})
-
-
-def former_json(table: CompensationTable) -> str:
-    """The JSON text of a table as former versions wrote it."""
-    entries = []
-    for row, rate in enumerate(table.rates.tolist()):
-        for history in histories(table.gaps, table.reach):
-            place = row, number_of(history, table.reach)
-            values = {name: float(getattr(table, name)[place]) for name in (*COLUMNS, "deviation")}
-            known = {name: None if math.isnan(value) else value for name, value in values.items()}
-            entries.append({"rate": rate, "gaps": [gap_text(gap) for gap in history], **known})
-    head = {name: getattr(table, name) for name in ("hammer", "fingerprint", "gaps", "reach")}
-    units = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
-    kind = {"kind": "printhammer compensation table", "format": 1, "units": units}
-    return json.dumps({**kind, **head, "largest_current": table.largest_current, "entries": entries})

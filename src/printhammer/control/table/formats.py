@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     Head = dict[str, Any]
     Rows = list[dict[str, Any]]
 
-FORMAT: Final = 1  # Version of the CSV format, and of the JSON files of former versions
+FORMAT: Final = 1  # Version of the CSV format
 KIND: Final = "printhammer compensation table"  # What the first line of a CSV file says
 DEVIATION: Final = "deviation"  # Name of the array that is no time
 # What a file says of the whole table
@@ -45,7 +45,6 @@ HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "la
 OPTIONAL: Final = {"driver": "own", "serial": ""}
 """What a file may say besides, and what holds where it does not."""
 _FIRST: Final = f"# {KIND}, format {FORMAT}"
-_UNITS: Final = {"rate": "Hz", **dict.fromkeys(COLUMNS, "s")}
 _ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file
 
 
@@ -115,40 +114,24 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
 
 
 def _of_json(text: str) -> tuple[Head, Rows]:
-    """Read head and rows of a JSON file: as results are written, or as tables were by former versions."""
+    """Read head and rows of a JSON file, which is that of a result."""
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"expected JSON ({' '.join(str(error).split())})") from None
-    if isinstance(data, dict) and isinstance(data.get("columns"), dict):
-        head = {key: data[key] for key in (*HEAD, *OPTIONAL) if key in data}
-        head |= {"fingerprint": data["hammer_fingerprint"]} if "hammer_fingerprint" in data else {}
-        _check_head(head)
-        entries: Any = _entries(data["columns"])
-    else:
-        if not isinstance(data, dict) or data.get("kind") != KIND:
-            raise InputError(
-                f"kind = {shown(data.get('kind') if isinstance(data, dict) else data)}, expected {KIND!r}"
-            )
-        if data.get("format") != FORMAT or isinstance(data["format"], bool):
-            raise InputError(f"format = {shown(data.get('format'))}, expected {FORMAT}")
-        if data.get("units") != _UNITS:
-            raise InputError(f"units = {shown(data.get('units'))}, expected {json.dumps(_UNITS)}")
-        head = {key: data[key] for key in data if key not in ("kind", "format", "units", "entries")}
-        _check_head(head)
-        entries = data.get("entries")
-    if not isinstance(entries, list):
-        raise InputError(f"entries = {shown(entries)}, expected a list")
+    if not isinstance(data, dict) or not isinstance(data.get("columns"), dict):
+        columns = data.get("columns") if isinstance(data, dict) else data
+        raise InputError(f"columns = {shown(columns)}, expected the arrays of a table")
+    head = {key: data[key] for key in (*HEAD, *OPTIONAL) if key in data}
+    head |= {"fingerprint": data["hammer_fingerprint"]} if "hammer_fingerprint" in data else {}
+    _check_head(head)
+    entries = _entries(data["columns"])
     for number, entry in enumerate(entries, 1):
-        where = f"entry {number}"
-        if not isinstance(entry, dict):
-            raise InputError(f"{where} = {shown(entry)}, expected an object")
-        _check_keys(entry, ["rate", "gaps", *COLUMNS, DEVIATION], f"{where}: ")
         for name in ("rate", *COLUMNS, DEVIATION):
             if entry[name] is None and name == DEVIATION:
                 continue
             if isinstance(entry[name], bool) or not isinstance(entry[name], int | float):
-                raise InputError(f"{where}: {name} = {shown(entry[name])}, expected a number")
+                raise InputError(f"entry {number}: {name} = {shown(entry[name])}, expected a number")
     return head, entries
 
 
