@@ -108,7 +108,12 @@ def read_state(state: npt.ArrayLike) -> FloatArray:
 def image_of(
     regime: Regime, state: FloatArray, firings: int, tolerance: float, *, contacts: bool = True
 ) -> Image:
-    """Do as `strobe_map` with arguments that are known to be right."""
+    """Return the image of a state, (m, m/s), under the strobe map, iterated, with its derivative.
+
+    The pulses fired before the start are under way at it, as in a train that has always been fired. A run
+    that could not go on, or a state where no force law holds, has a status and is no exception. Contacts and
+    the margin take about a third of the time.
+    """
     regime.check_planar()
     train, _ = regime.train(firings)
     moments = regime.moments(train, firings)
