@@ -22,12 +22,12 @@ SILENT = (
     "figures",
     "results",
     "studies/reconstruction/figures",
+    "support/arrays",
     "support/c_code",
     "support/constants",
-    "support/outputs",
+    "support/files",
     "support/sheets",
-    "support/texts",
-    "support/threads",
+        "support/threads",
     "units",
 )
 

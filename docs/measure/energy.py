@@ -14,7 +14,7 @@ FAMILY = ("02", "06", "10", "14", "18")
 FORCES = (0.9, 1.1, 1.2)
 RATES = (1000.0, 1250.0, 1500.0)
 DOTS = 8
-ROOMS = (*MOTION, "control/least_work", "control/widths", "printing/dots")
+ROOMS = (*MOTION, "control/least_work", "control/pulses", "printing/dots")
 SINGLE, POSITIVE, LEAST = 2, 4, 5
 """Places in what a burst costs: of a single pulse, positive work, and the least that any current needs."""
 

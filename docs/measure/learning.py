@@ -71,12 +71,11 @@ FEW = f"feedback, {FEEDBACK} of them"
 ROOMS = (
     *MOTION,
     "control/learning",
-    "control/coil_current",
+    "control/pulses",
     "control/table",
-    "control/widths",
     "printing/dots",
     "printing/rates",
-    "support/works",
+    "support/threads",
 )
 CYCLE = slots_of(cycle_with_lead_in())
 

@@ -37,14 +37,14 @@ RAIL = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistan
 CYCLE = slots_of(cycle_with_lead_in())
 ROOMS = (
     *MOTION,
-    "control/coil_current",
+    "control/pulses",
     "control/learning",
-    "control/sensing",
+    "control/impact_estimator",
+    "control/impact_time",
     "control/table",
-    "control/widths",
     "printing/dots",
     "printing/rates",
-    "support/works",
+    "support/threads",
 )
 
 

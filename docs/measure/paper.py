@@ -38,8 +38,13 @@ PAPERS = {
 }
 ROOMS = (
     *MOTION,
-    *("control/feedback", "control/learning", "control/coil_current", "control/table", "control/widths"),
-    *("printing/dots", "printing/rates", "support/works"),
+    *(
+        "control/feedback",
+        "control/learning",
+        "control/pulses",
+        "control/table",
+    ),
+    *("printing/dots", "printing/rates", "support/threads"),
 )
 SPEED = 1.0
 """Speed of a touch, m/s, by which the front shifts times of impact."""

@@ -35,9 +35,8 @@ BETWEEN = 2.5
 
 ROOMS = (
     *MOTION,
-    "control/coil_current",
+    "control/pulses",
     "control/table",
-    "control/widths",
     "printing/dots",
     "printing/rates",
 )

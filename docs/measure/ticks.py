@@ -30,9 +30,8 @@ SAFE = 850.0
 TICKS = (None, "1 us", "2 us", "5 us", "10 us", "20 us")
 ROOMS = (
     *MOTION,
-    "control/coil_current",
+    "control/pulses",
     "control/table",
-    "control/widths",
     "printing/dots",
     "printing/rates",
 )
