@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
-from matplotlib.figure import Figure
-
 from printhammer.figures.elements.save import FORMATS, save
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from printhammer.hammer.hammer import Hammer
 
 __all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]

@@ -8,11 +8,9 @@ Tolerance yield: how the safe rates of a production are spread, and what makes a
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import ALONG_X, ALONG_Y, beside, dashed, dots, heading
@@ -23,6 +21,10 @@ from printhammer.printing.rates.quality import Quality
 from printhammer.printing.rates.safe_rate import SafeRate
 from printhammer.printing.rates.tolerance import ToleranceYield
 from printhammer.support.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MOST_SLOTS: Final = 64
 _US: Final = 1e6

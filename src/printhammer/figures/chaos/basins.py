@@ -11,9 +11,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements.map_marks import edges
@@ -23,6 +20,10 @@ from printhammer.figures.elements.style import BLUE, INK, MUTED, ORANGE, SMALL, 
 from printhammer.figures.paper.motion import DELAYS
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
     from printhammer.chaos.basins.basins import Basins
     from printhammer.chaos.basins.quench import QuenchMap
     from printhammer.chaos.orbits.manifolds import Manifolds

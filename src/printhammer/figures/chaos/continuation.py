@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
@@ -17,6 +15,9 @@ from printhammer.figures.elements.style import new_panel, sign, styled
 from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.regimes import Branches
 

@@ -8,9 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from printhammer.errors import InputError
 from printhammer.figures.chaos.continuation import axis_of
@@ -19,6 +16,10 @@ from printhammer.figures.elements.marks import legend_in_columns
 from printhammer.figures.elements.style import new_panel, sign, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
     from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve
     from printhammer.chaos.curves.stability_chart import StabilityChart
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.figures.chaos.strobe import shown_period
 from printhammer.figures.elements import style
@@ -29,6 +27,9 @@ from printhammer.figures.elements.style import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from printhammer.chaos import ImpactTrain, Section
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.chaos.orbits.collection import Orbits
 from printhammer.chaos.orbits.orbit import Orbit
@@ -29,6 +27,10 @@ from printhammer.figures.elements.style import new_figure, sign, styled
 from printhammer.run.motion import Motion
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 POINTS: Final = 600
 """Strobe points below the orbits, after a third as many firings that are left out."""

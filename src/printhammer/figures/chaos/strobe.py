@@ -6,8 +6,6 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import HALO, dots, freest, heading, note
@@ -17,6 +15,9 @@ from printhammer.run.regime import Window
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from printhammer.chaos import Strobe
 
 _FEW: Final = 20

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import beside, heading, legend_above
@@ -16,6 +14,9 @@ from printhammer.figures.elements.timeline import between_surfaces, current_betw
 from printhammer.run.energy import coil_power
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from printhammer.control.least_work.burst import LeastWork
     from printhammer.control.least_work.rates import LeastWorkRates
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import dashed, dots, heading
@@ -17,6 +15,9 @@ from printhammer.support.arrays import FloatArray
 from printhammer.units import from_si
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from printhammer.control.feedback.comparison import Feedback
 
 _COLOURS: Final = (style.ORANGE, style.YELLOW, style.GREEN)

@@ -7,10 +7,6 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
-from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements.marks import ALONG_Y, beside, legend_above
@@ -22,6 +18,10 @@ from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
 
 COLOURS: Final = "viridis"
 """Perceptually uniform, and told apart by the colour-blind (N. Smith and S. van der Walt, 2015)."""

@@ -6,13 +6,10 @@ Where on a panel there is room for a label or an insert: away from the curves.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.text import Text
 
 from printhammer.figures.elements.curves import places
 from printhammer.figures.elements.scales import Scale, label, scale
@@ -31,6 +28,11 @@ from printhammer.figures.elements.style import (
 from printhammer.hammer.hammer import Hammer
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.text import Text
 
 CURVE: Final = "curve:"
 """Beginning of the label of every line that counts as a curve."""

@@ -3,24 +3,20 @@
 Figures are made with matplotlib's objects, never with pyplot, so that nothing global is left behind. Colours
 are those of M. Okabe and K. Ito (2008), which the colour-blind can tell apart; what matters also differs in
 dash or label.
-
-The kind of all figures: one of matplotlib's that a notebook shows, although pyplot does not know it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import wraps
-from io import BytesIO
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final, Literal, ParamSpec
 
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from printhammer.hammer.hammer import Hammer
 
 _P = ParamSpec("_P")
@@ -110,6 +106,8 @@ def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
 def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:
     """Return an empty figure, sizes in inches, whose axes will be laid out without overlap; or by hand."""
+    from printhammer.figures.elements.picture import Picture
+
     figure = Picture(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
     figure.settings = RC
     return figure
@@ -148,22 +146,3 @@ def foot(figure: Figure, origin: str, remark: str = "") -> None:
     text.set_in_layout(True)
     if remark:
         figure.suptitle(remark, x=0.01, ha="left", fontsize=SMALL, color=ORANGE)
-
-
-class Picture(Figure):
-    """A figure that shows itself as the last line of a cell.
-
-    Notebooks show what pyplot made, and what tells them how. Where the inline backend of matplotlib is at
-    work, it goes first, and the picture appears once.
-    """
-
-    settings: Mapping[str, Any] = {}
-    """Settings of matplotlib with which it is shown."""
-
-    def _repr_png_(self) -> bytes:
-        """Return what a notebook shows."""
-        buffer = BytesIO()
-        settings: Any = dict(self.settings)  # matplotlib's own type lists every setting by name
-        with rc_context(settings):
-            self.savefig(buffer, format="png", dpi=self.dpi)
-        return buffer.getvalue()

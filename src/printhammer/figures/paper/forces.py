@@ -8,11 +8,9 @@ Figure 10: the phase plane of the armature after a single pulse.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.figures.elements import style
 from printhammer.figures.elements.curves import fired, orbit, places, shown_until, times_of
@@ -45,6 +43,10 @@ from printhammer.figures.elements.style import (
 from printhammer.hammer.hammer import Hammer
 from printhammer.run.motion import Motion
 from printhammer.support.arrays import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 @styled

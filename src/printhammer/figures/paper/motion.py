@@ -10,9 +10,7 @@ Any motion against time: displacement with the places of the hammer, firings, an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Final
 
 from printhammer.errors import InputError
 from printhammer.figures.elements.curves import fired, shown_until
@@ -24,6 +22,9 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.buzz import BuzzSearch, BuzzTrain
 from printhammer.run.motion import Motion
 from printhammer.units import from_si, parse
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figure:

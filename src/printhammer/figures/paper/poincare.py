@@ -7,9 +7,6 @@ from collections.abc import Mapping, Sequence
 from string import ascii_lowercase
 from typing import TYPE_CHECKING, Final, Literal
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from printhammer.errors import InputError
 from printhammer.figures.chaos.strobe import RING, panel, scales_of, shown_period
 from printhammer.figures.elements.curves import waveform_of
@@ -20,6 +17,9 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.run.scheme_runs import Reading, Scheme
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from printhammer.chaos import Strobe
 
 PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
@@ -17,6 +15,10 @@ from printhammer.figures.elements.scales import label, scale
 from printhammer.figures.elements.style import new_panel, sign, styled
 from printhammer.hammer.hammer import Hammer
 from printhammer.support.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
 """Currents of the paper's Fig. 2, A."""
