@@ -58,7 +58,7 @@ def refined(draft: Draft) -> Draft:
         lower = lower[~(halfway.worst <= BETWEEN)]
         if not lower.size:
             break
-        more = _tuned(draft, lower)
+        more = _tuned_between(draft, lower)
         wanted = {*draft.rates[lower].tolist(), *more.rates.tolist()}
         rates = np.concatenate([draft.rates, more.rates])
         order = np.argsort(rates, kind="stable")
@@ -78,7 +78,7 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
     return halfway
 
 
-def _tuned(draft: Draft, lower: IntArray) -> Draft:
+def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
     """Return tuned rows halfway between some rates and those above them."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
@@ -227,7 +227,7 @@ def tune(
         report=_counter(progress, steps),
         mean_square=variability is not None,
     )
-    draft = _tuned_tuning(task, grid, open_ended=asked is None)
+    draft = _tuned(task, grid, open_ended=asked is None)
     if asked is None:
         return refined(draft.rows(np.arange(_usable(draft)))).table().fired_by(driver, hammer)
     _tune_again(draft)
@@ -282,12 +282,12 @@ def _tune_again(draft: Draft) -> None:
     poor = np.flatnonzero(~(draft.worst <= _POOR))
     if not poor.size:
         return
-    again = _tuned_tuning(draft.task, draft.rates[poor], around=_AROUND)
+    again = _tuned(draft.task, draft.rates[poor], around=_AROUND)
     better = again.worst < draft.worst[poor]
     draft.values[:, poor[better]] = again.values[:, better]
 
 
-def _tuned_tuning(
+def _tuned(
     task: Task, rates: FloatArray, *, open_ended: bool = False, around: FloatArray | None = None
 ) -> Draft:
     """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
