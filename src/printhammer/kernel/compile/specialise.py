@@ -60,6 +60,7 @@ _PLAIN = (
     "model.modes",
     "model.layout",
     "model.transitions",
+    "model.dots",
     "single.carry",
     "lanes.batch",
     "methods.hermite",

@@ -58,7 +58,7 @@ def members(
         control = control_of(batch, row)
         limits = (bounds[row, 0], bounds[row, 1], bounds[row, 2], bounds[row, 3])
         train = train_of(batch, m, under_way[1], live[1])
-        own_dots = kept.dots[batch.firing_starts[m] : batch.firing_starts[m + 1]]
+        own_dots = kept.dots[kept.dot_starts[m] : kept.dot_starts[m + 1]]
         own_times = kept.strobe_times[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
         own_strobes = kept.strobes[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
         picture = kept.x[m]
@@ -81,7 +81,7 @@ def members(
             carry[C.WITH_CURRENT] = 1.0
             for j in range(ELECTRIC_WIDTH):
                 carry[C.ELECTRIC + j] = states[m, 5 + j]
-        code, count = PAUSED, 0
+        code, count, extra = PAUSED, 0, 0
         while code == PAUSED:
             code, used, touched, count = run(
                 (train.firings, train.begins, train.pieces, batch.replace, under_way[0], live[0]),
@@ -101,7 +101,7 @@ def members(
                 return number
             record = nodes[:used]
             if kept.want_dots:
-                note_dots(own_dots, contacts[:touched], record, train, hammer)
+                extra = note_dots(own_dots, extra, contacts[:touched], record, train, hammer)
             strobe, sample = note_states(
                 own_strobes,
                 own_times,
@@ -120,5 +120,6 @@ def members(
         blank_states(own_strobes, strobe, own_times.size, picture, sample, grid.size)
         kept.status[m] = code
         kept.steps[m] = count
+        kept.extra[m] = extra
         kept.reached[m] = carry[C.TIME]
     return len(which)
