@@ -73,6 +73,7 @@ def members(
         if kept.want_dots:
             clear_dots(own_dots)
         carry[C.STATE] = C.FRESH
+        carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY] = begin, states[m, 1], states[m, 2]
         carry[C.PAUSE_AFTER] = nodes.shape[0] // 2
         if states[m, 3] >= 0.0:
             carry[C.STATE] = C.ON_BRANCH
@@ -84,15 +85,14 @@ def members(
         code, count, extra = PAUSED, 0, 0
         while code == PAUSED:
             code, used, touched, count = run(
-                (train.firings, train.begins, train.pieces, batch.replace, under_way[0], live[0]),
-                hammer,
-                begin,
-                states[m, 1],
-                states[m, 2],
+                (
+                    (train.firings, train.begins, train.pieces, batch.replace, under_way[0], live[0]),
+                    hammer,
+                    control,
+                    limits,
+                    batch.max_steps,
+                ),
                 batch.ends[m],
-                control,
-                limits,
-                batch.max_steps,
                 nodes,
                 contacts,
                 carry,
