@@ -59,22 +59,15 @@ def currents(problem: Problem, state: Any, path: float) -> tuple[float, float]:
 
 def arrive(problem: Problem, state: Any, branch: int, path: float, start: float, end: float) -> np.ndarray:
     """State at `end` of a run with a current from `start` on: as `state`, six numbers."""
-    begin = fresh_carry()
+    begin = fresh_carry(start, (float(state[0]), float(state[1])))
     if branch in (UNLOADING, RELOADING):
         begin[carry.STATE], begin[carry.MODE], begin[carry.PEAK] = carry.ON_BRANCH, branch, state[2]
     begin[carry.WITH_CURRENT] = 1.0
     begin[carry.ELECTRIC : carry.ELECTRIC + 3] = (*currents(problem, state, path), state[5])
     nodes = np.empty((20_000, 9))
     status, used, _touched, _steps = problem.kernel.run(
-        problem.drive_arrays(),
-        problem.constants,
-        start,
-        float(state[0]),
-        float(state[1]),
+        (problem.drive_arrays(), problem.constants, problem.control, problem.bounds, 100_000),
         end,
-        problem.control,
-        problem.bounds,
-        100_000,
         nodes,
         np.empty((500, 7)),
         begin,

@@ -124,7 +124,9 @@ def not_none(result: Result | None) -> Result:
 @cache
 def ensemble(hammer: Hammer) -> EnsembleResult:
     drives = [ph.PulseTrain(hammer.waveform, rate=rate, pulses=2) for rate in (400.0, 500.0)]
-    return ph.Ensemble(hammer, drives, 6e-3).run(dots=True, strobes="firings", times=[1e-3, 2e-3, 3e-3])
+    return ph.Ensemble(hammer, drives, 6e-3).run(
+        dots=True, extra=True, strobes="firings", times=[1e-3, 2e-3, 3e-3]
+    )
 
 
 def feedback(hammer: Hammer) -> Result:
@@ -185,6 +187,7 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "DeadTime": dead_time,
     "DotTable": lambda hammer: not_none(ensemble(hammer).dots),
     "EnsembleResult": ensemble,
+    "ExtraDots": lambda hammer: not_none(ensemble(hammer).extra),
     "Feedback": feedback,
     "Fit": fit,
     "ImpactTime": impact_time,

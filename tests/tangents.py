@@ -23,20 +23,13 @@ SMALLEST = 1e-3
 
 def arrive(problem: Problem, state: Any, branch: int, start: float, end: float) -> np.ndarray:
     """State (displacement, velocity, latest local maximum) at `end` of a run from `state` at `start`."""
-    begin = fresh_carry()
+    begin = fresh_carry(start, (float(state[0]), float(state[1])))
     if branch in (UNLOADING, RELOADING):
         begin[carry.STATE], begin[carry.MODE], begin[carry.PEAK] = carry.ON_BRANCH, branch, state[2]
     nodes = np.empty((20_000, 5))
     status, used, _touched, _steps = problem.kernel.run(
-        problem.drive_arrays(),
-        problem.constants,
-        start,
-        float(state[0]),
-        float(state[1]),
+        (problem.drive_arrays(), problem.constants, problem.control, problem.bounds, 100_000),
         end,
-        problem.control,
-        problem.bounds,
-        100_000,
         nodes,
         np.empty((500, 7)),
         begin,

@@ -17,8 +17,9 @@ import numpy as np
 from printhammer.derivatives.constants import flow, pack_push_changes, pack_push_rate, surface_moves
 from printhammer.derivatives.flow import Flow
 from printhammer.derivatives.parameters import Parameter
+from printhammer.kernel.model.dots import DOT
 from printhammer.results import Declared, part, scalar
-from printhammer.run.contacts import Contact
+from printhammer.run.contacts import Contact, contact_numbers
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray
@@ -92,11 +93,7 @@ def dot_values(motion: Motion) -> FloatArray:
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
     """Return the rows of the contacts that make a dot."""
-    return [
-        row
-        for row, contact in enumerate(contacts)
-        if contact.surface == "pack" and not (contact.initial or contact.extra or contact.firing is None)
-    ]
+    return [row for row, number in enumerate(contact_numbers(contacts)) if number == DOT]
 
 
 def _back(contacts: Sequence[Contact], row: int) -> int | None:

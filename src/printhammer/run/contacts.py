@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from printhammer.kernel.model.modes import PACK_SURFACE
+from printhammer.kernel.model.dots import DOT, NO_DOT, contact_number, firing_before
+from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE
 from printhammer.results import Declared, part, scalar
 from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray
@@ -41,9 +42,8 @@ class Contact(Declared):
 class Dot(Declared):
     """What one firing did on the paper.
 
-    A pack contact belongs to the latest firing at or before its touch. The first one in an interval makes
-    the dot, later ones are extra contacts, one already open at a firing belongs to the dot before. A firing
-    without a first one is a lost dot.
+    The first pack contact after a firing makes its dot, see `printhammer.kernel.model.dots`; a firing
+    without one is a lost dot.
     """
 
     index: int = part("number of the firing, from 0")
@@ -63,6 +63,33 @@ class Dot(Declared):
     )
     net_loss: float | None = scalar("J", "energy that the pack kept", default=None)
     extra_contacts: int = part("further pack contacts before the next firing", default=0)
+
+
+class _Numbers:
+    """Count of the pack contacts of each firing."""
+
+    def __init__(self) -> None:
+        self._counts: dict[int, int] = {}
+
+    def count(self, surface: int, initial: bool, fired: int) -> int:
+        """Return the number of the next contact among those of its firing, and count it."""
+        number = contact_number(surface, initial, fired, self._counts.get(fired, 0))
+        if number != NO_DOT:
+            self._counts[fired] = number + 1
+        return number
+
+
+def contact_numbers(contacts: Sequence[Contact]) -> list[int]:
+    """Return the number of each contact among those of its firing, `DOT` for what makes a dot."""
+    numbers = _Numbers()
+    return [
+        numbers.count(
+            PACK_SURFACE if contact.surface == "pack" else BACKSTOP_SURFACE,
+            contact.initial,
+            -1 if contact.firing is None else contact.firing,
+        )
+        for contact in contacts
+    ]
 
 
 def step_range(record: Record, row: int) -> tuple[int, int]:
@@ -98,15 +125,12 @@ def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid:
     peaks = problem.peaks(record)
     times = problem.firings
     contacts: list[Contact] = []
-    dotted: set[int] = set()
+    numbers = _Numbers()
     for row, (surface, t_in, v_in, t_out, v_out, _node, initial) in enumerate(record.contacts):
         is_pack = int(surface) == PACK_SURFACE
         first, last = step_range(record, row)
-        fired = int(np.searchsorted(times, t_in, side="right")) - 1
-        extra = False
-        if is_pack and not initial and fired >= 0:
-            extra = fired in dotted
-            dotted.add(fired)
+        fired = firing_before(t_in, times)
+        number = numbers.count(int(surface), bool(initial), fired)
         hard = rigid and not is_pack
         contacts.append(
             Contact(
@@ -120,7 +144,7 @@ def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid:
                 peak_force=None if hard else float(peaks[row, 2]),
                 loss=float(increments[first:last, 2 if is_pack else 3].sum()),
                 firing=fired if fired >= 0 else None,
-                extra=extra,
+                extra=number > DOT,
                 initial=bool(initial),
             )
         )
@@ -153,10 +177,10 @@ def loading_works(
 
 
 def dots_of(times: FloatArray, contacts: Sequence[Contact], works: FloatArray, t_end: float) -> list[Dot]:
-    """Assign pack contacts to firings by the rule of `Dot`; firings after `t_end`, s, are left out."""
+    """Return the dots of all firings; firings after `t_end`, s, are left out."""
     owned: dict[int, list[int]] = {}
-    for row, contact in enumerate(contacts):
-        if contact.surface == "pack" and not contact.initial and contact.firing is not None:
+    for row, (contact, number) in enumerate(zip(contacts, contact_numbers(contacts), strict=True)):
+        if number != NO_DOT and contact.firing is not None:
             owned.setdefault(contact.firing, []).append(row)
     dots: list[Dot] = []
     for index, fired_at in enumerate(times):

@@ -22,6 +22,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.results import Result, column, part
+from printhammer.run.dot_table import DotTable, ExtraDots
 from printhammer.run.ensemble_group import MOST_COLUMNS, Fired, Group, Job
 from printhammer.run.motion import Motion
 from printhammer.run.problem import MAX_STEPS, TOLERANCE, check_tolerance, laws_of
@@ -32,7 +33,15 @@ from printhammer.support.threads import PIECES_A_THREAD, Progress, in_threads, t
 if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
-__all__ = ["DISPLAY_TOLERANCE", "MODE_NAMES", "DotTable", "Ensemble", "EnsembleResult", "Strobes"]
+__all__ = [
+    "DISPLAY_TOLERANCE",
+    "MODE_NAMES",
+    "DotTable",
+    "Ensemble",
+    "EnsembleResult",
+    "ExtraDots",
+    "Strobes",
+]
 
 DISPLAY_TOLERANCE: Final = 5e-7
 """Tolerance for pictures: displacements are good to about 1e-4 of the stroke."""
@@ -41,24 +50,7 @@ Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)
 
 
-_FIRINGS: Final = "member firing"
 _TIMES: Final = "member strobe"
-
-
-class DotTable(Result):
-    """What the firings did, up to the most firings of any member; nan where there is nothing to tell."""
-
-    fired: BoolArray = column("1", "whether there was such a firing, and the run came so far", _FIRINGS)
-    fired_at: FloatArray = column("s", "time of the firing", _FIRINGS)
-    struck: BoolArray = column("1", "whether it made a dot", _FIRINGS)
-    flight_time: FloatArray = column("s", "time from firing to touch", _FIRINGS)
-    impact_speed: FloatArray = column("m/s", "velocity at touch", _FIRINGS)
-    peak_force: FloatArray = column("N", "largest pack force", _FIRINGS)
-    indentation: FloatArray = column("m", "largest indentation", _FIRINGS)
-    contact_time: FloatArray = column(
-        "s", "time from touch to leaving", _FIRINGS, more="nan also while the contact is open"
-    )
-    extra_contacts: IntArray = column("1", "further pack contacts before the next firing", _FIRINGS)
 
 
 class Strobes(Result):
@@ -105,6 +97,7 @@ class EnsembleResult(Result):
     reached: FloatArray = column("s", "time at which the run ended", "member")
     steps: IntArray = column("1", "steps of the integrator", "member")
     dots: DotTable | None = part("what the firings did", more="if asked for", default=None)
+    extra: ExtraDots | None = part("extra contacts", more="if asked for", default=None)
     strobes: Strobes | None = part("states at the times asked for", default=None)
     x: npt.NDArray[np.float32] | None = column(
         "m",
@@ -120,12 +113,14 @@ class EnsembleResult(Result):
         return f"{len(self.status)} runs of an ensemble"
 
     def entries(self) -> Entries:
-        """Return what was asked for; dots by their names, states as `strobe_t` and so on."""
+        """Return what was asked for; dots by their names, states as `strobe_t`, extra contacts likewise."""
         entries = super().entries()
         if self.x is None:
             del entries["x"]
         if self.strobes is not None:
             entries |= {f"strobe_{name}": entry for name, entry in self.strobes.entries().items()}
+        if self.extra is not None:
+            entries |= {f"extra_{name}": entry for name, entry in self.extra.entries().items()}
         return entries if self.dots is None else entries | self.dots.entries()
 
     @property
@@ -315,6 +310,7 @@ class Ensemble:
         self,
         *,
         dots: bool = False,
+        extra: bool = False,
         strobes: Literal["firings"] | Sequence[npt.ArrayLike] | None = None,
         times: npt.ArrayLike | None = None,
         x: npt.NDArray[np.float32] | None = None,
@@ -328,6 +324,8 @@ class Ensemble:
         ----------
         dots : bool, optional
             Keep what each firing did.
+        extra : bool, optional
+            Keep every extra contact too; with `dots` only.
         strobes : str or sequence of arrays, optional
             Keep the state at every firing ("firings"), or at ascending times, s, one array for each member.
         times : array, optional
@@ -360,8 +358,10 @@ class Ensemble:
                 " float32, without gaps"
             )
         moments = self._moments(strobes)
-        jobs = [Job(group, bool(dots), moments, grid, x) for group in self.groups]
+        jobs = [Job(group, bool(dots), bool(extra), moments, grid, x) for group in self.groups]
         _integrate(jobs, engine, workers, progress)
+        # Members with more extra contacts than there was room for run once more.
+        _integrate([job for job in jobs if job.make_room()], engine, workers, None)
         for job in jobs:
             job.finish(x)
         return EnsembleResult(
@@ -369,6 +369,9 @@ class Ensemble:
             reached=self._gathered([job.kept.reached for job in jobs]),
             steps=self._gathered([job.kept.steps for job in jobs]),
             dots=self._dot_table(jobs) if dots else None,
+            extra=ExtraDots.from_rows([(job.group.members, job.rows_of_extra()) for job in jobs])
+            if dots and extra
+            else None,
             strobes=None if strobes is None else self._strobes(jobs, moments),
             x=None if times is None else x,
         )
@@ -389,22 +392,9 @@ class Ensemble:
         return whole
 
     def _dot_table(self, jobs: Sequence[Job]) -> DotTable:
-        dots = self._spread([Ragged(job.kept.dots, job.group.firings.starts) for job in jobs])
-        fired_at = firings_of(self.drives).filled().copy()
+        rows = self._spread([job.rows_of_dots() for job in jobs])
         reached = self._gathered([job.kept.reached for job in jobs])
-        fired = fired_at <= reached[:, np.newaxis]
-        contacts = np.nan_to_num(dots[:, :, 0]).astype(np.int64)
-        return DotTable(
-            fired=fired,
-            fired_at=fired_at,
-            struck=contacts > 0,
-            flight_time=dots[:, :, 1] - fired_at,
-            impact_speed=dots[:, :, 2],
-            peak_force=dots[:, :, 5],
-            indentation=dots[:, :, 4],
-            contact_time=dots[:, :, 3] - dots[:, :, 1],
-            extra_contacts=np.maximum(contacts - 1, 0),
-        )
+        return DotTable.from_rows(rows, firings_of(self.drives).filled().copy(), reached)
 
     def _strobes(self, jobs: Sequence[Job], moments: Ragged) -> Strobes:
         states = self._spread([Ragged(job.kept.strobes, job.kept.strobe_starts) for job in jobs])
@@ -434,7 +424,7 @@ class Ensemble:
 
 def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Progress | None) -> None:
     works, lengths = [], []
-    sizes = [len(job.group.members) for job in jobs]
+    sizes = [job.order.size for job in jobs]
     for job, size in zip(jobs, sizes, strict=True):
         in_lanes = engine != "plain" and job.group.fits_lanes()
         if engine == "lanes" and not in_lanes:

@@ -19,6 +19,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce
 from printhammer.kernel.compile.specialise import Kernel
 from printhammer.kernel.lanes import layout as lane_layout
+from printhammer.kernel.model.dots import DOT_WIDTH
 from printhammer.kernel.model.layout import (
     CUBIC_PIECE,
     END,
@@ -47,7 +48,8 @@ if TYPE_CHECKING:
 _NODES: Final = 2048
 _CONTACTS: Final = 256
 MOST_COLUMNS: Final = 6
-_DOT_WIDTH: Final = 6
+_EXTRA: Final = 4
+"""Room for extra contacts of a member, beside one for each firing, before it is known how many there are."""
 _STROBE_WIDTH: Final = 4
 _ELECTRIC_WIDTH: Final = 3
 _PIECE: Final = 4 * lane_layout.LANES
@@ -210,21 +212,25 @@ def _scales(
 class Job:
     """One integration of a group: what to keep, and the arrays that it goes to.
 
-    Kept are what each firing did, if wanted; the states at the `moments`, times in s for each member of the
-    ensemble; and the displacements at the times of the `grid`, s, in `x`, which is that of the whole ensemble
-    and used as it is where the group is the whole.
+    Kept are what each firing did and each extra contact, both if wanted; the states at the `moments`, times
+    in s for each member of the ensemble; and the displacements at the times of the `grid`, s, in `x`, which
+    is that of the whole ensemble and used as it is where the group is the whole.
     """
 
     def __init__(
         self,
         group: Group,
         want_dots: bool,
+        want_extra: bool,
         moments: Ragged,
         grid: FloatArray,
         x: npt.NDArray[np.float32],
     ) -> None:
         self.group = group
+        self._want_extra = want_dots and want_extra
         count = len(group.members)
+        rows = group.firings.counts if want_dots else np.zeros(count, np.int64)
+        dot_starts = starts_of(2 * rows + _EXTRA if self._want_extra else rows)
         self.order = np.arange(count)
         own = moments.take(group.members)
         from printhammer.kernel.lanes.batch import Kept
@@ -237,7 +243,9 @@ class Job:
             status=np.zeros(count, np.int64),
             reached=np.zeros(count),
             steps=np.zeros(count, np.int64),
-            dots=np.empty((group.batch.firings.size if want_dots else 0, _DOT_WIDTH)),
+            extra=np.zeros(count, np.int64),
+            dot_starts=dot_starts,
+            dots=np.empty((dot_starts[-1], DOT_WIDTH)),
             strobes=np.empty(
                 (own.values.size, _STROBE_WIDTH + (_ELECTRIC_WIDTH if group.laws.circuit else 0))
             ),
@@ -249,6 +257,41 @@ class Job:
         if self.kept.x is not x:
             x[self.group.members] = self.kept.x
 
+    def rows_of_dots(self) -> Ragged:
+        """Return the rows of the firings of each member."""
+        if not self._want_extra:
+            return Ragged(self.kept.dots, self.kept.dot_starts)
+        return self._rows(self.kept.dot_starts[:-1], self.group.firings.counts)
+
+    def rows_of_extra(self) -> Ragged:
+        """Return the rows of the extra contacts of each member."""
+        return self._rows(self.kept.dot_starts[:-1] + self.group.firings.counts, self.kept.extra)
+
+    def _rows(self, begins: IntArray, counts: IntArray) -> Ragged:
+        """Return some of the kept rows of each member, from where they begin."""
+        starts = starts_of(counts)
+        places = np.arange(starts[-1]) + np.repeat(begins - starts[:-1], counts)
+        return Ragged(self.kept.dots[places], starts)
+
+    def make_room(self) -> bool:
+        """Make room for all extra contacts of members that had too little; whether there are such members.
+
+        They are those of the next integration, which fills their rows once more.
+        """
+        kept = self.kept
+        needed = self.group.firings.counts + kept.extra
+        short = needed > np.diff(kept.dot_starts)
+        if not self._want_extra or not short.any():
+            return False
+        self.order = np.flatnonzero(short)
+        starts = starts_of(needed)
+        dots = np.empty((starts[-1], DOT_WIDTH))
+        places = np.arange(starts[-1]) + np.repeat(kept.dot_starts[:-1] - starts[:-1], needed)
+        whole = np.repeat(~short, needed)
+        dots[whole] = kept.dots[places[whole]]
+        self.kept = kept._replace(dot_starts=starts, dots=dots)
+        return True
+
     def share_out(self, threads: int) -> int:
         """Spread the members over pieces so that neighbours do not come together; return their length.
 
@@ -256,7 +299,7 @@ class Job:
         """
         count = self.order.size
         pieces = threads * max(1, round(count / (_PIECE * threads)))
-        self.order = np.concatenate([np.arange(piece, count, pieces) for piece in range(pieces)])
+        self.order = np.concatenate([self.order[piece::pieces] for piece in range(pieces)])
         return -(-count // pieces)
 
     def prepare(self, lanes: bool) -> None:

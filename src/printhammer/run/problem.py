@@ -90,9 +90,13 @@ class _TooLong(Exception):
     """A stretch does not fit."""
 
 
-def fresh_carry(pause_after: float = math.inf, beyond: Beyond = AT_REST) -> FloatArray:
-    """Return what the kernel's `run` needs to begin, and to pause after so many nodes."""
+def fresh_carry(
+    start: float, state: tuple[float, float], pause_after: float = math.inf, beyond: Beyond = AT_REST
+) -> FloatArray:
+    """Return the state with which the kernel's `run` begins, and pauses after so many nodes."""
     array = np.zeros(carry.SIZE)
+    array[carry.TIME] = start
+    array[carry.POSITION_NOW], array[carry.VELOCITY] = state
     array[carry.PAUSE_AFTER] = pause_after
     if beyond.branch >= 0.0:
         array[carry.STATE] = carry.ON_BRANCH
@@ -285,7 +289,7 @@ class Problem:
         contact_capacity = _CONTACTS + int(flights)
         while True:
             nodes, contacts = self.room(capacity), np.empty((contact_capacity, 7))
-            carried = fresh_carry(beyond=self.beyond)
+            carried = fresh_carry(self.start, self.state, beyond=self.beyond)
             status, used, touched, steps = self._advance(
                 end, self.max_steps or MAX_STEPS, self.drive_arrays(), nodes, contacts, carried
             )
@@ -305,15 +309,8 @@ class Problem:
     ) -> tuple[int, int, int, int]:
         """Run to time `end`, s, or to a pause, from the start or from where `state` says."""
         status, used, touched, steps = self.kernel.run(
-            drive,
-            self.constants,
-            self.start,
-            float(self.state[0]),
-            float(self.state[1]),
+            (drive, self.constants, self.control, self.bounds, max_steps),
             float(end),
-            self.control,
-            self.bounds,
-            max_steps,
             nodes,
             contacts,
             state,
@@ -335,7 +332,7 @@ class Problem:
 
     def _stretches(self, end: float, capacity: int) -> Iterator[Stretch]:
         drive, nodes, contacts = self.drive_arrays(), self.room(capacity), np.empty((capacity, 7))
-        state = fresh_carry(max(capacity // 2, 2), self.beyond)
+        state = fresh_carry(self.start, self.state, max(capacity // 2, 2), self.beyond)
         status = PAUSED
         while status == PAUSED:
             status, used, touched, _steps = self._advance(end, MAX_STEPS, drive, nodes, contacts, state)

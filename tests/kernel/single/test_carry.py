@@ -30,20 +30,12 @@ def stretches(problem: Problem, end: float, pause_after: float) -> Iterator[tupl
     """Nodes, contacts, status and steps of each stretch of a run that pauses."""
     arrays = problem.drive_arrays()
     nodes, contacts = np.empty((4000, 5)), np.empty((400, 7))
-    carried = fresh_carry(pause_after)
+    carried = fresh_carry(problem.start, problem.state, pause_after)
     status = PAUSED
     while status == PAUSED:
         status, used, touched, steps = problem.kernel.run(
-            arrays,
-            problem.constants,
-            # What a run that goes on does not look at.
-            problem.start if carried[carry.STATE] == carry.FRESH else math.nan,
-            problem.state[0] if carried[carry.STATE] == carry.FRESH else math.nan,
-            problem.state[1] if carried[carry.STATE] == carry.FRESH else math.nan,
+            (arrays, problem.constants, problem.control, problem.bounds, MAX_STEPS),
             end,
-            problem.control,
-            problem.bounds,
-            MAX_STEPS,
             nodes,
             contacts,
             carried,

@@ -66,8 +66,11 @@ class Kept(NamedTuple):
         Whether to fill `dots`.
     status, reached, steps : array, shape (M,)
         Status code (int64), time reached [s], number of steps (int64).
-    dots : float64 array, shape (firings, 6)
-        See :mod:`printhammer.kernel.single.stretch`; rows as in `Batch.firings`.
+    extra : int64 array, shape (M,)
+        Number of extra contacts.
+    dot_starts, dots
+        Rows of :mod:`printhammer.kernel.model.dots` of all members one after the other, and the first of
+        each: the firings of the member, then its extra contacts as far as there is room.
     strobes : float64 array, shape (strobe times, 4), with a coil circuit (strobe times, 7)
         See :mod:`printhammer.kernel.single.stretch`.
     x : float32 array, shape (M, T)
@@ -81,6 +84,8 @@ class Kept(NamedTuple):
     status: Any
     reached: Any
     steps: Any
+    extra: Any
+    dot_starts: Any
     dots: Any
     strobes: Any
     x: Any

@@ -15,6 +15,7 @@ from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.lanes import layout as R
 from printhammer.kernel.methods.hermite import rises_through
 from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.dots import TIME_OUT
 from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, PACK, POSITION, Control, ForceLaw, Train
 from printhammer.kernel.model.transitions import FOLLOWING
 
@@ -23,12 +24,12 @@ if TYPE_CHECKING:
     from printhammer.kernel.lanes.steps import lane_acceleration, lane_contact_rate
     from printhammer.kernel.methods.contact import contact_switch
     from printhammer.kernel.methods.landing import first_switch, land_on_level, land_on_reversal
-    from printhammer.kernel.model.forces import Hammer, pack_force
+    from printhammer.kernel.model.forces import Hammer
     from printhammer.kernel.model.laws import HAS_DAMPING, RELOAD_ALONG_UNLOADING, pack_memory
     from printhammer.kernel.model.pulses import Drive, edges_at
     from printhammer.kernel.single.around import contact_unit
     from printhammer.kernel.single.resample import state_in_step
-    from printhammer.kernel.single.stretch import firing_before
+    from printhammer.kernel.single.stretch import deepen_dot, open_dot
 
 MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)
 """Mode of the members in each pool."""
@@ -270,9 +271,8 @@ def turn_in_pack(
     if (inward and which == R.LOADING_POOL) or (RELOAD_ALONG_UNLOADING and which == R.UNLOADING_POOL):
         return LEAVES
     dot = int(slot[R.DOT])
-    if dot >= 0 and not dots[dot, 4] >= x - hammer[FRONT]:
-        dots[dot, 4] = x - hammer[FRONT]
-        dots[dot, 5] = -pack_force(x, 0.0, M.LOADING, 0.0, hammer)
+    if dot >= 0:
+        deepen_dot(dots, dot, x, hammer)
     if inward:
         enter(pool, i, t, x, 0.0, M.LOADING, slot[R.PACK_STEP], 0.0)
         return R.LOADING_POOL if pool[R.A * R.BLOCK + i] > still else LEAVES
@@ -311,13 +311,9 @@ def after_switch(
         if not v > 0.0:
             return LEAVES
         slot[R.DOT] = -1.0
-        fired = firing_before(t, firings)
-        if want_dots and fired >= 0:
-            dots[fired, 0] += 1.0
-            if dots[fired, 0] == 1.0:
-                slot[R.DOT] = fired
-                dots[fired, 1] = t
-                dots[fired, 2] = v
+        if want_dots:
+            row, extra = open_dot(dots, int(slot[R.EXTRA]), M.PACK_SURFACE, False, t, v, firings)
+            slot[R.DOT], slot[R.EXTRA] = row, extra
         enter(pool, i, t, x, v, M.LOADING, slot[R.PACK_STEP], 0.0)
         return R.LOADING_POOL
     if following != M.FREE:
@@ -326,7 +322,7 @@ def after_switch(
     if switch == M.LEFT_FRONT:
         away, level = -v, hammer[FRONT]
         if int(slot[R.DOT]) >= 0:
-            dots[int(slot[R.DOT]), 3] = t
+            dots[int(slot[R.DOT]), TIME_OUT] = t
         slot[R.DOT] = -1.0
     if not away > 0.0:
         return LEAVES
@@ -361,10 +357,7 @@ def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Ha
     """Enter the deepest point so far of a pack contact that is open at the end."""
     dot = int(slot[R.DOT])
     if which == R.LOADING_POOL and dot >= 0:
-        x = pool[R.X * R.BLOCK + i]
-        if not dots[dot, 4] >= x - hammer[FRONT]:
-            dots[dot, 4] = x - hammer[FRONT]
-            dots[dot, 5] = -pack_force(x, 0.0, M.LOADING, 0.0, hammer)
+        deepen_dot(dots, dot, pool[R.X * R.BLOCK + i], hammer)
 
 
 @compiled

@@ -110,6 +110,7 @@ def begin_member(
     slot[R.CONTACT_STEP] = 0.05
     slot[R.UNIT] = 0.0
     slot[R.DOT] = -1.0
+    slot[R.EXTRA] = 0.0
     slot[R.END] = end
     slot[R.CAREFUL] = 0.0
     slot[R.EVENT_TIME] = t
@@ -172,7 +173,7 @@ def look_after(
     train = train_of(batch, m, under_way, live)
     times = kept.strobe_times[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
     strobes = kept.strobes[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
-    dots = kept.dots[batch.firing_starts[m] : batch.firing_starts[m + 1]]
+    dots = kept.dots[kept.dot_starts[m] : kept.dot_starts[m + 1]]
     event = int(pool[R.EVENT * R.BLOCK + i])
     switch = NO_SWITCH
     t, x, v = pool[i], 0.0, 0.0
@@ -216,6 +217,7 @@ def look_after(
         kept.status[m] = OK
         kept.reached[m] = pool[i]
         kept.steps[m] = int(pool[R.STEPS * R.BLOCK + i])
+        kept.extra[m] = int(slot[R.EXTRA])
         sample = int(slot[R.NEXT_SAMPLE])
         blank_states(strobes, int(slot[R.NEXT_STROBE]), times.size, kept.x[m], sample, kept.grid.size)
         return DONE
@@ -301,7 +303,7 @@ def lanes(
             hammer, control = batch.hammers[row], control_of(batch, row)
             train = train_of(batch, m, under_way, live)
             if kept.want_dots:
-                clear_dots(kept.dots[batch.firing_starts[m] : batch.firing_starts[m + 1]])
+                clear_dots(kept.dots[kept.dot_starts[m] : kept.dot_starts[m + 1]])
             slot[R.MEMBER] = m
             slot[R.NEXT_SAMPLE] = 0
             slot[R.NEXT_STROBE] = 0

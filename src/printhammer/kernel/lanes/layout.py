@@ -121,7 +121,7 @@ CONTACT_STEP = 5
 UNIT = 6
 """Unit of s of the backstop contact under way; 0 for one under way since the start."""
 DOT = 7
-"""Number of the firing whose dot the open pack contact makes, -1 for none."""
+"""Row of the open pack contact among the dots and extra contacts of the member, -1 for none."""
 END = 8
 CAREFUL = 9
 """Whether the next switch is located with steps of the plain kernel."""
@@ -133,7 +133,9 @@ EVENT_TIME = 13
 """Time at which the latest event was looked after."""
 EVENTS = 14
 """How many events in a row did not move time."""
-SLOT_WIDTH = 15
+EXTRA = 15
+"""Number of extra contacts so far."""
+SLOT_WIDTH = 16
 
 # Events, to be added up.
 SWITCH = 1.0

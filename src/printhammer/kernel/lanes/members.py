@@ -58,7 +58,7 @@ def members(
         control = control_of(batch, row)
         limits = (bounds[row, 0], bounds[row, 1], bounds[row, 2], bounds[row, 3])
         train = train_of(batch, m, under_way[1], live[1])
-        own_dots = kept.dots[batch.firing_starts[m] : batch.firing_starts[m + 1]]
+        own_dots = kept.dots[kept.dot_starts[m] : kept.dot_starts[m + 1]]
         own_times = kept.strobe_times[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
         own_strobes = kept.strobes[kept.strobe_starts[m] : kept.strobe_starts[m + 1]]
         picture = kept.x[m]
@@ -73,6 +73,7 @@ def members(
         if kept.want_dots:
             clear_dots(own_dots)
         carry[C.STATE] = C.FRESH
+        carry[C.TIME], carry[C.POSITION_NOW], carry[C.VELOCITY] = begin, states[m, 1], states[m, 2]
         carry[C.PAUSE_AFTER] = nodes.shape[0] // 2
         if states[m, 3] >= 0.0:
             carry[C.STATE] = C.ON_BRANCH
@@ -81,18 +82,17 @@ def members(
             carry[C.WITH_CURRENT] = 1.0
             for j in range(ELECTRIC_WIDTH):
                 carry[C.ELECTRIC + j] = states[m, 5 + j]
-        code, count = PAUSED, 0
+        code, count, extra = PAUSED, 0, 0
         while code == PAUSED:
             code, used, touched, count = run(
-                (train.firings, train.begins, train.pieces, batch.replace, under_way[0], live[0]),
-                hammer,
-                begin,
-                states[m, 1],
-                states[m, 2],
+                (
+                    (train.firings, train.begins, train.pieces, batch.replace, under_way[0], live[0]),
+                    hammer,
+                    control,
+                    limits,
+                    batch.max_steps,
+                ),
                 batch.ends[m],
-                control,
-                limits,
-                batch.max_steps,
                 nodes,
                 contacts,
                 carry,
@@ -101,7 +101,7 @@ def members(
                 return number
             record = nodes[:used]
             if kept.want_dots:
-                note_dots(own_dots, contacts[:touched], record, train, hammer)
+                extra = note_dots(own_dots, extra, contacts[:touched], record, train, hammer)
             strobe, sample = note_states(
                 own_strobes,
                 own_times,
@@ -120,5 +120,6 @@ def members(
         blank_states(own_strobes, strobe, own_times.size, picture, sample, grid.size)
         kept.status[m] = code
         kept.steps[m] = count
+        kept.extra[m] = extra
         kept.reached[m] = carry[C.TIME]
     return len(which)

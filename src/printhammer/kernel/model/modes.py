@@ -62,6 +62,8 @@ CIRCUIT = 12
 """The current of the coil takes another path."""
 REST_ENDED = 13
 """The current of the coil moves an armature at rest."""
+HOLDS = 14
+"""Not a switch: the armature goes on resting, and the node at which the rest began holds on."""
 
 # Statuses of a run.
 OK = 0

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from printhammer.kernel.compile.compiling import compiled
+from printhammer.kernel.model import dots as D
 from printhammer.kernel.model.layout import FRONT, Train
-from printhammer.kernel.model.modes import LOADING, PACK_SURFACE, RELOADING, UNLOADING
+from printhammer.kernel.model.modes import LOADING, RELOADING, UNLOADING
 
 if TYPE_CHECKING:
     from printhammer.kernel.model.circuit import coil_current, turn_current
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
         state_in_step,
     )
 
-DOT_WIDTH = 6
-"""Columns of a dot: pack contacts, time and velocity in, time out, depth, peak force."""
-
 STROBE_WIDTH = 4
 """Columns of a strobe: displacement, velocity, mode, memory; with a coil circuit `ELECTRIC_WIDTH` more."""
 
@@ -37,26 +35,55 @@ ELECTRIC_WIDTH = 3
 """Columns of an electric state: currents in coil and shorted turn [A], voltage of the reservoir [V]."""
 
 
-@compiled
-def firing_before(t: float, firings: Any) -> int:
-    """Return the number of the latest firing at or before time `t` [s], -1 if there is none."""
-    low, high = 0, firings.size
-    while low < high:
-        middle = (low + high) // 2
-        if firings[middle] <= t:
-            low = middle + 1
-        else:
-            high = middle
-    return low - 1
+firing_before = compiled(D.firing_before)
+contact_number = compiled(D.contact_number)
 
 
 @compiled
 def clear_dots(dots: Any) -> None:
-    """Make all dots lost ones."""
+    """Make all dots lost ones, without extra contacts."""
     for i in range(dots.shape[0]):
-        dots[i, 0] = 0.0
-        for j in range(1, DOT_WIDTH):
+        dots[i, D.CONTACTS] = 0.0
+        for j in range(D.CONTACTS + 1, D.DOT_WIDTH):
             dots[i, j] = np.nan
+
+
+@compiled
+def open_dot(
+    dots: Any, extra: int, surface: int, initial: bool, t: float, v: float, firings: Any
+) -> tuple[int, int]:
+    """Count a contact that begins at time `t` with velocity `v` for its firing and enter it into its row.
+
+    Returns
+    -------
+    tuple
+        Index of the row, -1 if the contact belongs to no firing or there is no row left for it; and the
+        number of extra contacts so far, given as `extra` before.
+    """
+    fired = firing_before(t, firings)
+    earlier = int(dots[fired, D.CONTACTS]) if fired >= 0 else 0
+    number = contact_number(surface, initial, fired, earlier)
+    if number == D.NO_DOT:
+        return -1, extra
+    dots[fired, D.CONTACTS] = earlier + 1.0
+    row = fired
+    if number != D.DOT:
+        row = firings.size + extra
+        extra += 1
+        if row >= dots.shape[0]:
+            return -1, extra
+        dots[row, D.FIRING] = fired
+    dots[row, D.TIME_IN] = t
+    dots[row, D.SPEED_IN] = v
+    return row, extra
+
+
+@compiled
+def deepen_dot(dots: Any, row: int, x: float, hammer: Hammer) -> None:
+    """Note a reversal at displacement `x` [m] in a row if it is the deepest so far."""
+    if not dots[row, D.DEPTH] >= x - hammer[FRONT]:
+        dots[row, D.DEPTH] = x - hammer[FRONT]
+        dots[row, D.FORCE] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
 
 
 @compiled
@@ -73,31 +100,31 @@ def deepest_node(contact: Any, nodes: Any, hammer: Hammer) -> tuple[float, float
 @compiled
 def note_dots(
     dots: Any,
+    extra: int,
     contacts: Any,
     nodes: Any,
     train: Train,
     hammer: Hammer,
-) -> None:
-    """Enter the pack contacts of a stretch into the dots of its member."""
-    for row in range(contacts.shape[0]):
-        contact = contacts[row]
-        if contact[0] != PACK_SURFACE or contact[6] != 0.0:
-            continue
-        fired = firing_before(contact[1], train.firings)
-        if fired < 0:
-            continue
-        dots[fired, 0] += 1.0
-        if dots[fired, 0] > 1.0:
+) -> int:
+    """Enter the pack contacts of a stretch into the rows of its member.
+
+    Returns the number of its extra contacts so far, given as `extra` before.
+    """
+    for number in range(contacts.shape[0]):
+        contact = contacts[number]
+        row, extra = open_dot(
+            dots, extra, int(contact[0]), contact[6] != 0.0, contact[1], contact[2], train.firings
+        )
+        if row < 0:
             continue
         if MEMORY:
             depth, force = deepest_node(contact, nodes, hammer)
         else:
             _t, depth, force = peaks_of(contact, nodes, train, hammer)
-        dots[fired, 1] = contact[1]
-        dots[fired, 2] = contact[2]
-        dots[fired, 3] = contact[3]
-        dots[fired, 4] = depth
-        dots[fired, 5] = force
+        dots[row, D.TIME_OUT] = contact[3]
+        dots[row, D.DEPTH] = depth
+        dots[row, D.FORCE] = force
+    return extra
 
 
 @compiled

@@ -14,7 +14,7 @@ from printhammer.printing.dots.judging import Judgement, Limits, judge
 from printhammer.printing.dots.nominal import WAIT, SinglePulse
 from printhammer.printing.dots.strategy import FIRST_SLOT, Strategy, checked_drives, open_loop
 from printhammer.results import Declared, column, part
-from printhammer.run.ensemble import DotTable, Ensemble
+from printhammer.run.ensemble import DotTable, Ensemble, ExtraDots
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import Progress
 
@@ -41,6 +41,7 @@ class Trial(Declared):
     dots: DotTable = part("what the firings did")
     judgement: Judgement = part("how far off they are")
     statuses: tuple[str, ...] = part("how the runs ended")
+    extra: ExtraDots | None = part("extra contacts", more="if asked for", default=None)
 
     @property
     def passed(self) -> BoolArray:
@@ -60,13 +61,16 @@ def attempt(
     limits: Limits,
     tolerance: float,
     judged_from: int = 0,
+    extra: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Trial:
     """Print all of some patterns in all of some cases, from rest.
 
     Patterns are numbers of the slots at which dots are wanted, at least one each; slots before `judged_from`
-    are a lead-in. Each member has a status: a run that could not go on is no exception, and does not pass.
+    are a lead-in. With `extra` every extra contact is kept too.
+
+    Each member has a status: a run that could not go on is no exception, and does not pass.
     """
     drives = joined([checked_drives(strategy, case.hammer, patterns, case.rate) for case in cases])
     every = list(patterns) * len(cases)
@@ -79,7 +83,7 @@ def attempt(
     ends = np.maximum(firings_of(drives).last, due.max(axis=1)) + WAIT
     hammers = [case.hammer for case in cases for _ in patterns]
     result = Ensemble(hammers, drives, ends, tolerance=tolerance).run(
-        dots=True, threads=threads, progress=progress
+        dots=True, extra=extra, threads=threads, progress=progress
     )
     dots = result.dots
     assert dots is not None
@@ -95,4 +99,5 @@ def attempt(
         dots=dots,
         judgement=judgement,
         statuses=tuple(result.status_names),
+        extra=result.extra,
     )

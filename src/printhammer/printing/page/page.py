@@ -22,7 +22,6 @@ from printhammer.drive.input import read_positive
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.printing.dots.extra_dots import extra_dots
 from printhammer.printing.dots.judging import FAULTS, PRESETS, Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import OpenLoop, Strategy, name_of, open_loop, slots_of
@@ -277,9 +276,10 @@ def print_page(
             rows[first : first + _PIECE],
             strategy,
             progress=tell,
+            extra=True,
             **options,
         )
-        pieces.append(_dots_of(trial, options))
+        pieces.append(_dots_of(trial))
     counts = np.array([len(slots) for slots in rows])
     before = np.cumsum([0, *(piece["run"].size for piece in pieces[:-1])])
     for piece, count in zip(pieces, before, strict=True):
@@ -303,13 +303,11 @@ def print_page(
     )
 
 
-def _dots_of(trial: Trial, options: dict[str, Any]) -> dict[str, Any]:
+def _dots_of(trial: Trial) -> dict[str, Any]:
     """Return what became of the dots of some wires, one wire after the other."""
-    ((hammer, single, _rate),) = trial.cases
-    dots, judged, wanted = trial.dots, trial.judgement, trial.slots >= 0
-    extra = extra_dots(
-        hammer, trial.drives, trial.ends, dots, tolerance=options["tolerance"], threads=options["threads"]
-    )
+    ((_hammer, single, _rate),) = trial.cases
+    dots, extra, judged, wanted = trial.dots, trial.extra, trial.judgement, trial.slots >= 0
+    assert extra is not None
     place = np.cumsum(wanted).reshape(wanted.shape) - 1
     late = extra.touch - single.flight_time - trial.due[extra.member, extra.firing]
     return {

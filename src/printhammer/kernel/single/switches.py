@@ -1,0 +1,139 @@
+"""What follows a step that ends in a switch: an edge of the drive, another path, another mode."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.compiling import inlined
+from printhammer.kernel.model import modes as M
+from printhammer.kernel.model.layout import BACKSTOP_PART, FRONT, MAGNET, POSITION
+from printhammer.kernel.model.transitions import FOLLOWING
+from printhammer.kernel.single import carry as C
+
+if TYPE_CHECKING:
+    from printhammer.kernel.model.circuit import next_path
+    from printhammer.kernel.model.laws import HAS_CIRCUIT, RIGID, backstop_rebound
+    from printhammer.kernel.single.carry import Setup
+    from printhammer.kernel.single.phases import (
+        State,
+        accelerate,
+        acceleration_in,
+        electric_of,
+        keep_electric,
+        note_node,
+        pass_edge,
+        rate_in_backstop,
+    )
+    from printhammer.kernel.single.record import close_contact, open_contact
+    from printhammer.kernel.single.steps import reverse
+
+
+@inlined
+def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
+    """Go on after the switch in which a step ended."""
+    if switch == M.EDGE:
+        pass_edge(state, setup)
+        accelerate(state, setup)
+        if int(state[C.MODE]) == M.BACKSTOP:
+            rate_in_backstop(state, setup)
+    elif HAS_CIRCUIT and switch in (M.CIRCUIT, M.REST_ENDED):
+        if switch == M.CIRCUIT:
+            electric = next_path(
+                state[C.TIME], state[C.POSITION_NOW], electric_of(state), setup.hammer, setup.train.live
+            )
+            keep_electric(electric, state)
+        accelerate(state, setup)
+        if int(state[C.MODE]) == M.BACKSTOP:
+            rate_in_backstop(state, setup)
+    elif switch != M.NO_SWITCH:
+        if switch == M.REACHED_BACKSTOP:
+            reach_backstop(state, setup, nodes, contacts)
+        elif switch == M.REACHED_FRONT:
+            reach_front(state, setup, contacts)
+        elif switch == M.REVERSAL:
+            if state[C.POSITION_NOW] <= setup.hammer[FRONT]:
+                close_now(state, contacts)
+                state[C.MODE] = M.FREE
+            else:
+                reverse(state, setup)
+        elif switch in (M.LEFT_FRONT, M.LEFT_BACKSTOP):
+            leave(switch, state, setup, contacts)
+        else:
+            follow(switch, state)
+            if int(state[C.MODE]) == M.BACKSTOP:
+                depth = setup.hammer[POSITION] - state[C.POSITION_NOW]
+                state[C.ROOT] = math.sqrt(max(depth, 0.0))
+        accelerate(state, setup)
+
+
+@inlined
+def follow(switch: int, state: State) -> None:
+    """Take the mode that follows a switch."""
+    state[C.MODE] = FOLLOWING[int(state[C.MODE]), switch]
+
+
+@inlined
+def open_now(surface: int, state: State, contacts: Any) -> None:
+    """Begin a contact."""
+    state[C.TOUCHED] = open_contact(
+        contacts,
+        int(state[C.TOUCHED]),
+        surface,
+        state[C.TIME],
+        state[C.VELOCITY],
+        int(state[C.USED]),
+        False,
+    )
+
+
+@inlined
+def close_now(state: State, contacts: Any) -> None:
+    """End the latest contact."""
+    close_contact(contacts, int(state[C.TOUCHED]), state[C.TIME], state[C.VELOCITY])
+
+
+@inlined
+def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
+    """Go on after a touch of the backstop; a rigid one throws the armature back at once, or it rests."""
+    open_now(M.BACKSTOP_SURFACE, state, contacts)
+    if RIGID:
+        hammer = setup.hammer
+        note_node(M.FREE, 0.0, state, setup, nodes)
+        v = backstop_rebound(hammer[BACKSTOP_PART:MAGNET], state[C.VELOCITY])
+        state[C.VELOCITY] = v
+        a = acceleration_in(M.FREE, v, state, setup)
+        if a < 0.0 and v * v <= -2.0 * a * 1e-12 * setup.control[0]:
+            state[C.VELOCITY] = 0.0
+            state[C.MODE] = M.RESTING
+        else:
+            close_now(state, contacts)
+    else:
+        follow(M.REACHED_BACKSTOP, state)
+        state[C.ROOT] = 0.0
+
+
+@inlined
+def reach_front(state: State, setup: Setup, contacts: Any) -> None:
+    """Go on after the armature has come to the front of the pack."""
+    v = max(state[C.VELOCITY], 0.0)
+    state[C.VELOCITY] = v
+    # A touch without velocity opens a contact only if the armature is pushed on.
+    if v > 0.0 or acceleration_in(M.FREE, v, state, setup) > 0.0:
+        open_now(M.PACK_SURFACE, state, contacts)
+        follow(M.REACHED_FRONT, state)
+
+
+@inlined
+def leave(switch: int, state: State, setup: Setup, contacts: Any) -> None:
+    """Go on after the armature has left a surface, exactly there."""
+    hammer = setup.hammer
+    close_now(state, contacts)
+    state[C.POSITION_NOW] = hammer[POSITION] if switch == M.LEFT_BACKSTOP else hammer[FRONT]
+    follow(switch, state)
+    if switch == M.LEFT_BACKSTOP and state[C.VELOCITY] <= 0.0:
+        state[C.VELOCITY] = 0.0
+        if acceleration_in(M.FREE, 0.0, state, setup) < 0.0:
+            open_now(M.BACKSTOP_SURFACE, state, contacts)
+            state[C.MODE] = M.BACKSTOP
+            state[C.ROOT] = 0.0
