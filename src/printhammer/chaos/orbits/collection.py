@@ -5,17 +5,33 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, orbits_table
 from printhammer.results import Column, Result, part, scalar
 from printhammer.results.result import stacked
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Style,
+    Summary,
+    multiplier,
+    styled,
+)
 from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_STYLES: Final[dict[str, Style]] = {
+    "stable": "good",
+    "saddle": "cyan",
+    "unstable": "magenta",
+    "undecided": "poor",
+}
 
 
 class Orbits(Result):
@@ -38,6 +54,28 @@ class Orbits(Result):
     def title(self) -> str:
         """One line that says what the orbits are."""
         return f"periodic orbits of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
+
+    def summary(self) -> Summary:
+        """Return the orbits, a row each, and how the search ended."""
+        if not self.found:
+            return Summary([self.message])
+        work = "drive_work" if self.regime.fired.quantity == "force" else "coil_work"
+        names = [work, "pack_loss", "backstop_loss"]
+        if self.regime.hammer.damping is not None:
+            names.append("damping_loss")
+        columns = [
+            Cells("firings", [orbit.firings for orbit in self]),
+            Cells("kind", [styled(_STYLES[orbit.kind], orbit.kind) for orbit in self], left=True),
+            Cells("multipliers", ["  ".join(map(multiplier, orbit.multipliers)) for orbit in self]),
+            Cells("backstop\ncontacts", [orbit.backstop_contacts for orbit in self]),
+            Cells("dots", [orbit.printed for orbit in self]),
+            Cells("lost", [orbit.lost for orbit in self]),
+            *(
+                Cells(name.replace("_", " "), [getattr(orbit.energy, name, None) for orbit in self], "J")
+                for name in names
+            ),
+        ]
+        return Summary([Grid(columns), "", self.message])
 
     def __len__(self) -> int:
         return len(self.found)

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.options import Units, range_with_unit, with_unit
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
-from printhammer.cli.screen import facts
+from printhammer.cli.screen import facts, render
 
 if TYPE_CHECKING:
     from printhammer.chaos.basins.basins import Basins
-    from printhammer.chaos.basins.quench import QuenchMap
     from printhammer.chaos.orbits.manifolds import Manifolds
     from printhammer.hammer.hammer import Hammer
 
 _BASINS: Final = "Basins"
 _QUENCH: Final = "Quench map"
-_ROWS: Final = 12
 _CROSSINGS: Final = 6
 """Length of a manifold over the longer side of the plane."""
 _PIECES: Final = 200
@@ -76,24 +73,25 @@ def basins(
     with job.counting("cells") as tell:
         if quench:
             mapped = quench_map(hammer, progress=tell, **passed)
-            status, content, rows = mapped.status, Content.of(mapped), quenched(mapped, units)
+            status, content, summary = mapped.status, Content.of(mapped), mapped.summary()
         else:
             planes = computed(hammer, progress=tell, **firing, **passed)
-            status, rows = planes.status, led(planes, box, units)
+            status, summary = planes.status, planes.summary(box)
             content = Content.of(planes)
+    shown = render(summary, units)
     if saddles is not None:
         curves, said = curves_of(job, planes, saddles)
-        rows += said
+        shown.append(facts(said))
         content = Content.of(planes, manifolds=curves)
     return Answer(
-        [facts(rows)],
+        shown,
         note=f"{status.size} cells, computed in {job.seconds:.2g} s",
         files={"out": content},
         complaints=ended_early(status[status != NO_STATE_STATUS], status.size),
     )
 
 
-def curves_of(job: Job, planes: Basins, longest: int) -> tuple[list[Manifolds], list[tuple[str, str | None]]]:
+def curves_of(job: Job, planes: Basins, longest: int) -> tuple[list[Manifolds], list[tuple[str, str]]]:
     """Return the manifolds of all saddles of up to so many firings, and what is said of them."""
     import numpy as np
 
@@ -114,63 +112,7 @@ def curves_of(job: Job, planes: Basins, longest: int) -> tuple[list[Manifolds], 
             way = _CROSSINGS * float(spans.max())
             curves.append(manifolds(saddle, length=way, spacing=float(spans.max()) / _PIECES))
             tell(number, len(shown))
-    rows: list[tuple[str, str | None]] = [("saddles", f"manifolds of {len(curves)} drawn")]
+    rows = [("saddles", f"manifolds of {len(curves)} drawn")]
     if len(known) > len(shown):
         rows.append(("", f"{len(known) - len(shown)} more are in the pack at the firing"))
     return curves, rows
-
-
-def led(result: Basins, box: int | None, units: Units) -> list[tuple[str, str | None]]:
-    """Return the attractors with their shares, the cells that lead to none, and the basin entropy."""
-    from printhammer.chaos.basins.basins import BOX, UNDECIDED
-
-    rows: list[tuple[str, str | None]] = []
-    share, error = result.shares
-    for row, attractor in enumerate(result.attractors[:_ROWS]):
-        x, v = attractor.states[0].tolist()
-        first = f", first at {with_unit(x, 'length', units)}, {with_unit(v, 'speed', units)}"
-        name = attractor.name.replace("-", " ")
-        part = f"{100.0 * share[row]:.2f} ± {100.0 * error[row]:.2f} % of the states"
-        rows.append(
-            (
-                f"attractor {row + 1}",
-                f"[bold]{name}[/bold], {part}{'' if attractor.period is None else first}",
-            )
-        )
-    if len(result.attractors) > _ROWS:
-        rows.append(("", f"and {len(result.attractors) - _ROWS} more"))
-    after = (
-        f" after {result.firings.max()} firings, more --rounds may tell" if result.counts[UNDECIDED] else ""
-    )
-    rows += [
-        (name, f"{result.counts[label]} of {result.labels.size} cells{after if label == 0 else ''}")
-        for label, name in ((0, "undecided"), (-1, "ended early"), (-2, "no state"))
-        if result.counts[label] or label == 0
-    ]
-    entropy = result.entropy(box=min(BOX, *result.labels.shape) if box is None else box)
-    boundary = (
-        "no box on a boundary"
-        if math.isnan(entropy.boundary_entropy)
-        else f"{entropy.boundary_entropy:.4f} in the {entropy.boundary_boxes} boxes on a boundary"
-        f"{', more than ln 2: a fractal one' if entropy.fractal else ''}"
-    )
-    boxes = f"{entropy.boxes} boxes of {entropy.box} x {entropy.box} cells"
-    return [*rows, ("basin entropy", f"{entropy.entropy:.4f} in {boxes}, {boundary}")]
-
-
-def quenched(result: QuenchMap, units: Units) -> list[tuple[str, str | None]]:
-    """Return how many second dots are lost, and how the others differ from the first."""
-    force = with_unit(result.single_force, "force", units)
-    flight = with_unit(result.single_flight_time, "time", units)
-    rows: list[tuple[str, str | None]] = [
-        (
-            "second dots",
-            f"{int(result.struck.sum())} printed, {int(result.lost.sum())} of {result.status.size} lost",
-        ),
-        ("first alone", f"{force}, flight time {flight}"),
-    ]
-    if result.struck.any() and math.isfinite(result.single_force):
-        ratio, gain = result.force_ratio[result.struck], result.flight_gain[result.struck]
-        rows.append(("force ratio", f"{ratio.min():.3f} to {ratio.max():.3f}"))
-        rows.append(("flies shorter by", range_with_unit(gain, "time", units)))
-    return rows

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.console import RenderableType
-from rich.markup import escape
-
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
-from printhammer.cli.screen import Column, multiplier, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.regimes import Branches
     from printhammer.hammer.hammer import Hammer
 
@@ -114,12 +110,12 @@ def continue_(
             result = _followed(job, hammer, parameter, bounds, doublings, **firing, **start, **passed)
     except InterruptedBranches as interrupt:
         interrupted, result = True, interrupt.branches
-    job.show(*described(result))
+    job.show(*render(result.summary()))
     if second is not None and ends is not None and not interrupted:
         with job.counting("curves", remaining=False) as tell:
             chart = stability_chart(result[0], second, ends, grid=(grid, grid), progress=tell)
         return Answer(
-            ["", escape(chart.message)],
+            ["", *render(chart.summary())],
             files={"out": Content.of(chart)},
         )
     known = len(result) and second is None
@@ -149,29 +145,3 @@ def _followed(
     with job.counting("orbits", remaining=False) as tell:
         branch = continuation(hammer, parameter, bounds, progress=tell, **options)
     return follow_doublings(branch, levels, most=options["most"])
-
-
-def described(result: Branches) -> list[RenderableType]:
-    """Return what branches were found, what happens on them, and why they end."""
-    parts: list[RenderableType] = []
-    for i, branch in enumerate(result):
-        parts.append(f"[bold]{i + 1}[/bold]  {escape(branch.message)}")
-        parts += [
-            f"   [green]stable[/green] from {low:.9g} to {high:.9g} {branch.unit}"
-            for low, high in branch.stable_ranges
-        ]
-        if branch.events:
-            parts.append(table(_columns(branch), branch.events))
-        parts.append("")
-    refused = [f"[yellow]not followed[/yellow] {escape(sentence)}" for sentence in result.refused]
-    return [*parts, escape(result.message), *refused]
-
-
-def _columns(branch: Branch) -> tuple[Column[Any], ...]:
-    unit = branch.unit if branch.unit != "1" else ""
-    return (
-        Column(branch.parameter, lambda event: event.value, unit=unit, format=".9g"),
-        Column("what happens", lambda event: event.message, left=True),
-        Column("multipliers", lambda event: "  ".join(multiplier(complex(m)) for m in event.multipliers)),
-        Column("", lambda event: "" if event.sharp else "between two orbits", left=True),
-    )

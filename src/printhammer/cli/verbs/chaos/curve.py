@@ -5,17 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.console import RenderableType
-from rich.markup import escape
-
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
-from printhammer.cli.screen import Column, multiplier, table
+from printhammer.cli.screen import render
 from printhammer.cli.verbs.chaos.continuation import both, read_state
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve
     from printhammer.hammer.hammer import Hammer
 
 _START: Final = "Start"
@@ -106,22 +102,4 @@ def curve(
         with job.counting("orbits", remaining=False) as tell:
             branch = continuation(hammer, parameter, ends, progress=tell, **firing, **orbit, **passed)
         result = bifurcation_curve(branch, second, bounds, **chosen)
-    return Answer(described(result), files={"out": Content.of(result)})
-
-
-def described(result: BifurcationCurve) -> list[RenderableType]:
-    """Return what the curve is, and its points of codimension two."""
-    parts: list[RenderableType] = []
-    if result.points:
-        parts += [table(_columns(result), result.points), ""]
-    return [*parts, escape(result.message)]
-
-
-def _columns(result: BifurcationCurve) -> tuple[Column[Any], ...]:
-    units = [unit if unit != "1" else "" for unit in result.units]
-    return (
-        Column(result.names[0], lambda point: point.first, unit=units[0], format=".9g"),
-        Column(result.names[1], lambda point: point.second, unit=units[1], format=".9g"),
-        Column("what happens", lambda point: point.message, left=True),
-        Column("multipliers", lambda point: "  ".join(multiplier(complex(m)) for m in point.multipliers)),
-    )
+    return Answer(render(result.summary()), files={"out": Content.of(result)})

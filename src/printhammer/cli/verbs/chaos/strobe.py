@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from printhammer.cli import options as opt
-from printhammer.cli.options import Units, range_with_unit
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
-from printhammer.cli.screen import facts, repeated, train_line
+from printhammer.cli.screen import render, train_line
 
 if TYPE_CHECKING:
-    from printhammer.chaos import Strobe
     from printhammer.hammer.hammer import Hammer
 
 
@@ -38,34 +37,8 @@ def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **pa
     result = points_of(hammer, **firing, **passed)
     drive = result.drive
     return Answer(
-        [facts(summary(result, units))],
+        render(result.summary(), units),
         note=train_line(drive.waveform.shape, drive.quantity, drive.overlap, result.period),
         files={"out": Content.of(result)},
         complaints=[] if result.ok else [f"the run ended early: {result.status}"],
     )
-
-
-def summary(result: Strobe, units: Units) -> list[tuple[str, str | None]]:
-    """Return points and verdict."""
-    import numpy as np
-
-    known = np.isfinite(result.x)
-    first, last = int(result.firing[0]), int(result.firing[-1])
-    at = f", {result.phase:g} of a period later" if result.phase else ""
-    rows: list[tuple[str, str | None]] = [
-        ("points", f"{int(known.sum())}, at the firings {first} to {last}{at}"),
-        ("displacement", range_with_unit(result.x[known], "length", units)),
-        ("velocity", range_with_unit(result.v[known], "speed", units)),
-    ]
-    if result.current is not None:
-        rows.append(("current", range_with_unit(result.current[known], "current", units)))
-    judged = result.verdict
-    if judged is None:
-        return rows
-    style = "yellow" if judged.name == "undecided" else "green"
-    return [
-        *rows,
-        ("verdict", f"[bold {style}]{judged.name.replace('-', ' ')}[/bold {style}]"),
-        ("because", judged.reason or None),
-        *repeated("evidence", judged.phrases),
-    ]

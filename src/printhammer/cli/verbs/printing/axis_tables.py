@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from rich.table import Table
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, check_endings
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.control.axes import AxisTables
     from printhammer.hammer.hammer import Hammer
-
-_ROWS = 24
 
 
 def tuned_along(
@@ -43,8 +36,8 @@ def tuned_along(
         made = made.quantised(header["tick"])
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
-    job.show(_table(made, units), note=f"tuned in {job.seconds:.2g} s{size}")
-    return Answer(files={"out": Content(partial(_save, made, header))})
+    job.show(*render(made.summary(), units), note=f"tuned in {job.seconds:.2g} s{size}")
+    return Answer(files={"out": Content(lambda path: made.save(path, **header))})
 
 
 def _read(written: str) -> tuple[str, list[float]]:
@@ -55,24 +48,3 @@ def _read(written: str) -> tuple[str, list[float]]:
     if axis not in AXES:
         raise InputError(f"--along {written!r}: expected one of {', '.join(AXES)} first")
     return axis, opt.between(opt.read_span(rest, f"--along {axis}"), AXES[axis].unit, f"--along {axis}")
-
-
-def _save(made: AxisTables, header: dict[str, Any], path: Path) -> None:
-    made.save(path, **header)
-
-
-def _table(made: AxisTables, units: Units) -> Table:
-    """Return the pulse from rest and how far off the entries are, a row for each value."""
-    from printhammer.control.axes import AXES
-
-    def worst(row: int) -> float:
-        return 100.0 * float(made.tables[row].deviation.max())
-
-    columns: tuple[Column[int], ...] = (
-        Column(made.axis, lambda row: made.values[row], unit=AXES[made.axis].unit, format=".6g"),
-        Column("width from rest", lambda row: float(made.tables[row].width[0, 0]), "time"),
-        Column("advance from rest", lambda row: float(made.tables[row].advance[0, 0]), "time"),
-        Column("worst,\nof the limits", worst, "", "%", ".1f"),
-    )
-    title = f"Tables along the {made.axis} at {made.tables[0].rates[0]:g} Hz"
-    return table(columns, range(len(made.values)), units, title=title, most=_ROWS)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, load_hammer, verb
-from printhammer.cli.screen import Column, facts, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.control.duty import ThermalDuty
-    from printhammer.control.thermal_limit import ThermalLimit
+    pass
 
 _COIL: Final = "Coil"
 _NEEDED: Final = ("thermal_resistance", "limit")
@@ -62,7 +60,7 @@ def duty(
             raise InputError(f"{hammer} is given, expected no hammer beside --rates")
         with located(str(rates)):
             behind = thermal_limit(**read_rates(rates))
-        return Answer(limit_shown(behind), files={"out": Content.of(behind)})
+        return Answer(render(behind.summary()), files={"out": Content.of(behind)})
     from printhammer.control.duty import thermal_duty
 
     if (hammer is None) == (heat is None):
@@ -71,7 +69,7 @@ def duty(
         if name not in passed:
             raise InputError(f"--{name.replace('_', '-')} is missing, expected it beside the heat of a dot")
     made = thermal_duty(heat if heat is not None else _fired(hammer, passed), **passed)
-    return Answer(duty_shown(made), files={"out": Content.of(made)})
+    return Answer(render(made.summary()), files={"out": Content.of(made)})
 
 
 def _fired(name: str | None, passed: dict[str, Any]) -> Any:
@@ -81,47 +79,3 @@ def _fired(name: str | None, passed: dict[str, Any]) -> Any:
     if "feed" in passed:
         raise InputError("--feed is given, expected it beside --heat only: a hammer has a driver of its own")
     return heat_of(load_hammer(str(name), fired=True))
-
-
-def duty_shown(made: ThermalDuty) -> list[Any]:
-    """Return the largest rates, a row each ambient temperature, and what bursts are allowed."""
-    rows = range(made.ambient.size)
-    rates: tuple[Column[int], ...] = (
-        Column("ambient", lambda row: made.ambient[row], unit="°C", format="g"),
-        Column("dots a second\nfor ever", lambda row: made.rate[row], unit="Hz", format=".4g"),
-    )
-    pairs = [(row, fast) for fast in range(made.burst.size) for row in rows]
-    bursts: tuple[Column[tuple[int, int]], ...] = (
-        Column("in bursts of", lambda at: made.burst[at[1]], unit="Hz", format=".6g"),
-        Column("ambient", lambda at: made.ambient[at[0]], unit="°C", format="g"),
-        Column("would come to", lambda at: _finite(made.temperature[at]), unit="°C", format=".1f"),
-        Column("too hot after", lambda at: _finite(made.time[at]), unit="s", format=".3g"),
-        Column("part of the time", lambda at: 100.0 * made.share[at], unit="%", format=".1f"),
-    )
-    said = [
-        ("limit of the winding", f"{made.limit:g} °C"),
-        ("heat of one dot there", f"{1e3 * made.limit_heat:.4g} mJ"),
-        ("keeps the same", f"the {made.heat.feed} of the driver"),
-    ]
-    return [facts(said), "", table(rates, rows), "", table(bursts, pairs)]
-
-
-def limit_shown(made: ThermalLimit) -> list[Any]:
-    """Return the limit, and the rates beside those that follow from it."""
-    error = "" if math.isnan(made.error) else f" ± {made.error:.2g}"
-    columns: tuple[Column[int], ...] = (
-        Column("rail", lambda row: made.voltage[row] or None, unit="V", format="g"),
-        Column("ambient", lambda row: made.ambient[row], unit="°C", format="g"),
-        Column("stated", lambda row: made.rate[row], unit="Hz", format="g"),
-        Column("from the limit", lambda row: made.fitted[row], unit="Hz", format=".1f"),
-        Column("1 Hz warms by", lambda row: made.warming[row], unit="K", format=".4g"),
-    )
-    return [
-        f"limit of the winding [bold]{made.limit:.1f}{error} °C[/bold]",
-        "",
-        table(columns, range(made.rate.size)),
-    ]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

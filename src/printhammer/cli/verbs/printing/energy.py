@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.table import Table
-
 from printhammer.cli import options as opt
-from printhammer.cli.options import Units, with_unit
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.screen import Column, facts, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.control.least_work.burst import LeastWork, SupplyCheck
     from printhammer.hammer.hammer import Hammer
 
 _MOST_RATES: Final = 200
@@ -59,84 +56,25 @@ def energy(
     if rates is not None:
         if supply or current:
             raise InputError("--rates is given, expected neither --supply nor a current (.csv) beside it")
-        return _at_rates(job, hammer, rates, passed)
+        from printhammer.control.least_work.rates import FOUND, least_work_rates
+
+        with job.counting("rates") as tell:
+            several = least_work_rates(hammer, rates, progress=tell, **passed)
+        missing = int((several.status != FOUND).sum())
+        complaint = f"no current was found at {missing} of {several.status.size} rates"
+        return Answer(
+            render(several.summary()),
+            files={"out": Content.of(several)},
+            complaints=[complaint] if missing else [],
+        )
     with job.counting("dots planned") as tell:
         result = least_work(hammer, rate, progress=tell, **passed)
-    shown: list[Table | str] = [facts(burst(result, units))]
+    shown = render(result.summary(), units)
     if supply:
-        shown += ["", supplied(result.under_supply(), result.count, units)]
+        shown += ["", *render(result.under_supply().summary(result.count), units)]
     short = result.adequate < result.count
     return Answer(
         shown,
         files={"out": Content.of(result)},
         complaints=[f"{result.adequate} of {result.count} dots are adequate"] if short else [],
-    )
-
-
-def burst(result: LeastWork, units: Units) -> list[tuple[str, str | None]]:
-    """Return what the burst prints, and what it costs."""
-    work, ledger = result.work, result.ledger
-    weakest = (
-        f", the weakest with {result.forces.min():.4f} of the single pulse's force" if result.contacts else ""
-    )
-    allowed = f"{result.slew:.4g} A/s allowed" if result.shape == "free" else "pulses of the hammer"
-    return [
-        ("dots", f"{result.adequate} of {result.count} adequate at {result.rate:.6g} Hz{weakest}"),
-        ("current", f"at most {with_unit(result.drive.peak, 'current', units)}, {allowed}"),
-        ("at rest", f"after {with_unit(result.rest_time, 'time', units)}"),
-        ("absorbed by the pack", with_unit(ledger.pack_loss, "energy", units)),
-        ("lost at the backstop", with_unit(ledger.backstop_loss, "energy", units)),
-        (
-            "net work W",
-            (
-                f"{with_unit(work.net, 'energy', units)}, [bold]{result.net_ratio:.4f}[/bold] of what the"
-                f" pack absorbs; {result.single_ratio:.2f} with single pulses"
-            ),
-        ),
-        (
-            "positive work W+",
-            (
-                f"{with_unit(work.positive, 'energy', units)}, [bold]{result.positive_ratio:.4f}[/bold] of"
-                f" it; no current does with less than {result.bound_ratio:.4f} for this force"
-            ),
-        ),
-        ("heat of the coil", None if work.heat is None else with_unit(work.heat, "energy", units)),
-        ("ledger", f"residual {ledger.residual / ledger.throughput:.1e} of the throughput"),
-    ]
-
-
-def supplied(result: SupplyCheck, count: int, units: Units) -> Table:
-    """Return how the burst fares with other currents."""
-    columns: tuple[Column[int], ...] = (
-        Column("current", lambda row: f"{100.0 * result.changes[row]:+.1f} %"),
-        Column("adequate dots", lambda row: f"{result.adequate[row]} of {count}"),
-        Column("weakest force", lambda row: float(result.weakest[row]), format=".3f"),
-        Column("late by", lambda row: float(result.spread[row]), "time"),
-    )
-    return table(columns, range(len(result.changes)), units)
-
-
-def _at_rates(job: Job, hammer: Hammer, rates: list[float], options: dict[str, Any]) -> Answer:
-    from printhammer.control.least_work.rates import FOUND, least_work_rates
-
-    with job.counting("rates") as tell:
-        result = least_work_rates(hammer, rates, progress=tell, **options)
-
-    def ratio(values: Any, row: int) -> float | None:
-        return float(values[row]) if result.status[row] == FOUND else None
-
-    columns: tuple[Column[int], ...] = (
-        Column("rate", lambda row: result.rates[row], unit="Hz", format=".6g"),
-        Column("adequate dots", lambda row: f"{result.adequate[row]} of {result.count}"),
-        Column("W", lambda row: ratio(result.net_ratio, row), format=".4f"),
-        Column("W+", lambda row: ratio(result.positive_ratio, row), format=".4f"),
-        Column("least W+", lambda row: ratio(result.bound_ratio, row), format=".4f"),
-        Column("", lambda row: "" if result.status[row] == FOUND else str(result.status[row])),
-    )
-    missing = int((result.status != FOUND).sum())
-    complaint = f"no current was found at {missing} of {result.status.size} rates"
-    return Answer(
-        [table(columns, range(len(rates)))],
-        files={"out": Content.of(result)},
-        complaints=[complaint] if missing else [],
     )

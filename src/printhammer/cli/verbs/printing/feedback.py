@@ -6,15 +6,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
-
 from printhammer.cli import options as opt
-from printhammer.cli.options import Units, with_unit
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import render
 
 if TYPE_CHECKING:
-    from printhammer.control.feedback.comparison import Feedback
     from printhammer.hammer.hammer import Hammer
 
 
@@ -74,43 +71,10 @@ def feedback(
     bad, patterns = int((~result.passed[-1]).sum()), result.passed.shape[1]
     complaint = f"{bad} of {patterns} patterns are not printed within limits with feedback"
     return Answer(
-        [compared_ways(result, units)],
+        render(result.summary(), units),
         files={
             "out": Content.of(result),
             "run": Content(partial(save_drive, result.run.motion.drive), result.plot_run),
         },
         complaints=[complaint] if bad else [],
     )
-
-
-def compared_ways(result: Feedback, units: Units) -> Table:
-    """Return for each way to drive how many patterns are within limits, and how far dots are off."""
-    import numpy as np
-
-    def off(row: int) -> str | None:
-        force = 100.0 * result.force[row]
-        if not np.isfinite(force).any():
-            return None
-        return f"{np.nanmin(force):+.1f} to {np.nanmax(force):+.1f} %"
-
-    def late(row: int) -> str | None:
-        times = result.arrival[row]
-        if not np.isfinite(result.force[row]).any():
-            return None
-        return " to ".join(
-            with_unit(float(end), "time", units) for end in (np.nanmin(times), np.nanmax(times))
-        )
-
-    columns: tuple[Column[int], ...] = (
-        Column("", lambda row: result.strategies[row], left=True),
-        Column(
-            "patterns within limits",
-            lambda row: f"{int(result.passed[row].sum())} of {result.passed.shape[1]}",
-        ),
-        Column("force off", off),
-        Column("arrival off", late),
-        Column("lost", lambda row: int(result.lost[row])),
-        Column("extra", lambda row: int(result.extra_contacts[row])),
-        Column("peak current", lambda row: float(result.peak_current[row]), "current"),
-    )
-    return table(columns, range(len(result.strategies)), units)

@@ -7,13 +7,10 @@ from typing import TYPE_CHECKING, Any
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import render
 
 if TYPE_CHECKING:
-    from printhammer.control.impact_time import ImpactTime
     from printhammer.hammer.hammer import Hammer
-
-_ROWS = 24
 
 
 @verb(
@@ -57,23 +54,4 @@ def impact_time(
             **{name: grid for name, grid in grids.items() if grid},
             **passed,
         )
-    return Answer([errors(study, units)], files={"out": Content.of(study)})
-
-
-def errors(study: ImpactTime, units: Units) -> Any:
-    """Return the errors, a row for each way to sample."""
-    import itertools
-
-    cells = list(itertools.product(*map(range, study.bias.shape)))
-    columns: tuple[Column[Any], ...] = (
-        Column("noise", lambda at: 1e3 * study.noise[at[0]], unit=f"m{study.unit}", format=".3g"),
-        Column("samples", lambda at: 1e-3 * study.sampling_rate[at[1]], unit="kHz", format="g"),
-        Column("bits", lambda at: int(study.bits[at[2]])),
-        Column("nominal:\nbias", lambda at: float(study.bias[at]), "time"),
-        Column("deviation", lambda at: float(study.deviation[at]), "time"),
-        Column("missed", lambda at: f"{100.0 * study.missed[at]:.0f} %"),
-        Column("units:\nbias", lambda at: float(study.unit_bias[at]), "time"),
-        Column("deviation", lambda at: float(study.unit_deviation[at]), "time"),
-        Column("missed", lambda at: f"{100.0 * study.unit_missed[at]:.0f} %"),
-    )
-    return table(columns, cells, units, title=study.title, most=_ROWS)
+    return Answer(render(study.summary(), units), files={"out": Content.of(study)})

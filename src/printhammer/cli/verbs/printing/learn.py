@@ -5,16 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.table import Table
-
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.control.learning.learn import Learning
     from printhammer.hammer.hammer import Hammer
 
 _PANEL: Final = "The sensor"
@@ -80,7 +77,7 @@ def learn(
     share = 100.0 * result.share[-1]
     complaint = f"{share:.1f} % of the dots are within limits in the end"
     return Answer(
-        [stages(result, units), constants(result, units)],
+        render(result.summary(), units),
         files={"out": Content.of(result), "table": Content.of(result.table)},
         complaints=[] if result.passed else [complaint],
     )
@@ -100,34 +97,3 @@ def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict
         study = impact_time(hammer, signal=signal, noise=[noise], dots=200, units=50, progress=tell)
     sensor = asdict(study.sensor())
     return {name: sensor[name] for name in ("noise", "offset", "missed") if sensor[name]}
-
-
-def stages(result: Learning, units: Units) -> Table:
-    """Return what is printed at each stage, a row each."""
-    import numpy as np
-
-    def worst(values: Any) -> float:
-        known = np.abs(values[np.isfinite(values)])
-        return float(known.max()) if known.size else float("nan")
-
-    columns: tuple[Column[int], ...] = (
-        Column("test dots", lambda row: int(result.dots[row])),
-        Column("printed with", lambda row: "table" if result.learned[row] else "open loop", left=True),
-        Column("within limits", lambda row: f"{100.0 * result.share[row]:.1f} %"),
-        Column("worst force", lambda row: f"{100.0 * worst(result.force_deviation[row]):.1f} %"),
-        Column("worst arrival", lambda row: worst(result.arrival_deviation[row]), "time"),
-    )
-    title = f"Unit {result.table.serial} of {result.hammer.name} at {result.rate:g} Hz"
-    return table(columns, range(result.dots.size), units, title=title)
-
-
-def constants(result: Learning, units: Units) -> Table:
-    """Return what is believed of the constants of the unit in the end, a row each."""
-    nominal = [result.hammer.constants[name].si for name in result.constants]
-    columns: tuple[Column[int], ...] = (
-        Column("constant", lambda row: result.constants[row], left=True),
-        Column("off by", lambda row: f"{100.0 * (result.believed[row] / nominal[row] - 1.0):+.2f} %"),
-        Column("known to", lambda row: f"{100.0 * result.uncertainty[row] / abs(nominal[row]):.2f} %"),
-    )
-    title = f"Constants of unit {result.table.serial}, from its readings"
-    return table(columns, range(len(result.constants)), units, title=title)

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
-from printhammer.cli.options import Units, with_unit
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
-from printhammer.cli.screen import facts
+from printhammer.cli.screen import render
 from printhammer.cli.verbs.printing.strategy import FEEDBACK, SERIAL, TABLE, chosen_strategy
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
-    from printhammer.printing.page.page import Page
     from printhammer.printing.page.pattern import Pattern
 
 _USUAL: Final = ("printed.png", "printed.pdf", "printed-zoom.png")
@@ -98,7 +97,7 @@ def print_(
     save = page.save
     views: dict[str, Any] = {name: Content(save, partial(page.plot, view=name)) for name in ("zoom", "sheet")}
     return Answer(
-        [facts(on_paper(page, units))],
+        render(page.summary(), units),
         note=f"{page.status.size} runs, {page.line.size} dots, computed in {job.seconds:.2g} s",
         files={"out": Content(save, page.plot), **views, "save": Content(asked.save)},
         complaints=ended_early(page.status.ravel()),
@@ -128,39 +127,3 @@ def _pattern(
         font=font,
         columns=COLUMNS if columns is None else columns,
     )
-
-
-def on_paper(page: Page, units: Units) -> list[tuple[str, str | None]]:
-    """Return what is on the paper: dots, where they are, how dark they are."""
-    import numpy as np
-
-    on = page.printed
-    dots = f"{page.line.size} wanted, {int(on.sum())} printed, {int(page.lost.sum())} lost"
-    if not page.run.all():
-        dots += f", {int((~page.run).sum())} not run"
-    faults = ", ".join(f"{name} {count}" for name, count in page.fault_counts.items() if count)
-    others = f"; the others by first fault: {faults}" if faults else ""
-    rows: list[tuple[str, str | None]] = [
-        ("dots", f"{dots}, {int(page.extra_contacts.sum())} extra contacts"),
-        ("within limits", f"{int(page.good.sum())} of {page.line.size} dots{others}"),
-        ("carriage", f"{page.rate:.6g} slots a second, {with_unit(page.speed, 'speed', units)}"),
-    ]
-    if not on.any():
-        return rows
-    error, flight, dark = page.placement_error[on], page.flight_time[on], page.darkness[on]
-    worst = int(np.argmax(np.abs(error)))
-    line, wire, slot = (part[on][worst] + 1 for part in (page.line, page.wire, page.slot))
-    spread, most = (with_unit(float(value), "length", units) for value in (np.std(error), error[worst]))
-    scatter, range_ = (with_unit(float(value), "time", units) for value in (np.std(flight), np.ptp(flight)))
-    return [
-        *rows,
-        (
-            "placement",
-            f"spread {spread}, worst {most} (line {line}, wire {wire}, slot {slot}, counted from 1)",
-        ),
-        ("flight time", f"spread {scatter}, peak to peak {range_}"),
-        (
-            "darkness",
-            f"{dark.min():.2f} to {dark.max():.2f}, mean {dark.mean():.2f}, spread {np.std(dark):.3f}",
-        ),
-    ]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.screen import render
 from printhammer.cli.verbs.printing.strategy import FEEDBACK, SERIAL, TABLE, chosen_strategy
 from printhammer.errors import InputError
 
@@ -69,7 +70,6 @@ def quality(
 
     Ends with status 1 where a run stopped before its end.
     """
-    from printhammer.cli.verbs.printing import quality_report
     from printhammer.printing.dots.judging import limits_named
 
     instead = {"safe-rate": safe_rate, "yield": yield_ is not None, "damping": damping}
@@ -95,6 +95,7 @@ def quality(
         # It says nothing of other rates.
         many = {"first": float(loaded_table.rates[0]), "last": float(loaded_table.rates[-1]), **many}
     result: Any
+    bad: list[str] = []
     if task == "report":
         from printhammer.printing.dots.paper import Paper
         from printhammer.printing.rates.quality import quality as report
@@ -104,13 +105,11 @@ def quality(
             varied = None if paper is None else Paper.load(paper)
             result = report(hammer, rate or 0.0, slots, **common, **opt.given(pitch=pitch, paper=varied))
         bad = [] if result.ok else [f"the run ended early: {result.status}"]
-        lines = quality_report.report(result, units)
     elif task == "safe-rate":
         from printhammer.printing.rates.safe_rate import safe_rate as safe
 
         with job.telling("patterns") as say:
             result = safe(hammer, progress=lambda at: say(f"patterns up to {at:g} Hz"), **many)
-        lines, bad = quality_report.safe_rate(result, units), []
     elif task == "yield":
         from printhammer.printing.rates.tolerance import tolerance_yield
 
@@ -120,15 +119,13 @@ def quality(
         drawn = opt.given(seed=seed, judged_by=judged_by)
         with job.counting("hammers") as tell:
             result = tolerance_yield(hammer, rate, number=yield_, progress=tell, **spreads, **drawn, **many)
-        lines, bad = quality_report.tolerance_yield(result, units), []
     else:
         from printhammer.printing.rates.damping import damping_study
 
         with job.counting("materials") as tell:
             result = damping_study(hammer, progress=tell, **opt.given(current=current), **many)
-        lines, bad = quality_report.damping(result, units), []
     return Answer(
-        [lines],
+        render(result.summary(), units),
         note=f"computed in {job.seconds:.2g} s",
         files={"out": Content.of(result)},
         complaints=bad,

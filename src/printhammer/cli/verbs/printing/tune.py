@@ -6,22 +6,18 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.table import Table
-
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import render
 from printhammer.cli.verbs.printing.axis_tables import tuned_along
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from printhammer.control.table.compensation import CompensationTable
-    from printhammer.control.table.report import TableReport
     from printhammer.hammer.hammer import Hammer
 
 _MOST_RATES: Final = 2000
-_ROWS: Final = 12
 
 
 @verb(
@@ -89,7 +85,7 @@ def tune(
         made = made.quantised(tick)
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
-    job.show(entries(made, units), note=f"tuned in {job.seconds:.2g} s{size}")
+    job.show(*render(made.summary(), units), note=f"tuned in {job.seconds:.2g} s{size}")
     files = {"out": Content(partial(save_table, made, header), made.plot)}
     if not judge:
         return Answer(files=files)
@@ -99,7 +95,9 @@ def tune(
     good = report.passed[1, 0]
     off = ", ".join(f"{each:g} Hz" for each in report.rates[~good].tolist())
     complaint = f"with the table not all dots are within the limits at {off}"
-    return Answer(["", judged(report)], files=files, complaints=[] if good.all() else [complaint])
+    return Answer(
+        ["", *render(report.summary(), units)], files=files, complaints=[] if good.all() else [complaint]
+    )
 
 
 def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> None:
@@ -110,45 +108,3 @@ def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> N
         write_file(path, made.to_header(**header))
     else:
         made.save(path)
-
-
-def entries(made: CompensationTable, units: Units) -> Table:
-    """Return the entries at the highest rate, a row each."""
-    from printhammer.control.table.drive import gap_text, histories, number_of
-
-    def entry(name: str, history: tuple[int, ...]) -> float:
-        return float(getattr(made, name)[-1, number_of(history, made.reach)])
-
-    def brake(name: str, history: tuple[int, ...]) -> float | None:
-        return entry(name, history) if entry("brake_width", history) > 0.0 else None
-
-    columns: tuple[Column[tuple[int, ...]], ...] = (
-        Column("gaps before", lambda history: "-".join(map(gap_text, history)), left=True),
-        Column("advance", lambda history: entry("advance", history), "time"),
-        Column("width", lambda history: entry("width", history), "time"),
-        Column("brake after", lambda history: brake("brake_delay", history), "time"),
-        Column("brake", lambda history: brake("brake_width", history), "time"),
-        Column("worst,\nof the limits", lambda history: 100.0 * entry("deviation", history), "", "%", ".1f"),
-    )
-    low, high, count = made.rates[0], made.rates[-1], made.rates.size
-    span = f"{low:g} Hz to {high:g} Hz, {count} rates, at " if count > 1 else ""
-    every = histories(made.gaps, made.reach)
-    return table(columns, every, units, title=f"Table for {span}{high:g} Hz", most=_ROWS)
-
-
-def judged(report: TableReport) -> Table:
-    """Return what the table gains and loses, a row a hammer."""
-    rates = report.rates
-    span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
-    share = 100.0 * report.good.mean(axis=(2, 3))
-    lost = report.lost.sum(axis=(2, 3))
-    columns: tuple[Column[int], ...] = (
-        Column("hammer driven", lambda row: report.hammers[row], left=True),
-        Column("open loop:\ngood dots", lambda row: f"{share[0, row]:.2f} %"),
-        Column("lost", lambda row: lost[0, row], format=".0f"),
-        Column("table:\ngood dots", lambda row: f"[bold]{share[1, row]:.2f} %[/bold]"),
-        Column("lost", lambda row: lost[1, row], format=".0f"),
-        Column("worst force", lambda row: f"{100.0 * report.force[1, row].max():.1f} %"),
-        Column("worst arrival", lambda row: float(report.arrival[1, row].max()), "time"),
-    )
-    return table(columns, range(len(report.hammers)), title=f"On patterns it was not tuned on, {span}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import PICTURES, Answer, Content, Job, verb
-from printhammer.cli.screen import facts
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results import Summary
     from printhammer.support.arrays import FloatArray
 
 _BURST: Final = "Bursts"
@@ -65,7 +66,7 @@ def map_(
     with job.counting("rates") as tell:
         chart = frequency_map(hammer, grid, times=moments, progress=tell, **passed)
     return Answer(
-        [facts(summary(chart, beside, job.seconds))],
+        render(summary(chart, beside, job.seconds)),
         files={"out": Content(partial(save_dataset, chart), partial(_drawn, hammer, chart, beside, drawn))},
         complaints=_complaints(chart),
     )
@@ -114,9 +115,11 @@ def _axes(
     return np.linspace(low, high, count), moments
 
 
-def summary(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float) -> list[tuple[str, str | None]]:
+def summary(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float) -> Summary:
     """Return what was computed: size, dots, the first lost one, the difference from a measured map."""
     import numpy as np
+
+    from printhammer.results import Facts, Summary
 
     rates, time = chart["rate"].values, chart["time"].values
     fired = np.isfinite(chart["fired_at"].values)
@@ -126,7 +129,7 @@ def summary(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float) -> lis
         row = int(np.argmax(lost.any(axis=1)))
         dots += f"; the first at {rates[row]:.6g} Hz, firing {int(np.argmax(lost[row])) + 1}"
     failed = int((chart["status"].values != 0).sum())
-    return [
+    rows = [
         (
             "map",
             (
@@ -138,6 +141,7 @@ def summary(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float) -> lis
         ("status", f"{failed} of {rates.size} runs did not reach their end" if failed else "ok"),
         ("measured", None if beside is None else _difference(chart, beside)),
     ]
+    return Summary([Facts(rows)])
 
 
 def _difference(chart: xr.Dataset, beside: xr.Dataset) -> str:

@@ -5,27 +5,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.markup import escape
-
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, verb
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import Column, marked, table
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.summary import Style
 
-_STYLES: Final = {"holds": "green", "fails": "red", "not yet": "yellow"}
+_STYLES: Final[dict[str, Style]] = {"holds": "good", "fails": "bad", "not yet": "poor"}
 
 
 def _verdict(verdict: str, said: object) -> str:
-    return f"[{_STYLES[verdict]}]{said}[/{_STYLES[verdict]}]"
+    from printhammer.results.summary import styled
+
+    return styled(_STYLES[verdict], said)
 
 
 _COLUMNS: Final[tuple[Column[Any], ...]] = (
     Column("claim", lambda result: result.claim.name, left=True),
     Column("kind", lambda result: result.claim.kind, left=True),
     Column("verdict", lambda result: _verdict(result.verdict, result.verdict), left=True),
-    Column("measured", lambda result: escape(result.detail), left=True),
+    Column("measured", lambda result: result.detail, left=True),
 )
 
 
@@ -48,7 +49,7 @@ def paper(
     with job.counting("paper,") as count:
         report = write_report(hammer, out, progress=count, pdf=pdf)
     counts = ", ".join(_verdict(verdict, f"{report.count(verdict)} {verdict}") for verdict in _STYLES)
-    job.show(table(_COLUMNS, report.results), "", f"{len(report.results)} claims: {counts}")
+    job.show(table(_COLUMNS, report.results), "", marked(f"{len(report.results)} claims: {counts}"))
     reports = [path for path in report.files if path.parent == out]
     for path in reports:
         job.wrote(path)

@@ -7,22 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
-from rich.table import Table
 
 from printhammer.cli import options as opt
-from printhammer.cli.options import Units, with_unit
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, tables_beside, verb
-from printhammer.cli.screen import Column, coloured, facts, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from printhammer.drive.trains import Drive
     from printhammer.hammer.hammer import Hammer
-    from printhammer.run.contacts import Dot
-    from printhammer.run.motion import Motion
 
-MOST_ROWS: Final = 40
-"""Dots shown; of more, the first and the last."""
 
 _DRIVE: Final = "Drive (default: a single pulse)"
 _FILES: Final = "Files (always SI)"
@@ -72,11 +67,8 @@ def run(
     if drive is not None:
         job.check(*tables_beside(drive, fired.waveform))
     motion = simulate(hammer, fired, **passed)
-    shown: list[Table | str] = [facts(summary(motion, units))]
-    if fired.quantity == "current" or hammer.pack is not None:
-        shown = [table(_COLUMNS, motion.dots, units, most=MOST_ROWS), "", *shown]
     return Answer(
-        shown,
+        render(motion.summary(), units),
         note=escape(repr(motion.drive)[1:-1]),
         files={
             "out": Content(partial(write_motion, motion), motion.plot),
@@ -104,91 +96,3 @@ def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
     if "at" in beside:
         beside["at"] = [each.strip() for each in beside["at"].split(",")]
     return PulseTrain(hammer.waveform, **beside)
-
-
-def _remark(dot: Dot) -> str:
-    if not dot.struck:
-        return "[red]lost[/red]"
-    if dot.contact_time is None:
-        return "[yellow]open[/yellow]"
-    return f"[yellow]+{dot.extra_contacts}[/yellow]" if dot.extra_contacts else ""
-
-
-_COLUMNS: Final[tuple[Column[Dot], ...]] = (
-    Column("dot", lambda dot: dot.index + 1),
-    Column("fired", lambda dot: dot.fired_at, "time"),
-    Column("flight", lambda dot: dot.flight_time, "time"),
-    Column("speed", lambda dot: dot.impact_speed, "speed"),
-    Column("force", lambda dot: dot.peak_force, "force"),
-    Column("depth", lambda dot: dot.indentation, "length"),
-    Column("contact", lambda dot: dot.contact_time, "time"),
-    Column("work", lambda dot: dot.loading_work, "energy"),
-    Column("loss", lambda dot: dot.net_loss, "energy"),
-    Column("", _remark, left=True),
-)
-
-
-def summary(motion: Motion, units: Units) -> list[tuple[str, str | None]]:
-    """Return status, dots, peak, contacts and energies."""
-    state = coloured(motion.ok, "ok" if motion.ok else motion.status, "bold red")
-    struck = sum(dot.struck for dot in motion.dots)
-    lost = len(motion.dots) - struck
-    rows: list[tuple[str, str | None]] = [
-        ("status", f"{state}, {motion.end * 1e3:.4g} ms in {motion.steps} steps"),
-        ("dots", f"{struck} struck" + (f", [red]{lost} lost[/red]" if lost else "")),
-    ]
-    times, x = motion.maxima
-    if len(x):
-        top = int(x.argmax())
-        rows.append(
-            ("peak", f"{with_unit(x[top], 'length', units)} at {with_unit(times[top], 'time', units)}")
-        )
-    for surface in ("pack", "backstop"):
-        touches = [c for c in motion.contacts if c.surface == surface and not c.initial]
-        forces = [c.peak_force for c in touches if c.peak_force is not None]
-        up_to = f", up to {with_unit(max(forces), 'force', units)}" if forces else ""
-        rows.append((surface, f"{len(touches)} {'touch' if len(touches) == 1 else 'touches'}{up_to}"))
-    energy = motion.energy
-    force = motion.drive.quantity == "force"
-    work, pack, backstop, damping, armature = (
-        with_unit(value, "energy", units)
-        for value in (
-            energy.drive_work if force else energy.coil_work,
-            energy.pack_loss,
-            energy.backstop_loss,
-            energy.damping_loss,
-            energy.kinetic + energy.stored,
-        )
-    )
-    source = "drive" if force else "coil"
-    damped = "" if motion.hammer.damping is None else f" + damping {damping}"
-    residual = max(energy.residual, energy.electric_residual, key=abs)
-    share = residual / energy.throughput if energy.throughput else 0.0
-    if motion.drive.quantity == "voltage":
-        rows.append(_supply_row(motion, units))
-    return [
-        *rows,
-        (
-            "energy",
-            f"{source} {work} = pack {pack} + backstop {backstop}{damped} + armature {armature}",
-        ),
-        ("residual", f"{share:+.1e} of the energy that passed through"),
-    ]
-
-
-def _supply_row(motion: Motion, units: Units) -> tuple[str, str]:
-    """Return what the supply of a voltage gave, and where it went."""
-    energy = motion.energy
-    supply, copper, driver, eddy, field, coil = (
-        with_unit(value, "energy", units)
-        for value in (
-            energy.supply_work,
-            energy.copper_loss,
-            energy.driver_loss,
-            energy.eddy_loss,
-            energy.field,
-            energy.coil_work,
-        )
-    )
-    turn = f" + eddies {eddy}" if energy.eddy_loss else ""
-    return "supply", f"{supply} = copper {copper} + driver {driver}{turn} + coil {coil} + field {field}"

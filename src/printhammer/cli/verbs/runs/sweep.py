@@ -15,7 +15,7 @@ from rich.markup import escape
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, announce_compiling, verb
-from printhammer.cli.screen import Column, coloured, table
+from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def planned(plan: Plan) -> list[RenderableType]:
 
     spec = plan.spec
     axes: tuple[Column[Any], ...] = (
-        Column("axis", lambda axis: escape(axis.key), left=True),
+        Column("axis", lambda axis: axis.key, left=True),
         Column("", lambda axis: str(len(axis.values)) if spec.grid else "drawn"),
         Column("from", lambda axis: axis.values.min(), format=".6g"),
         Column("to", lambda axis: axis.values.max(), format=".6g"),
@@ -92,11 +92,7 @@ def planned(plan: Plan) -> list[RenderableType]:
         Column("array", lambda row: row[0].name, left=True),
         Column("shape", lambda row: " × ".join(map(str, row[1])), left=True),
         Column("size", lambda row: size_text(row[2])),
-        Column(
-            "",
-            lambda row: escape(row[0].meaning + (f" [{row[0].unit}]" if row[0].unit else "")),
-            left=True,
-        ),
+        Column("", lambda row: row[0].meaning + (f" [{row[0].unit}]" if row[0].unit else ""), left=True),
     )
     rows = list(plan.table())
     blocks = "1 block" if plan.blocks.number == 1 else f"{plan.blocks.number} blocks"
@@ -121,7 +117,8 @@ def ended(result: xr.Dataset, new: float, seconds: float) -> str:
 
     counts = Counter(result["status"].values.ravel().tolist())
     each = ", ".join(
-        coloured(code == 0, f"{count} {STATUSES[code]}") for code, count in sorted(counts.items())
+        f"[{'yellow' if code else 'green'}]{count} {STATUSES[code]}[/]"
+        for code, count in sorted(counts.items())
     )
     how = f"{new:.0f} of them now, in {duration_text(seconds)}" if new else "all of them done before"
     return f"{result['status'].size} members: {each}; {how}"
