@@ -13,7 +13,7 @@ from printhammer.chaos import strobes
 from printhammer.chaos.bifurcation.columns import run_columns
 from printhammer.chaos.strobe.train import FROM_REST
 from printhammer.cli.options import Units
-from printhammer.cli.verbs.chaos.strobe import summary
+from printhammer.cli.verbs.strobe import summary
 from printhammer.control.least_work.burst import least_work
 from printhammer.drive.waveforms.drivers import Capacitor, Chopper, Rail
 from printhammer.identify.bench.benches import _currents

@@ -10,8 +10,8 @@ import xarray as xr
 
 import printhammer as ph
 from printhammer.chaos.orbits import search
-from printhammer.cli.verbs.chaos.orbits import columns_for
-from printhammer.cli.verbs.chaos.orbits import orbits as verb
+from printhammer.cli.verbs.strobe import columns_for
+from printhammer.cli.verbs.strobe import orbits as verb
 from printhammer.run.regime import Regime
 
 SMALL = ("--longest", "1", "--starts", "60", "--guesses", "6")

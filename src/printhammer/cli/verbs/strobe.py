@@ -1,4 +1,9 @@
-"""The verb `lyapunov`: how fast neighbouring motions part, and the 0-1 test as a second opinion."""
+"""The verb `strobe`: the state at the moment of firing, and whether the train is periodic or strange.
+
+The verb `orbits`: the periodic motions of a train, stable and unstable.
+
+The verb `lyapunov`: how fast neighbouring motions part, and the 0-1 test as a second opinion.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
 from printhammer.cli.screen import render, train_line
 from printhammer.errors import InputError
@@ -13,6 +19,74 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
+
+
+@verb(
+    "strobe",
+    "printhammer strobe hendriks-1983 --period '1.10 ms' --points 200 --out points.csv",
+    {
+        **opt.FIRED_TRAIN,
+        "points": opt.whole("Number of points.", default=200),
+        "transient": opt.whole("Firings left out before the first.", default=0),
+        "phase": opt.number("Part of the period between a firing and its point, from 0 to 1.", metavar="P"),
+        "tolerance": opt.TOLERANCE,
+        "verdict": opt.switch("Judge firings 1001 to 2000.", default=True),
+    },
+    out=opt.results("Points"),
+)
+def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
+    """Fire a hammer without end and tell what its state is at each firing: periodic, or strange.
+
+    Ends with status 1 where the run stopped before its end.
+    """
+    from printhammer.chaos import strobe as points_of
+
+    firing = firing_of(job, hammer, passed, "--period '1.10 ms'")
+    result = points_of(hammer, **firing, **passed)
+    drive = result.drive
+    return Answer(
+        render(result.summary(), units),
+        note=train_line(drive.waveform.shape, drive.quantity, drive.overlap, result.period),
+        files={"out": Content.of(result)},
+        complaints=[] if result.ok else [f"the run ended early: {result.status}"],
+    )
+
+
+_search = partial(opt.whole, panel="Search")
+
+
+@verb(
+    "orbits",
+    "printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv",
+    {
+        **opt.FIRED_TRAIN,
+        "longest": _search("Most firings after which a motion repeats.", default=8),
+        "starts": _search("States from which motions are followed.", default=1024),
+        "guesses": _search("Guesses that are tried for each number of firings.", default=48),
+        "follow": _search("Most firings of orbits through which branches are followed.", default=2),
+        "tolerance": opt.TOLERANCE,
+    },
+    out=opt.results("Orbits"),
+)
+def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
+    """Search for the motions that repeat after some firings, stable or not, and tell what they do.
+
+    Ends with status 1 where none was found.
+    """
+    from printhammer.chaos.orbits.search import orbits as search
+
+    firing = firing_of(job, hammer, passed, "--period '1.05 ms'")
+    with job.counting("orbits", remaining=False) as tell:
+        result = search(hammer, progress=tell, **firing, **passed)
+    regime = result.regime
+    missing = "no periodic orbit was found; more --starts or --guesses may find one"
+    return Answer(
+        render(result.summary(), units),
+        note=train_line(regime.fired.shape, regime.fired.quantity, regime.overlap, regime.period),
+        files={"out": Content.of(result)},
+        complaints=[] if len(result) else [missing],
+    )
+
 
 _STEPS: Final = 100
 _TRAINS: Final = "Trains (--period, --rate, or --from and --to)"
