@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -33,6 +35,7 @@ from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
 from printhammer.support.arrays import FloatArray
+from printhammer.support.files import write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -426,3 +429,41 @@ class Motion(Result, fields=False):
     def to_parquet(self, path: str | Path) -> None:
         """Write the output grid as Parquet with provenance; needs the extra `tables`."""
         write_parquet(self.to_pandas(), path)
+
+    def write(self, path: Path) -> None:
+        """Write the motion: all that it tells as JSON, where the name ends so, else its record as `save` does."""
+        if path.suffix.lower() == ".json":
+            write_file(path, self.to_json())
+        else:
+            self.save(path)
+
+    def to_json(self) -> str:
+        """Return dots, contacts, energies, constants and drive as JSON, SI, names with units."""
+        times, x = self.maxima
+        top = int(x.argmax()) if len(x) else None
+        content = {
+            "status": self.status,
+            "message": self.message,
+            "end_s": self.end,
+            "steps": self.steps,
+            "peak": None if top is None else {"t_s": float(times[top]), "x_m": float(x[top])},
+            "dots": [_named(dot) for dot in self.dots],
+            "contacts": [_named(contact) for contact in self.contacts],
+            "energy": {f"{key}_J": value for key, value in asdict(self.energy).items()},
+            "constants": {
+                key: {"value": constant.si, "unit": constant.si_unit, "status": constant.status}
+                for key, constant in self.hammer.constants.items()
+            },
+            "drive": self.drive.to_toml(),
+            "provenance": self.provenance,
+        }
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def _named(row: Dot | Contact) -> dict[str, Any]:
+    """Return a dot or contact by names such as "flight_time_s"."""
+    units = {name: note.unit for name, note in columns_of(type(row)).items()}
+    return {
+        f"{key}_{units[key].replace('/', '_per_')}" if units[key] else key: value
+        for key, value in asdict(row).items()
+    }

@@ -1,7 +1,4 @@
-"""The verb `bifurcation`: the states at the firings against a parameter, windows, and the way into chaos.
-
-The verb `basins`: which initial states lead where; with `--quench`, which second pulses lose their dot.
-"""
+"""The verbs `bifurcation` and `basins`: attractors against a parameter, and the states that lead to them."""
 
 from __future__ import annotations
 
@@ -13,12 +10,10 @@ from rich.markup import escape
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
-from printhammer.cli.screen import facts, render
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.chaos.basins.basins import Basins
-    from printhammer.chaos.orbits.manifolds import Manifolds
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
 
@@ -138,10 +133,6 @@ def _axis(
 
 _BASINS: Final = "Basins"
 _QUENCH: Final = "Quench map"
-_CROSSINGS: Final = 6
-"""Length of a manifold over the longer side of the plane."""
-_PIECES: Final = 200
-"""Points of a manifold over that side."""
 _count = partial(opt.whole, panel=_BASINS)
 
 
@@ -201,8 +192,14 @@ def basins(
             content = Content.of(planes)
     shown = render(summary, units)
     if saddles is not None:
-        curves, said = curves_of(job, planes, saddles)
-        shown.append(facts(said))
+        from printhammer.chaos.basins.saddles import saddle_manifolds
+
+        with job.counting("saddles") as tell:
+            curves, hidden = saddle_manifolds(planes, saddles, progress=tell)
+        shown.append(
+            f"manifolds of {len(curves)} saddles drawn"
+            + ("" if not hidden else f", {hidden} more are in the pack at the firing")
+        )
         content = Content.of(planes, manifolds=curves)
     return Answer(
         shown,
@@ -210,30 +207,3 @@ def basins(
         files={"out": content},
         complaints=ended_early(status[status != NO_STATE_STATUS], status.size),
     )
-
-
-def curves_of(job: Job, planes: Basins, longest: int) -> tuple[list[Manifolds], list[tuple[str, str]]]:
-    """Return the manifolds of all saddles of up to so many firings, and what is said of them."""
-    import numpy as np
-
-    from printhammer.chaos.orbits.manifolds import manifolds
-    from printhammer.chaos.orbits.orbit import SADDLE
-    from printhammer.chaos.orbits.search import orbits
-
-    spans = np.array([np.ptp(planes.x), np.ptp(planes.v)]) / planes.regime.window.half_widths
-    with job.counting("orbits", remaining=False) as tell:
-        known = [
-            orbit for orbit in orbits(planes.regime, longest=longest, progress=tell) if orbit.kind == SADDLE
-        ]
-    # The plane is that of the states at a firing.
-    shown = [orbit for orbit in known if orbit.phase == planes.regime.phase]
-    curves = []
-    with job.counting("saddles") as tell:
-        for number, saddle in enumerate(shown, 1):
-            way = _CROSSINGS * float(spans.max())
-            curves.append(manifolds(saddle, length=way, spacing=float(spans.max()) / _PIECES))
-            tell(number, len(shown))
-    rows = [("saddles", f"manifolds of {len(curves)} drawn")]
-    if len(known) > len(shown):
-        rows.append(("", f"{len(known) - len(shown)} more are in the pack at the firing"))
-    return curves, rows

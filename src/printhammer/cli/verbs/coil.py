@@ -1,9 +1,4 @@
-"""The verb `dead-time`: how long from switching on to impact, and which pulse gives the same blow.
-
-The verb `impact-time`: how well samples of the coil tell when a dot is struck.
-
-The verb `duty`: how many dots a second a coil stands without getting too hot.
-"""
+"""The verbs `dead-time`, `impact-time` and `duty`: when a pulse strikes, and how hot its coil gets."""
 
 from __future__ import annotations
 
@@ -18,8 +13,6 @@ from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
-
-    pass
 
 
 @verb(

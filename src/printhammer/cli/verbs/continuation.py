@@ -1,7 +1,4 @@
-"""The verb `continue`: a periodic orbit followed through a constant, all regimes in the rate, or a chart.
-
-The verb `curve`: a fold, a period doubling or a grazing followed through a second constant.
-"""
+"""The verbs `continue` and `curve`: an orbit followed through a constant, a bifurcation through two."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.regimes import Branches
     from printhammer.hammer.hammer import Hammer
 
-_START: Final = "Start (or --regimes)"
+_START: Final = "Start"
 _ALL: Final = "All regimes in the rate"
 _CHART: Final = "Chart of two constants"
 
@@ -32,6 +29,15 @@ def read_state(written: str, name: str) -> tuple[float, float]:
             f"{name} {written!r}: expected displacement and velocity, such as '46.2 um, 12 mm/s'"
         )
     return read_number(parts[0], "m", name), read_number(parts[1], "m/s", name)
+
+
+_FIRINGS: Final = opt.whole("Firings after which the orbit repeats.", panel=_START)
+_STATE: Final = opt.text(
+    "X,V", "State near the orbit, such as '46.2 um, 12 mm/s'.", panel=_START, read=read_state
+)
+_PHASE: Final = opt.number(
+    "Part of the period between firing and section, from 0 to 1.", panel=_START, metavar="P", default=0.0
+)
 
 
 @verb(
@@ -56,13 +62,9 @@ def continue_(
     highest: str | None = opt.HIGHEST,
     period: str | None = opt.PERIOD,
     rate: str | None = opt.RATE,
-    firings: int | None = opt.whole("Firings after which the orbit repeats.", panel=_START),
-    state: tuple[float, float] | None = opt.text(
-        "X,V", "State near the orbit, such as '46.2 um, 12 mm/s'.", panel=_START, read=read_state
-    ),
-    phase: float = opt.number(
-        "Part of the period between firing and section, from 0 to 1.", panel=_START, metavar="P", default=0.0
-    ),
+    firings: int | None = _FIRINGS,
+    state: tuple[float, float] | None = _STATE,
+    phase: float = _PHASE,
     doublings: int = opt.whole("How often period doublings are followed as well.", default=0),
     regimes: bool = opt.switch("Search for orbits and follow all.", panel=_ALL),
     longest: int = opt.whole("Most firings after which a motion repeats.", panel=_ALL, default=3),
@@ -118,10 +120,7 @@ def continue_(
     if second is not None and ends is not None and not interrupted:
         with job.counting("curves", remaining=False) as tell:
             chart = stability_chart(result[0], second, ends, grid=(grid, grid), progress=tell)
-        return Answer(
-            ["", *render(chart.summary())],
-            files={"out": Content.of(chart)},
-        )
+        return Answer(["", *render(chart.summary())], files={"out": Content.of(chart)})
     known = len(result) and second is None
     nothing = "no branch was found; more --seeds or a larger --longest may find one"
     return Answer(
@@ -149,9 +148,6 @@ def _followed(
     with job.counting("orbits", remaining=False) as tell:
         branch = continuation(hammer, parameter, bounds, progress=tell, **options)
     return follow_doublings(branch, levels, most=options["most"])
-
-
-_START_CURVE: Final = "Start"
 
 
 def read_event(written: str, name: str) -> int | str:
@@ -190,24 +186,17 @@ def curve(
     second_to: str | None = opt.text("VALUE", "Its largest value."),
     period: str | None = opt.PERIOD,
     rate: str | None = opt.RATE,
-    firings: int | None = opt.whole("Firings after which the orbit repeats.", panel=_START_CURVE),
-    state: tuple[float, float] | None = opt.text(
-        "X,V", "State near the orbit, such as '46.2 um, 12 mm/s'.", panel=_START_CURVE, read=read_state
-    ),
-    phase: float = opt.number(
-        "Part of the period between firing and section, from 0 to 1.",
-        panel=_START_CURVE,
-        metavar="P",
-        default=0.0,
-    ),
+    firings: int | None = _FIRINGS,
+    state: tuple[float, float] | None = _STATE,
+    phase: float = _PHASE,
     event: int | str | None = opt.text(
         "EVENT",
         "Number of an event of the branch from 0 on, its kind, or 'first' or 'last' for an end in a grazing.",
-        panel=_START_CURVE,
+        panel=_START,
         read=read_event,
     ),
     start: Path | None = opt.source(
-        "A file with a branch or a curve instead, saved by 'continue' or 'curve'.", panel=_START_CURVE
+        "A file with a branch or a curve instead, saved by 'continue' or 'curve'.", panel=_START
     ),
     grid: int = opt.whole("Values of either constant at which trains from rest are judged.", default=0),
     **passed: Any,

@@ -1,7 +1,4 @@
-"""The verb `energy`: a burst of dots with least work, rest to rest.
-
-The verb `feedback`: a drive that sees the hammer, beside the open loop.
-"""
+"""The verbs `energy` and `feedback`: a burst of least work, and a drive that sees the hammer."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The verbs `hammer show`, `check`, `schema` and `list`.
-
-The verb `hammer from-datasheet`: what a maker prints, as a hammer file.
-"""
+"""The verbs `hammer show`, `check`, `schema`, `list` and `from-datasheet`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The verb `figure`: one figure of the paper, for any hammer.
-
-The verb `paper`: every figure and claim of the paper, in one report.
-"""
+"""The verbs `figure` and `paper`: one figure of the paper for any hammer, or all figures and claims."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""The verb `quality`: what a hammer prints at a rate, how fast it may go, and what materials would buy.
-
-Ways to drive a hammer that verbs offer beside the open loop: a compensation table, or feedback.
-
-The verb `print`: a text or a pattern on paper, as the hammer prints it at a rate.
-"""
+"""The verbs `quality` and `print`: what a hammer prints at a rate, by its figures and on paper."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""The verb `strobe`: the state at the moment of firing, and whether the train is periodic or strange.
-
-The verb `orbits`: the periodic motions of a train, stable and unstable.
-
-The verb `lyapunov`: how fast neighbouring motions part, and the 0-1 test as a second opinion.
-"""
+"""The verbs `strobe`, `orbits` and `lyapunov`: states at the firings, periodic orbits, exponents."""
 
 from __future__ import annotations
 

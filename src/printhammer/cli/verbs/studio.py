@@ -1,7 +1,4 @@
-"""The verb `studio`: hammer, drive and all their pictures in a browser, changing while a slider moves.
-
-The verb `warm`: machine code for a hammer, made before it is needed.
-"""
+"""The verbs `studio` and `warm`: the laboratory in a browser, and machine code compiled beforehand."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The verb `sweep`: many hammers under many drives, into a store that can be continued.
-
-How far a sweep is, and how long it will take.
-"""
+"""The verb `sweep`: many hammers under many drives, into a store that can be continued."""
 
 from __future__ import annotations
 
@@ -11,22 +8,19 @@ import sys
 import time
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 import typer
-from rich.console import Console, RenderableType
-from rich.markup import escape
+from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, announce_compiling, verb
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from printhammer.sweep.plan import Plan
 
 
 @verb(
@@ -66,7 +60,7 @@ def sweep(
     if threads is not None and dask is not None:
         raise InputError("--threads is given beside --dask, expected one or the other")
     if check:
-        return Answer(planned(make_plan(read_spec(spec))))
+        return Answer(render(make_plan(read_spec(spec)).summary()))
     if out is None:
         raise InputError("--out is missing, expected a folder for the results")
     from printhammer.sweep import sweep as run_sweep
@@ -78,37 +72,6 @@ def sweep(
     job.show(ended(result, telling.new, time.monotonic() - began))
     job.wrote(out)
     return Answer()
-
-
-def planned(plan: Plan) -> list[RenderableType]:
-    """Return axes, members, blocks and arrays of a sweep."""
-
-    spec = plan.spec
-    axes: tuple[Column[Any], ...] = (
-        Column("axis", lambda axis: axis.key, left=True),
-        Column("", lambda axis: str(len(axis.values)) if spec.grid else "drawn"),
-        Column("from", lambda axis: axis.values.min(), format=".6g"),
-        Column("to", lambda axis: axis.values.max(), format=".6g"),
-        Column("unit", lambda axis: "" if axis.note.si == "1" else axis.note.si, left=True),
-    )
-    arrays: tuple[Column[Any], ...] = (
-        Column("array", lambda row: row[0].name, left=True),
-        Column("shape", lambda row: " × ".join(map(str, row[1])), left=True),
-        Column("size", lambda row: size_text(row[2])),
-        Column("", lambda row: row[0].meaning + (f" [{row[0].unit}]" if row[0].unit else ""), left=True),
-    )
-    rows = list(plan.table())
-    blocks = "1 block" if plan.blocks.number == 1 else f"{plan.blocks.number} blocks"
-    return [
-        f"[bold]{escape(spec.title or spec.where)}[/bold]  {escape(spec.base.hammer.name)}\n",
-        table(axes, spec.axes),
-        "",
-        table(arrays, rows),
-        (
-            f"\n{plan.members} members in {blocks} of up to {math.prod(plan.blocks.chunks)};"
-            f" {size_text(sum(size for _output, _shape, size in rows))} before compression"
-        ),
-    ]
 
 
 def ended(result: xr.Dataset, new: float, seconds: float) -> str:
@@ -197,12 +160,3 @@ def duration_text(seconds: float) -> str:
     if hours:
         return f"{hours} h {minutes} min"
     return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"
-
-
-def size_text(size: float) -> str:
-    """Return a size in bytes, such as "1.2 MB"."""
-    for unit in ("B", "kB", "MB", "GB"):
-        if size < 1000.0:
-            return f"{size:.3g} {unit}"
-        size /= 1000.0
-    return f"{size:.3g} TB"

@@ -1,9 +1,4 @@
-"""The verb `tune`: a compensation table for the firmware, and what it gains and loses.
-
-The option `--along` of `tune`: a table for each value of what a firmware knows beside rate and history.
-
-The verb `learn`: a compensation table that calibrates itself on a unit, from one number a dot.
-"""
+"""The verbs `tune` and `learn`: compensation tables from the model, and from the dots of one unit."""
 
 from __future__ import annotations
 
