@@ -188,7 +188,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     @property
     def reached(self) -> float:
-        """Strongest blow that is reached at every rail and temperature that reaches one, m/s; 0 without any."""
+        """Strongest blow reached at every rail and temperature that gives a blow, m/s; 0 without any."""
         known = self.strongest[np.isfinite(self.strongest)]
         return float(known.min()) if known.size else 0.0
 

@@ -198,28 +198,11 @@ class Result:
             rows.append((note.name, f"{said}{unit}{', ' if said else ''}{note.meaning}"))
         return Summary([Facts(rows)])
 
-    def cells(self, name: str, heading: str = "", format: str = "", *, factor: float = 1.0) -> Cells:
-        """Return a declared column as a column of a summary, with its unit.
-
-        Parameters
-        ----------
-        name : str
-            Name of the attribute.
-        heading : str, optional
-            Heading, where it is not that of the table.
-        format : str, optional
-            Format of the numbers; without one the renderer chooses unit and digits.
-        factor : float, optional
-            100 for per cent.
-        """
-        note, values = self.COLUMNS[name], np.ravel(getattr(self, name))
-        unit = "%" if factor == 100.0 else {"degC": "°C", "1": ""}.get(note.unit, note.unit)
-        return Cells(
-            heading or note.head or name.replace("_", " "),
-            values if factor == 1.0 else factor * values,
-            unit,
-            format,
-        )
+    def cells(self, name: str, heading: str = "", format: str = "") -> Cells:
+        """Return a declared column as a column of a summary, with its unit; see `results.Cells`."""
+        note = self.COLUMNS[name]
+        unit = {"degC": "°C", "1": ""}.get(note.unit, note.unit)
+        return Cells(heading or name.replace("_", " "), np.ravel(getattr(self, name)), unit, format)
 
     def __repr__(self) -> str:
         return f"{self.title}\n{self.summary().text()}"

@@ -1,7 +1,7 @@
 """Summary: what a result says in short, in sentences, facts and small tables; quantities stay in SI.
 
-The terminal, ``print(result)`` and the notebook render the same summary. Texts of a summary hold marks instead
-of finished numbers and colours: `quantity` marks a number with its SI unit, which is converted into the unit
+The terminal, ``print(result)`` and the notebook render the same summary. Its texts hold marks instead of
+finished numbers and colours: `quantity` marks a number with its SI unit, which is converted into the unit
 system of the reader when the summary is rendered, and `styled` marks words that a terminal shows in colour.
 """
 
@@ -16,7 +16,7 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from printhammer.results.declare import html_table
+from printhammer.results.declare import html_table, shortened
 
 System = Literal["si", "inch"]
 Style = Literal["good", "poor", "bad", "strong", "best", "dim", "cyan", "magenta"]
@@ -36,13 +36,13 @@ SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
 """Unit shown and format in either system, by SI unit."""
 _SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
 
-_QUANTITY: Final = re.compile("⟦([^ ⟧]*) ([^⟧]*)⟧")
+_QUANTITY: Final = re.compile("⟦([^ ⟧]*) ([^⟧!]*)(!?)⟧")
 _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
 
-def quantity(value: float | None, unit: str) -> str:
-    """Mark a quantity in SI, of a unit in `SHOWN`; a dash for None."""
-    return NONE if value is None else f"⟦{float(value)!r} {unit}⟧"
+def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
+    """Mark a quantity in SI, of a unit in `SHOWN`, shown without its unit if `bare`; a dash for None."""
+    return NONE if value is None else f"⟦{float(value)!r} {unit}{'!' * bare}⟧"
 
 
 def interval(values: npt.NDArray[Any], unit: str) -> str | None:
@@ -90,7 +90,10 @@ def shown(value: float, unit: str, system: System) -> str:
 def rendered(text: str, system: System = "si", style: Callable[[str, str], str] | None = None) -> str:
     """Replace the marks of a text; `style` shows a styled text, by default as it is."""
     with_units = _QUANTITY.sub(
-        lambda mark: f"{shown(float(mark[1]), mark[2], system)} {sign(mark[2], system)}", text
+        lambda mark: (
+            shown(float(mark[1]), mark[2], system) + ("" if mark[3] else f" {sign(mark[2], system)}")
+        ),
+        text,
     )
     return _STYLED.sub(lambda mark: style(mark[1], mark[2]) if style else mark[2], with_units)
 
@@ -141,18 +144,8 @@ class Grid:
 
     def rows(self, system: System) -> list[Sequence[str]]:
         """Return the texts of the cells, row by row."""
-        rows: list[Sequence[str]] = list(zip(*(column.texts(system) for column in self.columns), strict=True))
-        return shortened(rows, self.most)
-
-
-def shortened(rows: list[Sequence[str]], most: int | None) -> list[Sequence[str]]:
-    """Return at most `most` rows, and between the first and the last how many are left out."""
-    hidden = 0 if most is None else len(rows) - most
-    if most is None or hidden <= 0:
-        return rows
-    half = most // 2
-    dots = ["…"] * (len(rows[0]) - 1) + [styled("dim", f"{hidden} more")]
-    return [*rows[:half], dots, *rows[len(rows) - half :]]
+        rows = list(zip(*(column.texts(system) for column in self.columns), strict=True))
+        return shortened(rows, self.most or len(rows))
 
 
 @dataclass(frozen=True)

@@ -377,7 +377,8 @@ class Motion(Result, fields=False):
             eddies = f" + eddies {quantity(energy.eddy_loss, 'J')}" if energy.eddy_loss else ""
             spent = (
                 f"{quantity(energy.supply_work, 'J')} = copper {quantity(energy.copper_loss, 'J')}"
-                f" + driver {quantity(energy.driver_loss, 'J')}{eddies} + coil {quantity(energy.coil_work, 'J')}"
+                f" + driver {quantity(energy.driver_loss, 'J')}{eddies}"
+                f" + coil {quantity(energy.coil_work, 'J')}"
                 f" + field {quantity(energy.field, 'J')}"
             )
             rows.append(("supply", spent))
@@ -389,7 +390,8 @@ class Motion(Result, fields=False):
         )
         damping = "" if self.hammer.damping is None else f" + damping {quantity(energy.damping_loss, 'J')}"
         balance = (
-            f"{work} = pack {quantity(energy.pack_loss, 'J')} + backstop {quantity(energy.backstop_loss, 'J')}"
+            f"{work} = pack {quantity(energy.pack_loss, 'J')}"
+            f" + backstop {quantity(energy.backstop_loss, 'J')}"
             f"{damping} + armature {quantity(energy.kinetic + energy.stored, 'J')}"
         )
         residual = max(energy.residual, energy.electric_residual, key=abs)
@@ -431,7 +433,7 @@ class Motion(Result, fields=False):
         write_parquet(self.to_pandas(), path)
 
     def write(self, path: Path) -> None:
-        """Write the motion: all that it tells as JSON, where the name ends so, else its record as `save` does."""
+        """Write the motion: by a name in .json `to_json`, else its record as `save` does."""
         if path.suffix.lower() == ".json":
             write_file(path, self.to_json())
         else:

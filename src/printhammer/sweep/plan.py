@@ -229,8 +229,10 @@ class Plan(Declared):
                 Grid(axes),
                 "",
                 Grid(arrays),
-                f"\n{self.members} members in {blocks} of up to {math.prod(self.blocks.chunks)};"
-                f" {size_text(sum(sizes))} before compression",
+                (
+                    f"\n{self.members} members in {blocks} of up to {math.prod(self.blocks.chunks)};"
+                    f" {size_text(sum(sizes))} before compression"
+                ),
             ]
         )
 

@@ -208,7 +208,7 @@ class Bifurcation(Result, rows="direction column"):
         return Summary([*map(self._windows_grid, self.directions), *lines, *self._undecided()])
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
-        """Return what writes values of the parameter, with digits that tell neighbours apart, and the unit."""
+        """Return the formatter of parameter values, with digits that tell neighbours apart, and the unit."""
         si = self.regime.quantity(self.parameter).si
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import typer
 from rich.console import RenderableType
@@ -138,8 +138,9 @@ def constants_table(hammer: Hammer, sources: list[str]) -> Table:
     heads = ("constant", "value", "unit", "SI", "", "status", "source", "meaning")
     made = table([Column(head, str, left=head not in numbers) for head in heads], ())
     for section, group in groupby(hammer.constants.items(), lambda entry: entry[0].rpartition(".")[0]):
-        made.add_row("")
-        made.add_row(f"[bold]\\[{section}][/bold]", f"[dim]{laws.get(section, '')}[/dim]")
+        if section:
+            made.add_row("")
+            made.add_row(f"[bold]\\[{section}][/bold]", f"[dim]{laws.get(section, '')}[/dim]")
         for _key, constant in group:
             made.add_row(*cells(constant))
     return made
@@ -201,6 +202,7 @@ def from_datasheet(
         raise InputError("SHEET is missing, expected a data sheet; --example NAME prints one")
     from printhammer.identify.datasheet.build import hammer_of
     from printhammer.identify.datasheet.sheet import read_sheet
+    from printhammer.results import Cells, Grid, Summary
 
     read = read_sheet(sheet)
     made, magnet = hammer_of(read)
@@ -209,14 +211,12 @@ def from_datasheet(
             f"{sheet}: a force is met to {100.0 * magnet.misfit:.2g} % only: poles that are not flat, or a"
             " typing error"
         )
-    points = [
-        (gap, force, of_law) for (gap, force), of_law in zip(read.force, magnet.forces.tolist(), strict=True)
+    gaps, printed = zip(*read.force, strict=True)
+    forces = [
+        Cells("gap", [f"{gap.value:g} {gap.unit}" for gap in gaps]),
+        Cells("printed", [f"{force.value:g} {force.unit}" for force in printed]),
+        Cells("of the law", magnet.forces, "N", ".4g"),
     ]
-    forces: tuple[Column[tuple[Any, Any, float]], ...] = (
-        Column("gap", lambda row: f"{row[0].value:g} {row[0].unit}"),
-        Column("printed", lambda row: f"{row[1].value:g} {row[1].unit}"),
-        Column("of the law", lambda row: row[2], unit="N", format=".4g"),
-    )
     sources = list(dict.fromkeys(constant.source for constant in made.constants.values()))
     return Answer(
         [
@@ -224,7 +224,7 @@ def from_datasheet(
             constants_table(made, sources),
             *numbered(sources),
             "",
-            table(forces, points, title="Forces"),
+            *render(Summary([Grid(forces, "Forces")])),
         ],
         files={"out": Content.text(made.to_toml)},
     )

@@ -35,12 +35,17 @@ def tuned_along(
     check_endings(job.wanted["out"], (*opt.DATA, ".h"), "--out")
     with job.counting("tuning") as tell:
         made = tune_along(hammer, axis, values, progress=tell, **options)
-    if header:
-        made = made.quantised(header["tick"])
+    made = _told(job, made, header, budget, units)
+    return Answer(files={"out": Content(lambda path: made.save(path, **header))})
+
+
+def _told(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
+    """Show a table, rounded to the tick if there is one, and return it; check that it keeps to the budget."""
+    made = made.quantised(header["tick"]) if header else made
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
     job.show(*render(made.summary(), units), note=f"tuned in {job.seconds:.2g} s{size}")
-    return Answer(files={"out": Content(lambda path: made.save(path, **header))})
+    return made
 
 
 def _read(written: str) -> tuple[str, list[float]]:
@@ -117,11 +122,7 @@ def tune(
     with job.counting("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)
     header = opt.given(tick=tick)
-    if tick is not None:
-        made = made.quantised(tick)
-    made.to_header(budget=budget, **header)
-    size = f", {made.size(**header)} bytes in a C header"
-    job.show(*render(made.summary(), units), note=f"tuned in {job.seconds:.2g} s{size}")
+    made = _told(job, made, header, budget, units)
     files = {"out": Content(partial(save_table, made, header), made.plot)}
     if not judge:
         return Answer(files=files)

@@ -100,7 +100,7 @@ class Feedback(Result, rows=_DOTS):
         return f"feedback on {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return how many patterns are within limits and how far dots are off, a row for each way to drive."""
+        """Return the patterns within limits and the deviations of dots, a row for each way to drive."""
         count = self.passed.shape[1]
         known = [force[np.isfinite(force)] for force in self.force]
         late = [times[np.isfinite(times)] for times in self.arrival]

@@ -268,13 +268,17 @@ class LeastWork(Result, rows="node"):
             ("lost at the backstop", quantity(ledger.backstop_loss, "J")),
             (
                 "net work W",
-                f"{quantity(work.net, 'J')}, {net} of what the pack absorbs;"
-                f" {self.single_ratio:.2f} with single pulses",
+                (
+                    f"{quantity(work.net, 'J')}, {net} of what the pack absorbs;"
+                    f" {self.single_ratio:.2f} with single pulses"
+                ),
             ),
             (
                 "positive work W+",
-                f"{quantity(work.positive, 'J')}, {positive} of it; no current does with less than"
-                f" {self.bound_ratio:.4f} for this force",
+                (
+                    f"{quantity(work.positive, 'J')}, {positive} of it; no current does with less than"
+                    f" {self.bound_ratio:.4f} for this force"
+                ),
             ),
             ("heat of the coil", None if work.heat is None else quantity(work.heat, "J")),
             ("ledger", f"residual {ledger.residual / ledger.throughput:.1e} of the throughput"),

@@ -117,12 +117,17 @@ class Page(Result, rows="dot"):
         rows += [
             (
                 "placement",
-                f"spread {quantity(float(np.std(error)), 'm')}, worst {quantity(error[worst], 'm')}"
-                f" (line {line}, wire {wire}, slot {slot}, counted from 1)",
+                (
+                    f"spread {quantity(float(np.std(error)), 'm')}, worst {quantity(error[worst], 'm')}"
+                    f" (line {line}, wire {wire}, slot {slot}, counted from 1)"
+                ),
             ),
             (
                 "flight time",
-                f"spread {quantity(float(np.std(flight)), 's')}, peak to peak {quantity(float(np.ptp(flight)), 's')}",
+                (
+                    f"spread {quantity(flight.std(), 's')},"
+                    f" peak to peak {quantity(float(np.ptp(flight)), 's')}"
+                ),
             ),
             (
                 "darkness",

@@ -69,11 +69,9 @@ class Spread(Declared):
         """Return the spread in words, of quantities in a unit, beside that of the single pulse."""
         if not self.count:
             return "–"
-        mean, deviation, most = (
-            quantity(each, unit) for each in (self.mean, self.deviation, self.peak_to_peak)
-        )
-        alone = "" if single is None else f", single pulse {quantity(single, unit)}"
-        return f"{mean} ± {deviation}, {most} peak to peak{alone}"
+        mean, most = (quantity(each, unit, bare=True) for each in (self.mean, self.peak_to_peak))
+        alone = "" if single is None else f", single pulse {quantity(single, unit, bare=True)}"
+        return f"{mean} ± {quantity(self.deviation, unit)}, {most} peak to peak{alone}"
 
 
 class Quality(Result):
@@ -137,20 +135,24 @@ class Quality(Result):
         matrix, engraved = "arrivals within 200 µs of each other", "arrivals within 30 µs of each other"
         rows = [
             ("pattern", f"{what}, {count} dots judged, {self.rate:g} Hz, {self.strategy}"),
-            ("limits", self.limits.text),
+            ("limits", self.limits.said),
             ("paper", None if self.paper is None else self.paper.text),
             (
                 "dots",
-                f"{judged(good == count, f'{good} of {count} within limits')}, {lost} lost"
-                f" ({100.0 * self.missing:.3g} %), {extra} extra contacts",
+                (
+                    f"{judged(good == count, f'{good} of {count} within limits')}, {lost} lost"
+                    f" ({100.0 * self.missing:.3g} %), {extra} extra contacts"
+                ),
             ),
             *spreads,
             ("dot matrix", _verdict(self.dot_matrix, matrix)),
             ("engraved", _verdict(self.engraved, engraved)),
             (
                 "backstop",
-                f"{wear.touches / self.fired:.2f} touches a dot, {1e3 * self.backstop_impulse:.3f} mN·s"
-                f" and {quantity(self.backstop_loss, 'J')} a dot{pressed}",
+                (
+                    f"{wear.touches / self.fired:.2f} touches a dot, {1e3 * self.backstop_impulse:.3f} mN·s"
+                    f" and {quantity(self.backstop_loss, 'J')} a dot{pressed}"
+                ),
             ),
             ("coil", f"{quantity(self.work, 'J')} a dot, {self.mean_power:.3f} W in the mean{heat}"),
         ]

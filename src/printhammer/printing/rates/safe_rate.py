@@ -142,7 +142,7 @@ class SafeRate(Result):
         more = "at least " if self.at_least else ""
         first, last = float(self.rates[0]), float(self.rates[-1])
         rows = [
-            ("limits", self.limits.text),
+            ("limits", self.limits.said),
             ("drive", self.strategy),
             (
                 "safe rate",

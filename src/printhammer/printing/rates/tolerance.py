@@ -104,10 +104,13 @@ class ToleranceYield(Result):
         within = f"{100.0 * spreads[0]:g} %" + (f" to {100.0 * spreads[-1]:g} %" if len(spreads) > 1 else "")
         odd = self.status[self.status != "ok"]
         rows: list[FactRow] = [
-            ("limits", f"{self.limits.text}, judged by {self.judged_by} single pulse"),
+            ("limits", f"{self.limits.said}, judged by {self.judged_by} single pulse"),
             (
                 "draw",
-                f"{len(self.status)} hammers, {len(self.spreads)} constants within {within}, seed {self.seed}",
+                (
+                    f"{len(self.status)} hammers, {len(self.spreads)} constants within {within},"
+                    f" seed {self.seed}"
+                ),
             ),
             *(
                 ("", styled("poor", f"{int((odd == name).sum())} {name}"))
