@@ -6,8 +6,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from printhammer.cli.verbs.sweep import Telling, duration_text, progress_text, size_text
+from printhammer.cli.verbs.sweep import Telling, duration_text, progress_text
 from printhammer.results.store import open_store
+from printhammer.sweep.plan import size_text
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
 SPEC = """

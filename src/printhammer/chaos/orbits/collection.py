@@ -34,6 +34,13 @@ _STYLES: Final[dict[str, Style]] = {
 }
 
 
+def energies_of(regime: Regime) -> list[str]:
+    """Return the names of the energies in a summary: the work of the drive, the losses of the hammer."""
+    work = "drive_work" if regime.fired.quantity == "force" else "coil_work"
+    damping = [] if regime.hammer.damping is None else ["damping_loss"]
+    return [work, "pack_loss", "backstop_loss", *damping]
+
+
 class Orbits(Result):
     """The periodic orbits that a search has found, and what became of the search.
 
@@ -59,10 +66,6 @@ class Orbits(Result):
         """Return the orbits, a row each, and how the search ended."""
         if not self.found:
             return Summary([self.message])
-        work = "drive_work" if self.regime.fired.quantity == "force" else "coil_work"
-        names = [work, "pack_loss", "backstop_loss"]
-        if self.regime.hammer.damping is not None:
-            names.append("damping_loss")
         columns = [
             Cells("firings", [orbit.firings for orbit in self]),
             Cells("kind", [styled(_STYLES[orbit.kind], orbit.kind) for orbit in self], left=True),
@@ -72,7 +75,7 @@ class Orbits(Result):
             Cells("lost", [orbit.lost for orbit in self]),
             *(
                 Cells(name.replace("_", " "), [getattr(orbit.energy, name, None) for orbit in self], "J")
-                for name in names
+                for name in energies_of(self.regime)
             ),
         ]
         return Summary([Grid(columns), "", self.message])
