@@ -66,7 +66,7 @@ def test_a_table_is_declared_by_its_columns() -> None:
     assert [list(column.cells) for column in made.columns] == [
         ["1.000", "–"],
         ["0.0", "–"],
-        ["[green]2.54e-05[/green]", "[green]nan[/green]"],
+        ["[green]2.54e-05[/]", "[green]nan[/]"],
     ]
 
 

@@ -29,8 +29,5 @@ VERBS: Final[tuple[Verb, ...]] = (
     *(fit.magnet, fit.solenoid, fit.spring, fit.pack, fit.backstop, fit.motion, fit.coil),
 )
 
-GROUPS: Final = {
-    "hammer": (hammer.GROUP, None),
-    "fit": (fit.GROUP, fit.EXAMPLE),
-}
+GROUPS: Final = {"hammer": (hammer.GROUP, None), "fit": (fit.GROUP, fit.EXAMPLE)}
 """What the verbs of two words have in common, by their first word: help, and an example."""

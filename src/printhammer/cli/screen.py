@@ -35,11 +35,8 @@ STYLES: Final = {
     "bad": "bold red",
     "strong": "bold",
     "best": "bold green",
-    "dim": "dim",
-    "cyan": "cyan",
-    "magenta": "magenta",
 }
-"""Styles of the terminal by those of summaries."""
+"""Styles of the terminal by those of summaries, where their names differ."""
 
 
 @dataclass(frozen=True)
@@ -131,9 +128,10 @@ def marked(text: str, units: Units = Units.SI) -> str:
     """Return a text of a summary as rich markup."""
     from printhammer.results.summary import rendered
 
-    return rendered(
-        escape(text), units.value, lambda style, said: f"[{STYLES[style]}]{said}[/{STYLES[style]}]"
-    )
+    def shown(style: str, said: str) -> str:
+        return f"[{STYLES.get(style, style)}]{said}[/]"
+
+    return rendered(escape(text), units.value, shown)
 
 
 def render(summary: Summary, units: Units = Units.SI) -> list[RenderableType]:

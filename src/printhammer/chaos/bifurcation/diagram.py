@@ -246,7 +246,10 @@ class Bifurcation(Result, rows="direction column"):
                 "neighbouring motions approach each other: they still settle, more firings show the period",
             ),
             (known & ~settling, "the exponent lies within three standard errors of zero"),
-            (undecided & ~known, "no exponent was computed, or a touch grazes"),
+            (
+                undecided & ~known,
+                "no exponent was computed: the option exponents does so, except where a touch grazes",
+            ),
         )
         count = int(undecided.sum())
         return [

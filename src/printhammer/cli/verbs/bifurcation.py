@@ -96,11 +96,7 @@ def bifurcation(
 
 
 def _axis(
-    hammer: Hammer,
-    parameter: str,
-    ends: tuple[str | None, str | None],
-    count: int,
-    firing: Firing,
+    hammer: Hammer, parameter: str, ends: tuple[str | None, str | None], count: int, firing: Firing
 ) -> dict[str, Any]:
     """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
     import numpy as np

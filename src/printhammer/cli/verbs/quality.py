@@ -65,9 +65,7 @@ _instead = partial(opt.switch, panel=_MORE)
 
 
 @verb(
-    "quality",
-    "printhammer quality hendriks-1983 --rate 900Hz --out quality.png",
-    out=opt.results("Numbers"),
+    "quality", "printhammer quality hendriks-1983 --rate 900Hz --out quality.png", out=opt.results("Numbers")
 )
 def quality(
     job: Job,

@@ -35,10 +35,7 @@ _record = partial(opt.file, panel=_FILES)
         ),
         "points": opt.whole("Points in the record of the motion."),
     },
-    out=opt.results(
-        "Motion, as .json its dots, contacts and energies",
-        panel=_FILES,
-    ),
+    out=opt.results("Motion, as .json its dots, contacts and energies", panel=_FILES),
     dots=_record("Dots, .csv or .parquet.", ".csv", ".parquet"),
     contacts=_record("Contacts, .csv or .parquet.", ".csv", ".parquet"),
 )

@@ -23,10 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@verb(
-    "sweep",
-    "printhammer sweep --example > sweep.toml && printhammer sweep sweep.toml --out results.zarr",
-)
+@verb("sweep", "printhammer sweep --example > sweep.toml && printhammer sweep sweep.toml --out results.zarr")
 def sweep(
     job: Job,
     spec: Path | None = opt.argument("SPEC", "A spec file, TOML.", type=Path),
