@@ -11,6 +11,7 @@ from printhammer.cli.options import Units, files
 from printhammer.cli.runner import PICTURES, Answer, Content, Job, check_endings
 from printhammer.cli.screen import Column, table
 from printhammer.errors import InputError
+from printhammer.results.summary import styled
 
 
 def drawn() -> Figure:
@@ -53,9 +54,9 @@ def test_a_complaint_is_status_1_and_ctrl_c_is_130(capsys: pytest.CaptureFixture
 
 
 COLUMNS = (
-    Column[float]("length", lambda x: x, "length"),
+    Column[float]("length", lambda x: x, "m"),
     Column[float]("number", lambda x: 2.0 * x, unit="m", format=".1f"),
-    Column[float]("name", lambda x: f"[green]{x:g}[/green]", left=True),
+    Column[float]("name", lambda x: styled("good", f"{x:g}"), left=True),
 )
 
 
@@ -65,11 +66,11 @@ def test_a_table_is_declared_by_its_columns() -> None:
     assert [list(column.cells) for column in made.columns] == [
         ["1.000", "–"],
         ["0.0", "–"],
-        ["[green]2.54e-05[/green]", "[green]nan[/green]"],
+        ["[green]2.54e-05[/]", "[green]nan[/]"],
     ]
 
 
 def test_of_a_long_table_the_ends_are_shown() -> None:
     made = table(COLUMNS, [float(k) for k in range(10)], most=4)
     assert list(made.columns[1].cells) == ["0.0", "2.0", "…", "16.0", "18.0"]
-    assert list(made.columns[2].cells)[2] == "[dim]6 more[/dim]"
+    assert list(made.columns[2].cells)[2] == "6 more"

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from printhammer.cli.main import main
-from printhammer.cli.options import Units
 from printhammer.cli.screen import Column, facts, table
+from printhammer.results.summary import Cells, styled
 
 COLUMNS: tuple[Column[float], ...] = (
     Column("dot", int),
-    Column("flight", lambda x: 1e-6 * x, "time"),
-    Column("force", lambda x: 22.23 * x, "force"),
-    Column("", lambda x: "[red]lost[/red] on the way", left=True),
-    Column("work", lambda x: 1e-3 * x, "energy"),
+    Column("flight", lambda x: 1e-6 * x, "s"),
+    Column("force", lambda x: 22.23 * x, "N"),
+    Column("", lambda x: f"{styled('bad', 'lost')} on the way", left=True),
+    Column("work", lambda x: 1e-3 * x, "J"),
 )
 ROWS = [1.0, 22.0, 333.0]
 
@@ -39,8 +39,8 @@ def test_no_digit_is_cut_off(width: int) -> None:
     words = text.split()
     for column in COLUMNS:
         if not column.left:
-            for row in ROWS:
-                assert column.cell(row, Units.SI) in words
+            values = [column.value(row) for row in ROWS]
+            assert set(Cells(column.heading, values, column.unit).texts("si")) <= set(words)
 
 
 def test_a_narrow_terminal_gets_parts_that_begin_alike() -> None:

@@ -277,3 +277,11 @@ def test_values_that_belong_together_are_declared_alike() -> None:
     section = "mass : float\n    Mass, kg.\nshape : str\n    Shape; as a word.\n"
     assert Stone.__doc__ == f"A stone.\n\nAttributes\n----------\n{section}"
     assert "Stone" not in RESULTS
+
+
+def test_print_and_notebook_show_the_same_summary(result: Result) -> None:
+    summary = result.summary()
+    assert str(result) == f"{result.title}\n{summary.text()}"
+    assert summary.text("inch").count("\n") == summary.text().count("\n")
+    assert summary._repr_html_() in result._repr_html_()
+    assert not set("⟦⟧⟪⟫") & set(summary.text() + result._repr_html_())

@@ -12,8 +12,6 @@ import printhammer as ph
 from printhammer.chaos import strobes
 from printhammer.chaos.bifurcation.columns import run_columns
 from printhammer.chaos.strobe.train import FROM_REST
-from printhammer.cli.options import Units
-from printhammer.cli.verbs.chaos.strobe import summary
 from printhammer.control.least_work.burst import least_work
 from printhammer.drive.waveforms.drivers import Capacitor, Chopper, Rail
 from printhammer.identify.bench.benches import _currents
@@ -179,6 +177,5 @@ def test_sentences_name_the_voltage_and_a_magnet_is_measured_up_to_the_current_o
 def test_the_terminal_shows_the_current_of_strobe_points() -> None:
     with interpreted():
         points = ph.strobe(on_a_rail(), period=1e-3, waveform=DRIVERS[0], points=2, verdict=False)
-    rows = dict(summary(points, Units.SI))
-    assert rows["current"] is not None
-    assert rows["current"].endswith(" A")
+    (row,) = (line for line in points.summary().text().splitlines() if line.startswith("current"))
+    assert row.endswith(" A")

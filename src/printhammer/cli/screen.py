@@ -1,23 +1,23 @@
-"""What the verbs show: tables that are declared column by column, and facts, a row each."""
+"""How summaries look on the terminal: tables that are cut into parts, facts, and styles of words."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, RenderResult
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.markup import escape
 from rich.table import Column as TableColumn
 from rich.table import Table
 
-from printhammer.cli.options import Units, shown, unit
+from printhammer.cli.options import Units
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.summary import Grid, Summary
 
 Row = TypeVar("Row")
 
@@ -29,34 +29,27 @@ STATUS_STYLES: Final = {
     "assumed": "magenta",
 }
 
+STYLES: Final = {
+    "good": "green",
+    "poor": "yellow",
+    "bad": "bold red",
+    "strong": "bold",
+    "best": "bold green",
+}
+"""Styles of the terminal by those of summaries, where their names differ."""
+
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """A column of a table."""
+    """A column of a table of rows, as `printhammer.results.Cells` is one of an array."""
 
     heading: str
     value: Callable[[Row], Any]
-    """Returns of a row a number in SI, None or NaN if there is none, or text with markup."""
-    kind: str = ""
-    """Kind of quantity, such as "time", which is shown in a unit of the system that is asked for."""
+    """Returns of a row a number, None or NaN if there is none, or text with marks of style."""
     unit: str = ""
-    """Unit in the heading of numbers that are shown as they are."""
     format: str = ""
-    """How numbers without kind are written."""
     left: bool = False
     """Whether the cells stand to the left."""
-
-    def head(self, units: Units) -> str:
-        """Return the heading, with the unit below."""
-        sign = unit(self.kind, units) if self.kind else self.unit
-        return f"{self.heading}\n\\[{sign}]" if sign else self.heading
-
-    def cell(self, row: Row, units: Units) -> str:
-        """Return the text of a cell."""
-        value = self.value(row)
-        if value is None or (isinstance(value, float) and math.isnan(value)):
-            return "–"
-        return shown(value, self.kind, units) if self.kind else format(value, self.format)
 
 
 class Sheet(Table):
@@ -100,56 +93,70 @@ def table(
     columns: Sequence[Column[Row]],
     rows: Iterable[Row],
     units: Units = Units.SI,
-    title: str | None = None,
+    title: str = "",
     most: int | None = None,
 ) -> Table:
-    """Return a table without frame; of more than `most` rows the first and the last."""
-    made = Sheet(box=None, pad_edge=False, title=title, title_justify="left", title_style="bold")
-    for column in columns:
+    """Return a table of rows without frame; of more than `most` rows the first and the last."""
+    from printhammer.results.summary import Cells, Grid
+
+    every = list(rows)
+    cells = [
+        Cells(each.heading, [each.value(row) for row in every], each.unit, each.format, each.left)
+        for each in columns
+    ]
+    return _grid(Grid(cells, title, most), units)
+
+
+def _grid(grid: Grid, units: Units) -> Table:
+    made = Sheet(box=None, pad_edge=False, title=grid.title or None, title_justify="left", title_style="bold")
+    for column in grid.columns:
+        unit = column.unit_sign(units.value)
         made.add_column(
-            column.head(units),
+            f"{column.heading}\n\\[{unit}]" if unit else column.heading,
             justify="left" if column.left else "right",
             header_style="bold",
             vertical="bottom",
             no_wrap=not column.left,
             overflow="fold",
         )
-    cells = [[column.cell(row, units) for column in columns] for row in rows]
-    hidden = 0 if most is None else len(cells) - most
-    if most is not None and hidden > 0:
-        half = most // 2
-        cells[half : len(cells) - half] = [["…"] * (len(columns) - 1) + [f"[dim]{hidden} more[/dim]"]]
-    for row in cells:
-        made.add_row(*row)
+    for row in grid.rows(units.value):
+        made.add_row(*(marked(text, units) for text in row))
     return made
 
 
-def facts(rows: Iterable[tuple[str, str | None]], title: str = "") -> Table:
-    """Return names and what there is to say of them, a row each; what is None is left out."""
+def marked(text: str, units: Units = Units.SI) -> str:
+    """Return a text of a summary as rich markup."""
+    from printhammer.results.summary import rendered
+
+    def shown(style: str, said: str) -> str:
+        return f"[{STYLES.get(style, style)}]{said}[/]"
+
+    return rendered(escape(text), units.value, shown)
+
+
+def render(summary: Summary, units: Units = Units.SI) -> list[RenderableType]:
+    """Return the parts of a summary, in a unit system."""
+    from printhammer.results.summary import Facts
+
+    parts: list[RenderableType] = []
+    for part in summary:
+        if isinstance(part, str):
+            parts.append(marked(part, units))
+        elif isinstance(part, Facts):
+            parts.append(facts([(name, marked(said, units)) for name, said in part.known], part.title))
+        else:
+            parts.append(_grid(part, units))
+    return parts
+
+
+def facts(rows: Iterable[tuple[str, str]], title: str = "") -> Table:
+    """Return names and what there is to say of them, a row each."""
     made = Table(box=None, pad_edge=False, show_header=bool(title))
     made.add_column(title, style="dim", header_style="bold", overflow="fold")
     made.add_column(overflow="fold")
     for name, said in rows:
-        if said is not None:
-            made.add_row(name, said)
+        made.add_row(name, said)
     return made
-
-
-def repeated(name: str, sentences: Iterable[str]) -> list[tuple[str, str | None]]:
-    """Return facts of which only the first is named."""
-    return [("" if row else name, sentence) for row, sentence in enumerate(sentences)]
-
-
-def coloured(good: bool, said: object, otherwise: str = "yellow") -> str:
-    """Return text in green, or in another colour where something is not good; rich markup."""
-    style = "green" if good else otherwise
-    return f"[{style}]{said}[/{style}]"
-
-
-def multiplier(value: complex) -> str:
-    """Return a Floquet multiplier as text; without an imaginary part where it has none."""
-    real = f"{value.real:+.4g}"
-    return real if value.imag == 0.0 else f"{real}{value.imag:+.4g}i"
 
 
 def train_line(shape: str, quantity: str, overlap: str, period: float | None = None) -> str:

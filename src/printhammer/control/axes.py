@@ -32,6 +32,11 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import save_dataset
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.c_code import identifier
 from printhammer.support.files import write_file
@@ -223,6 +228,22 @@ class AxisTables:
             write_file(Path(path), str(self.to_dataframe().to_csv(index=False, lineterminator="\n")))
         else:
             save_dataset(self.to_dataset(), path)
+
+    def summary(self) -> Summary:
+        """Return the pulse from rest and how far off the entries are, a row for each value."""
+        columns = [
+            Cells(self.axis, self.values, AXES[self.axis].unit, ".6g"),
+            Cells("width from rest", [float(table.width[0, 0]) for table in self.tables], "s"),
+            Cells("advance from rest", [float(table.advance[0, 0]) for table in self.tables], "s"),
+            Cells(
+                "worst,\nof the limits",
+                [100.0 * float(table.deviation.max()) for table in self.tables],
+                "%",
+                ".1f",
+            ),
+        ]
+        title = f"Tables along the {self.axis} at {self.tables[0].rates[0]:g} Hz"
+        return Summary([Grid(columns, title, most=24)])
 
 
 def tune_along(

@@ -26,6 +26,14 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.files import ENDINGS
+from printhammer.results.summary import (
+    Cells,
+    Facts,
+    Grid,
+    Summary,
+    quantity,
+    styled,
+)
 from printhammer.run.problem import TOLERANCE
 from printhammer.support import c_code
 from printhammer.support.arrays import FloatArray, TextArray
@@ -153,6 +161,36 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
     def title(self) -> str:
         """What it is of."""
         return f"dead time of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return the times against rail and temperature, and where no width gives the blow."""
+        own = f"{quantity(self.own_width, 's')}, impact after {quantity(self.own_time, 's')}"
+        rail, coil = np.meshgrid(self.voltage, self.temperature, indexing="ij")
+        columns = [
+            Cells("rail", rail.ravel(), "V", ".4g"),
+            Cells("coil", coil.ravel(), "°C", "g"),
+            self.cells("time", "own pulse:\nimpact after"),
+            self.cells("speed"),
+            self.cells("heat"),
+            self.cells("width", "same blow:\nwidth"),
+            self.cells("width_time", "impact after"),
+            self.cells("width_heat", "heat"),
+        ]
+        facts = Facts([("own pulse", own), ("blow", quantity(self.blow, "m/s"))])
+        none = np.isnan(self.width)
+        lacking = (
+            f"\nNo width gives the blow at {int(none.sum())} of {none.size} pairs of rail and temperature;"
+            f" {quantity(self.reached, 'm/s')} is the strongest that all of them reach."
+        )
+        return Summary(
+            [facts, "", Grid(columns, most=24), *([styled("poor", lacking)] if none.any() else [])]
+        )
+
+    @property
+    def reached(self) -> float:
+        """Strongest blow reached at every rail and temperature that gives a blow, m/s; 0 without any."""
+        known = self.strongest[np.isfinite(self.strongest)]
+        return float(known.min()) if known.size else 0.0
 
     def to_header(self) -> str:
         """Return a C header (C99) with widths and dead times in nanoseconds, and a function between them."""

@@ -38,6 +38,12 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.parts.coil.winding import COPPER, REFERENCE
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    Cells,
+    Facts,
+    Grid,
+    Summary,
+)
 from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
@@ -153,6 +159,30 @@ class ThermalDuty(Result, rows="ambient burst"):
     def title(self) -> str:
         """What the rates are for."""
         return f"thermal duty of a coil up to {self.limit:g} degC"
+
+    def summary(self) -> Summary:
+        """Return the largest rates, a row each ambient temperature, and what bursts are allowed."""
+        fast, ambient = np.meshgrid(self.burst, self.ambient, indexing="ij")
+        temperature, time = (
+            np.where(np.isfinite(each), each, np.nan).T.ravel() for each in (self.temperature, self.time)
+        )
+        rates = [
+            Cells("ambient", self.ambient, "°C", "g"),
+            Cells("dots a second\nfor ever", self.rate, "Hz", ".4g"),
+        ]
+        bursts = [
+            Cells("in bursts of", fast.ravel(), "Hz", ".6g"),
+            Cells("ambient", ambient.ravel(), "°C", "g"),
+            Cells("would come to", temperature, "°C", ".1f"),
+            Cells("too hot after", time, "s", ".3g"),
+            Cells("part of the time", 100.0 * self.share.T.ravel(), "%", ".1f"),
+        ]
+        facts = [
+            ("limit of the winding", f"{self.limit:g} °C"),
+            ("heat of one dot there", f"{1e3 * self.limit_heat:.4g} mJ"),
+            ("keeps the same", f"the {self.heat.feed} of the driver"),
+        ]
+        return Summary([Facts(facts), "", Grid(rates), "", Grid(bursts)])
 
 
 def thermal_duty(

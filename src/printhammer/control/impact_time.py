@@ -17,6 +17,11 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+)
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import FloatArray, IntArray
 
@@ -57,6 +62,22 @@ class ImpactTime(Result, rows=_CELLS):
     def title(self) -> str:
         """What it is of."""
         return f"time of impact of {self.hammer.name} from the {self.signal} of its coil"
+
+    def summary(self) -> Summary:
+        """Return the errors, a row for each way to sample."""
+        noise, rate, bits = np.meshgrid(self.noise, self.sampling_rate, self.bits, indexing="ij")
+        columns = [
+            Cells("noise", 1e3 * noise.ravel(), f"m{self.unit}", ".3g"),
+            Cells("samples", 1e-3 * rate.ravel(), "kHz", "g"),
+            Cells("bits", bits.ravel()),
+            self.cells("bias", "nominal:\nbias"),
+            self.cells("deviation"),
+            Cells("missed", [f"{100.0 * missed:.0f} %" for missed in self.missed.ravel()]),
+            self.cells("unit_bias", "units:\nbias"),
+            self.cells("unit_deviation", "deviation"),
+            Cells("missed", [f"{100.0 * missed:.0f} %" for missed in self.unit_missed.ravel()]),
+        ]
+        return Summary([Grid(columns, self.title, most=24)])
 
     def entries(self) -> Entries:
         """Return the arrays, the noise in the unit of the signal."""

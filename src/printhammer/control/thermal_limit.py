@@ -18,6 +18,12 @@ from printhammer.control.duty import COLDEST, read_temperature
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.results import Result, column, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+    styled,
+)
 from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
@@ -44,6 +50,19 @@ class ThermalLimit(Result):
     def title(self) -> str:
         """What was found."""
         return f"largest temperature of a coil, {self.limit:.4g} degC"
+
+    def summary(self) -> Summary:
+        """Return the limit, and the rates beside those that follow from it."""
+        error = "" if np.isnan(self.error) else f" ± {self.error:.2g}"
+        columns = [
+            Cells("rail", [each or None for each in self.voltage.tolist()], "V", "g"),
+            self.cells("ambient", format="g"),
+            self.cells("rate", "stated", "g"),
+            self.cells("fitted", "from the limit", ".1f"),
+            Cells("1 Hz warms by", self.warming, "K", ".4g"),
+        ]
+        limit = styled("strong", f"{self.limit:.1f}{error} °C")
+        return Summary([f"limit of the winding {limit}", "", Grid(columns)])
 
 
 def thermal_limit(

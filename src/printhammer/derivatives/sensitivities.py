@@ -21,6 +21,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import unknown
 from printhammer.results import Column, Result, column, coordinate, derived, part, scalar
+from printhammer.results.summary import Facts, Summary
 from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem, check_tolerance
 from printhammer.run.simulate import end_of_run
@@ -185,12 +186,15 @@ class Sensitivities(Result):
             }
         )
 
-    def __repr__(self) -> str:
+    def summary(self) -> Summary:
+        """Return how many dots struck, the constants, and how the run ended."""
         struck = len(self.dots) - len(self.lost)
-        return (
-            f"<Sensitivities of {self.hammer.name}: {struck} of {len(self.dots)} dots struck,"
-            f" {len(self.constants)} constants, {self.status}>"
-        )
+        rows = [
+            ("dots", f"{struck} of {len(self.dots)} dots struck"),
+            ("constants", ", ".join(self.constants)),
+            ("status", self.status),
+        ]
+        return Summary([Facts(rows)])
 
 
 class Spread(Result):

@@ -13,7 +13,16 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.results import Column, Declared, Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    Cells,
+    Facts,
+    Grid,
+    Summary,
+    repeated,
+    styled,
+)
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.units import from_si
 
 if TYPE_CHECKING:
     from printhammer.results.result import Entries
@@ -37,6 +46,10 @@ REPLACED: Final = {
     "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
 """Constants from which another one follows, and which go where that one is given itself, by its key."""
+
+
+_SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}
+"""Units that make handy numbers of what a hammer has."""
 
 
 class FittedConstant(Declared):
@@ -75,6 +88,20 @@ class FittedConstant(Declared):
         half = student(degrees_of_freedom) * float(standard_error)
         ends = float(value) - half, float(value) + half
         return cls(key, float(value), float(standard_error), ends, unit, in_file, how)
+
+    @property
+    def texts(self) -> tuple[str, str, str, str]:
+        """Value, standard error, interval and unit; as many digits as the error has meaning."""
+        unit = _SHOWN_IN.get(self.unit, self.unit)
+        value, error, low, high = (
+            from_si(number, self.unit, unit) if math.isfinite(number) else number
+            for number in (self.value, self.standard_error, *self.interval)
+        )
+        digits = 6
+        if error > 1e-12 * abs(value):
+            digits = 2 + math.floor(math.log10(max(abs(value), error))) - math.floor(math.log10(error))
+        centre, least, most = (f"{number:.{digits}g}" for number in (value, low, high))
+        return centre, f"{error:.2g}", f"{least} to {most}", "" if unit == "1" else unit
 
 
 class Profile(Declared, eq=False):
@@ -164,6 +191,36 @@ class Fit(Result):
     def title(self) -> str:
         """One line that says what was fitted to what."""
         return f"fit of the {self.kind} to {', '.join(self.source)}"
+
+    def summary(self) -> Summary:
+        """Return the constants with their uncertainty, and what the data say of the law."""
+        files = f"  {styled('dim', ' and '.join(self.source))}" if self.source else ""
+        scale = f"residual scale {self.residual_scale:.3g} {self.axes[1][1]}"
+        several = len(self.keys) > 1
+        verdict = styled("poor", "rejected") if self.rejected else styled("good", "not rejected")
+        rows = [
+            ("data", f"{int((~self.outliers).sum())} used, {scale}" if len(self.data) else None),
+            ("robust", self.outlier_lines() if self.outliers.any() else None),
+            ("correlation", self._largest_correlation() if several else None),
+            ("condition", f"{self.condition_number:.3g}" if several else None),
+            ("law", f"{verdict}, p = {self.p_value:.2g}" if math.isfinite(self.p_value) else None),
+            ("because", self.rejected or None),
+            *repeated("taken as known", (f"{name} = {value}" for name, value in self.given.items())),
+            *repeated("not told apart", self.indistinct),
+            *repeated("notes", self.remarks),
+        ]
+        texts = list(zip(*(constant.texts for constant in self.constants.values()), strict=True)) or [()] * 4
+        heads = ("value", "± error", "95 % interval", "unit")
+        columns = [
+            Cells("constant", list(self.constants), left=True),
+            *(Cells(head, each, left=k > 1) for k, (head, each) in enumerate(zip(heads, texts, strict=True))),
+        ]
+        return Summary([f"{styled('strong', self.kind)}{files}", Grid(columns), "", Facts(rows)])
+
+    def _largest_correlation(self) -> str:
+        size = np.abs(self.correlation - np.eye(len(self.keys)))
+        first, second = sorted(int(k) for k in np.unravel_index(int(np.argmax(size)), size.shape))
+        return f"{self.correlation[first, second]:.2f} at most, of {self.keys[first]} and {self.keys[second]}"
 
     def entries(self) -> Entries:
         """Return the data over `datum`, the constants over `constant`, and their covariance."""

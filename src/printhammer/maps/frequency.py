@@ -20,6 +20,7 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
+from printhammer.results import Facts, Summary
 from printhammer.results.provenance import provenance
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import waveform_of
@@ -158,6 +159,43 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
         if known.any():
             rms[k] = np.sqrt(np.mean(np.square(difference[known])))
     return computed["rate"].values[rows], rms
+
+
+def summary_of(chart: xr.Dataset, beside: xr.Dataset | None = None) -> Summary:
+    """Return what was computed: size, dots, the first lost one, the difference from a measured map."""
+    rates, time = chart["rate"].values, chart["time"].values
+    fired = np.isfinite(chart["fired_at"].values)
+    lost = fired & ~chart["struck"].values
+    dots = f"{int(fired.sum())} fired, {int((fired & ~lost).sum())} struck, {int(lost.sum())} lost"
+    if lost.any():
+        row = int(np.argmax(lost.any(axis=1)))
+        dots += f"; the first at {rates[row]:.6g} Hz, firing {int(np.argmax(lost[row])) + 1}"
+    failed = int((chart["status"].values != 0).sum())
+    rows = [
+        (
+            "map",
+            (
+                f"{rates.size} rates from {rates[0]:g} to {rates[-1]:g} Hz, {chart.attrs['pulses']} pulses,"
+                f" {time.size} times up to {1e3 * float(time[-1]):.4g} ms"
+            ),
+        ),
+        ("dots", dots),
+        ("status", f"{failed} of {rates.size} runs did not reach their end" if failed else "ok"),
+        ("measured", None if beside is None else _difference(chart, beside)),
+    ]
+    return Summary([Facts(rows)])
+
+
+def _difference(chart: xr.Dataset, beside: xr.Dataset) -> str:
+    both, difference = rms_difference(chart, beside)
+    known = difference[np.isfinite(difference)]
+    said = "not known, no rate is in both maps"
+    if known.size:
+        said = (
+            f"RMS {1e6 * float(np.median(known)):.3g} µm (median of {known.size} rates),"
+            f" {1e6 * float(known.max()):.3g} µm at {both[np.nanargmax(difference)]:.6g} Hz"
+        )
+    return f"{beside['rate'].size} rates; difference {said}"
 
 
 def _spacing(times: FloatArray) -> float:

@@ -5,16 +5,21 @@ from printhammer.results.files import ENDINGS, Reopened, reopen, save_dataset
 from printhammer.results.provenance import KEYS, provenance
 from printhammer.results.result import RESULTS, Result
 from printhammer.results.rows import Rows
+from printhammer.results.summary import Cells, Facts, Grid, Summary
 
 __all__ = [
     "ENDINGS",
     "KEYS",
     "RESULTS",
+    "Cells",
     "Column",
     "Declared",
+    "Facts",
+    "Grid",
     "Reopened",
     "Result",
     "Rows",
+    "Summary",
     "column",
     "coordinate",
     "derived",

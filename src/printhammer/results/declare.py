@@ -72,12 +72,12 @@ def span(values: Any) -> str:
     return f"{finite.min():.6g} to {finite.max():.6g}" if finite.size else ""
 
 
-def shortened(rows: Sequence[Sequence[str]]) -> list[Sequence[str]]:
-    """Return at most `MOST_ROWS` rows: of more, the first and the last, and dots between them."""
-    if len(rows) <= MOST_ROWS:
+def shortened(rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[Sequence[str]]:
+    """Return at most `most` rows: of more, the first and the last, and between them how many are left out."""
+    hidden, half = len(rows) - most, most // 2
+    if hidden <= 0:
         return list(rows)
-    half = MOST_ROWS // 2
-    return [*rows[:half], ["…"] * len(rows[0]), *rows[-half:]]
+    return [*rows[:half], [*["…"] * (len(rows[0]) - 1), f"{hidden} more"], *rows[len(rows) - half :]]
 
 
 def _cut(text: str) -> str:

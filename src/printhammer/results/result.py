@@ -28,6 +28,7 @@ import numpy as np
 from printhammer.results import files
 from printhammer.results.declare import (
     Column,
+    cell,
     column,
     columns_of,
     coordinate,
@@ -41,6 +42,7 @@ from printhammer.results.declare import (
     with_attributes,
 )
 from printhammer.results.provenance import provenance
+from printhammer.results.summary import Cells, Facts, Summary
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,7 +83,7 @@ class Result:
             cls.ENDINGS = endings
         RESULTS[cls.__name__] = cls
         if fields:
-            dataclass(frozen=True, eq=False)(cls)
+            dataclass(frozen=True, eq=False, repr=False)(cls)
         cls.COLUMNS = columns_of(cls)
         if fields:
             cls.__doc__ = with_attributes(cls.__doc__ or "", cls, cls.COLUMNS)
@@ -181,16 +183,42 @@ class Result:
         # By name, so that physics does not depend on pictures.
         return import_module("printhammer.figures.plots").plot(self, **options)
 
+    def summary(self) -> Summary:
+        """Return what the result says in short, by default of each declared column its range and meaning.
+
+        The terminal, `print` and the notebook show it. A class overrides it where it has more to say.
+        """
+        rows = []
+        for name, note in self.COLUMNS.items():
+            if note.kind == "part":
+                continue
+            value = getattr(self, name)
+            said = span(value) if np.ndim(value) else cell(value)
+            unit = "" if note.unit in ("", "1") or not said else f" {note.unit}"
+            rows.append((note.name, f"{said}{unit}{', ' if said else ''}{note.meaning}"))
+        return Summary([Facts(rows)])
+
+    def cells(self, name: str, heading: str = "", format: str = "") -> Cells:
+        """Return a declared column as a column of a summary, with its unit; see `results.Cells`."""
+        note = self.COLUMNS[name]
+        unit = {"degC": "°C", "1": ""}.get(note.unit, note.unit)
+        return Cells(heading or name.replace("_", " "), np.ravel(getattr(self, name)), unit, format)
+
+    def __repr__(self) -> str:
+        return f"{self.title}\n{self.summary().text()}"
+
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: title, columns, and attributes to unfold."""
+        """Return what a notebook shows: title and summary, columns and attributes to unfold."""
         columns = [
             (note.heading(name), extent(values), ", ".join(note.dims), span(values), note.meaning)
             for name, (note, values) in self.entries().items()
         ]
         attributes = [(key, str(value)) for key, value in files.plain(self.attributes).items()]
+        heads = ("", "shape", "dimensions", "values", "meaning")
         return titled(
             self.title,
-            html_table(columns, ("", "shape", "dimensions", "values", "meaning")),
+            self.summary()._repr_html_(),
+            f"<details><summary>columns</summary>{html_table(columns, heads)}</details>",
             f"<details><summary>attributes</summary>{html_table(attributes)}</details>",
         )
 

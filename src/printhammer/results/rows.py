@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, SupportsIndex, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from printhammer.results.declare import Declared, cell, columns_of, html_table, shortened
+from printhammer.results.files import write_csv, write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,6 +70,10 @@ class Rows(tuple[_T, ...]):
 
         table = pd.DataFrame([asdict(row) for row in self], columns=list(self._heads))
         return table.rename(columns=self._heads)
+
+    def save(self, path: Path) -> None:
+        """Write the table as Parquet where the name ends so, else as CSV; errors as for `write_file`."""
+        (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(self.to_dataframe(), path)
 
     def _cells(self) -> list[list[str]]:
         return [[cell(getattr(row, name)) for name in self._heads] for row in self]

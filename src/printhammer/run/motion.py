@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -16,12 +18,24 @@ from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, Rows, derived, provenance
+from printhammer.results.declare import columns_of
 from printhammer.results.files import write_csv, write_parquet
+from printhammer.results.summary import (
+    Cells,
+    FactRow,
+    Facts,
+    Grid,
+    Summary,
+    judged,
+    quantity,
+    styled,
+)
 from printhammer.run.contacts import Contact, Dot, contacts_of, dots_of, loading_works
 from printhammer.run.energy import CoilWork, Ledger, coil_work_of, increments_of, ledger_of
 from printhammer.run.problem import Problem, Record, message_of
 from printhammer.run.start import state_to_begin
 from printhammer.support.arrays import FloatArray
+from printhammer.support.files import write_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +52,18 @@ PATHS: Final = ("supply", "chopped", "blocked", "backward")
 decay of a negative current."""
 
 _BISECTIONS: Final = 52
+
+
+MOST_DOTS: Final = 40
+"""Dots that a summary shows; of more, the first and the last."""
+
+
+def _remark(dot: Dot) -> str:
+    if not dot.struck:
+        return styled("bad", "lost")
+    if dot.contact_time is None:
+        return styled("poor", "open")
+    return styled("poor", f"+{dot.extra_contacts}") if dot.extra_contacts else ""
 
 
 class Motion(Result, fields=False):
@@ -302,6 +328,76 @@ class Motion(Result, fields=False):
         """One line that says what the motion is."""
         return f"motion of {self.hammer.name}, {self.start:.9g} s to {self.end:.9g} s"
 
+    def summary(self) -> Summary:
+        """Return the dots, and status, peak, contacts and energies."""
+        lost = len(self.dots) - sum(dot.struck for dot in self.dots)
+        state = judged(self.ok, "ok" if self.ok else self.status, "bad")
+        missing = f", {styled('bad', f'{lost} lost')}" if lost else ""
+        rows: list[FactRow] = [
+            ("status", f"{state}, {self.end * 1e3:.4g} ms in {self.steps} steps"),
+            ("dots", f"{len(self.dots) - lost} struck{missing}"),
+        ]
+        times, x = self.maxima
+        if len(x):
+            top = int(x.argmax())
+            rows.append(("peak", f"{quantity(x[top], 'm')} at {quantity(times[top], 's')}"))
+        for surface in ("pack", "backstop"):
+            touches = [each for each in self.contacts if each.surface == surface and not each.initial]
+            forces = [each.peak_force for each in touches if each.peak_force is not None]
+            up_to = f", up to {quantity(max(forces), 'N')}" if forces else ""
+            rows.append((surface, f"{len(touches)} {'touch' if len(touches) == 1 else 'touches'}{up_to}"))
+        energies = Facts([*rows, *self._energy_facts()])
+        if self.drive.quantity != "current" and self.hammer.pack is None:
+            return Summary([energies])
+        heads = {
+            "fired": "fired_at",
+            "flight": "flight_time",
+            "speed": "impact_speed",
+            "force": "peak_force",
+            "depth": "indentation",
+            "contact": "contact_time",
+            "work": "loading_work",
+            "loss": "net_loss",
+        }
+        units = columns_of(Dot)
+        columns = [
+            Cells("dot", [dot.index + 1 for dot in self.dots]),
+            *(
+                Cells(head, [getattr(dot, name) for dot in self.dots], units[name].unit)
+                for head, name in heads.items()
+            ),
+            Cells("", [_remark(dot) for dot in self.dots], left=True),
+        ]
+        return Summary([Grid(columns, most=MOST_DOTS), "", energies])
+
+    def _energy_facts(self) -> list[FactRow]:
+        """Return where the energy came from and went to, and the residual of the ledger."""
+        energy, rows = self.energy, list[FactRow]()
+        if self.drive.quantity == "voltage":
+            eddies = f" + eddies {quantity(energy.eddy_loss, 'J')}" if energy.eddy_loss else ""
+            spent = (
+                f"{quantity(energy.supply_work, 'J')} = copper {quantity(energy.copper_loss, 'J')}"
+                f" + driver {quantity(energy.driver_loss, 'J')}{eddies}"
+                f" + coil {quantity(energy.coil_work, 'J')}"
+                f" + field {quantity(energy.field, 'J')}"
+            )
+            rows.append(("supply", spent))
+        force = self.drive.quantity == "force"
+        work = (
+            f"drive {quantity(energy.drive_work, 'J')}"
+            if force
+            else f"coil {quantity(energy.coil_work, 'J')}"
+        )
+        damping = "" if self.hammer.damping is None else f" + damping {quantity(energy.damping_loss, 'J')}"
+        balance = (
+            f"{work} = pack {quantity(energy.pack_loss, 'J')}"
+            f" + backstop {quantity(energy.backstop_loss, 'J')}"
+            f"{damping} + armature {quantity(energy.kinetic + energy.stored, 'J')}"
+        )
+        residual = max(energy.residual, energy.electric_residual, key=abs)
+        share = residual / energy.throughput if energy.throughput else 0.0
+        return [*rows, ("energy", balance), ("residual", f"{share:+.1e} of the energy that passed through")]
+
     @property
     def provenance(self) -> dict[str, Any]:
         """Where the motion comes from: fingerprints, versions, tolerance."""
@@ -336,9 +432,40 @@ class Motion(Result, fields=False):
         """Write the output grid as Parquet with provenance; needs the extra `tables`."""
         write_parquet(self.to_pandas(), path)
 
-    def __repr__(self) -> str:
-        struck = sum(dot.struck for dot in self.dots)
-        return (
-            f"<Motion of {self.hammer.name}: {self.start:.6g} s to {self.end:.6g} s, {self.status},"
-            f" {struck} of {len(self.dots)} dots struck>"
-        )
+    def write(self, path: Path) -> None:
+        """Write the motion: by a name in .json `to_json`, else its record as `save` does."""
+        if path.suffix.lower() == ".json":
+            write_file(path, self.to_json())
+        else:
+            self.save(path)
+
+    def to_json(self) -> str:
+        """Return dots, contacts, energies, constants and drive as JSON, SI, names with units."""
+        times, x = self.maxima
+        top = int(x.argmax()) if len(x) else None
+        content = {
+            "status": self.status,
+            "message": self.message,
+            "end_s": self.end,
+            "steps": self.steps,
+            "peak": None if top is None else {"t_s": float(times[top]), "x_m": float(x[top])},
+            "dots": [_named(dot) for dot in self.dots],
+            "contacts": [_named(contact) for contact in self.contacts],
+            "energy": {f"{key}_J": value for key, value in asdict(self.energy).items()},
+            "constants": {
+                key: {"value": constant.si, "unit": constant.si_unit, "status": constant.status}
+                for key, constant in self.hammer.constants.items()
+            },
+            "drive": self.drive.to_toml(),
+            "provenance": self.provenance,
+        }
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def _named(row: Dot | Contact) -> dict[str, Any]:
+    """Return a dot or contact by names such as "flight_time_s"."""
+    units = {name: note.unit for name, note in columns_of(type(row)).items()}
+    return {
+        f"{key}_{units[key].replace('/', '_per_')}" if units[key] else key: value
+        for key, value in asdict(row).items()
+    }

@@ -17,6 +17,12 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.results.provenance import provenance
 from printhammer.results.store import Layout, Variable
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+    styled,
+)
 from printhammer.support.arrays import FloatArray
 from printhammer.sweep.members import Maker
 from printhammer.sweep.outputs import FIRING, TIME, Output
@@ -196,6 +202,48 @@ class Plan(Declared):
             (output, shape, math.prod(shape) * np.dtype(output.dtype).itemsize)
             for output, shape in zip(outputs.arrays, shapes, strict=True)
         ]
+
+    def summary(self) -> Summary:
+        """Return axes, members, blocks and arrays of the sweep."""
+        spec, every = self.spec, self.table()
+        values = [axis.values for axis in spec.axes]
+        axes = [
+            Cells("axis", [axis.key for axis in spec.axes], left=True),
+            Cells("", [str(len(each)) if spec.grid else "drawn" for each in values]),
+            Cells("from", [each.min() for each in values], "", ".6g"),
+            Cells("to", [each.max() for each in values], "", ".6g"),
+            Cells("unit", ["" if axis.note.si == "1" else axis.note.si for axis in spec.axes], left=True),
+        ]
+        outputs, shapes, sizes = zip(*every, strict=True)
+        meanings = [output.meaning + (f" [{output.unit}]" if output.unit else "") for output in outputs]
+        arrays = [
+            Cells("array", [output.name for output in outputs], left=True),
+            Cells("shape", [" × ".join(map(str, shape)) for shape in shapes], left=True),
+            Cells("size", [size_text(size) for size in sizes]),
+            Cells("", meanings, left=True),
+        ]
+        blocks = "1 block" if self.blocks.number == 1 else f"{self.blocks.number} blocks"
+        return Summary(
+            [
+                f"{styled('strong', spec.title or spec.where)}  {spec.base.hammer.name}\n",
+                Grid(axes),
+                "",
+                Grid(arrays),
+                (
+                    f"\n{self.members} members in {blocks} of up to {math.prod(self.blocks.chunks)};"
+                    f" {size_text(sum(sizes))} before compression"
+                ),
+            ]
+        )
+
+
+def size_text(size: float) -> str:
+    """Return a size in bytes, such as "1.2 MB"."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000.0:
+            return f"{size:.3g} {unit}"
+        size /= 1000.0
+    return f"{size:.3g} TB"
 
 
 def identity(spec: Spec) -> dict[str, str]:

@@ -6,8 +6,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from printhammer.cli.verbs.runs.sweep_progress import Telling, duration_text, progress_text, size_text
+from printhammer.cli.verbs.sweep import Telling, duration_text, progress_text
 from printhammer.results.store import open_store
+from printhammer.sweep.plan import size_text
 
 SCRIPTS = Path(sysconfig.get_path("scripts"))
 SPEC = """
@@ -105,9 +106,7 @@ def test_without_a_terminal_there_is_a_line_now_and_then(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     clock = iter(range(0, 100, 4))
-    monkeypatch.setattr(
-        "printhammer.cli.verbs.runs.sweep_progress.time.monotonic", lambda: float(next(clock))
-    )
+    monkeypatch.setattr("printhammer.cli.verbs.sweep.time.monotonic", lambda: float(next(clock)))
     with Telling() as telling:
         for done in range(8):
             telling.tell(done, 0, 8)

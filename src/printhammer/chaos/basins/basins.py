@@ -31,6 +31,13 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Declared, Result, column, coordinate, part
 from printhammer.results.declare import Kind
+from printhammer.results.summary import (
+    FactRow,
+    Facts,
+    Summary,
+    quantity,
+    styled,
+)
 from printhammer.run.problem import check_tolerance
 from printhammer.run.regime import Firing, Regime
 from printhammer.run.start import AT_REST
@@ -137,6 +144,10 @@ _FEWEST: Final = 4
 Range = tuple[float | str, float | str, SupportsIndex]
 
 
+_ROWS: Final = 12
+"""Attractors that a summary lists."""
+
+
 class Basins(Result, rows="v x"):
     """Which initial states lead to which attractor."""
 
@@ -162,6 +173,37 @@ class Basins(Result, rows="v x"):
     def title(self) -> str:
         """One line that says what the basins are."""
         return f"basins of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
+
+    def summary(self, box: int | None = None) -> Summary:
+        """Return the attractors with their shares, the cells that lead to none, and the basin entropy."""
+        rows: list[FactRow] = []
+        for row, (attractor, share, error) in enumerate(zip(self.attractors, *self.shares, strict=True), 1):
+            x, v = attractor.states[0].tolist()
+            first = "" if attractor.period is None else f", first at {quantity(x, 'm')}, {quantity(v, 'm/s')}"
+            name = styled("strong", attractor.name.replace("-", " "))
+            rows.append(
+                (
+                    f"attractor {row}",
+                    f"{name}, {100.0 * share:.2f} ± {100.0 * error:.2f} % of the states{first}",
+                )
+            )
+        if len(rows) > _ROWS:
+            rows[_ROWS:] = [("", f"and {len(rows) - _ROWS} more")]
+        after = f" after {self.firings.max()} firings, more rounds may tell" if self.counts[UNDECIDED] else ""
+        rows += [
+            (name, f"{self.counts[label]} of {self.labels.size} cells{after if label == UNDECIDED else ''}")
+            for label, name in ((UNDECIDED, "undecided"), (FAILED, "ended early"), (NO_STATE, "no state"))
+            if self.counts[label] or label == UNDECIDED
+        ]
+        entropy = self.entropy(box=min(BOX, *self.labels.shape) if box is None else box)
+        boundary = (
+            "no box on a boundary"
+            if math.isnan(entropy.boundary_entropy)
+            else f"{entropy.boundary_entropy:.4f} in the {entropy.boundary_boxes} boxes on a boundary"
+            f"{', more than ln 2: a fractal one' if entropy.fractal else ''}"
+        )
+        boxes = f"{entropy.boxes} boxes of {entropy.box} x {entropy.box} cells"
+        return Summary([Facts([*rows, ("basin entropy", f"{entropy.entropy:.4f} in {boxes}, {boundary}")])])
 
     @property
     def names(self) -> dict[int, str]:

@@ -30,6 +30,13 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, derived, part, provenance, scalar
+from printhammer.results.summary import (
+    FactRow,
+    Facts,
+    Summary,
+    interval,
+    quantity,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.regime import waveform_of
 from printhammer.run.simulate import simulate
@@ -81,6 +88,20 @@ class QuenchMap(Result):
     def title(self) -> str:
         """One line that says what the map is."""
         return f"quench map of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return how many second dots are lost, and how the others differ from the first."""
+        struck, lost = self.struck, int(self.lost.sum())
+        first = f"{quantity(self.single_force, 'N')}, flight time {quantity(self.single_flight_time, 's')}"
+        rows: list[FactRow] = [
+            ("second dots", f"{int(struck.sum())} printed, {lost} of {self.status.size} lost"),
+            ("first alone", first),
+        ]
+        if struck.any() and np.isfinite(self.single_force):
+            ratio = self.force_ratio[struck]
+            rows.append(("force ratio", f"{ratio.min():.3f} to {ratio.max():.3f}"))
+            rows.append(("flies shorter by", interval(self.flight_gain[struck], "s")))
+        return Summary([Facts(rows)])
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ Between two neighbours there may be more than a diagram shows.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Final, Literal
@@ -24,9 +25,15 @@ from printhammer.chaos.strobe.verdict import SIGNIFICANT, is_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.results import Column, Declared, Result, column, coordinate, derived, part, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+)
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
+from printhammer.units import from_si
 
 SERIES: Final = (2, 4, 8)
 """Periods that, one after the other, count as a series of doublings."""
@@ -183,6 +190,71 @@ class Bifurcation(Result, rows="direction column"):
     def title(self) -> str:
         """One line that says what the diagram is."""
         return f"bifurcation diagram of {self.regime.hammer.name} in {self.parameter}"
+
+    def summary(self) -> Summary:
+        """Return the windows of each direction, routes to strange trains, hysteresis, undecided trains."""
+        several = len(self.directions) > 1
+        value, unit = self._value_text()
+        lines = [""]
+        for direction in self.directions:
+            lines += [
+                (f"{direction}: " if several else "") + route.worded(lambda each: f"{value(each)} {unit}")
+                for route in self.routes(direction)
+            ]
+        if several:
+            widths = cells(self.values)
+            share = float(widths[hysteresis(self)].sum() / (widths.sum() or 1.0))
+            lines.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
+        return Summary([*map(self._windows_grid, self.directions), *lines, *self._undecided()])
+
+    def _value_text(self) -> tuple[Callable[[float], str], str]:
+        """Return the formatter of parameter values, with digits that tell neighbours apart, and the unit."""
+        si = self.regime.quantity(self.parameter).si
+        unit = {"s": "ms", "m": "um"}.get(si, si)
+        steps = np.diff(self.values)
+        ratio = float(np.abs(self.values).max() / steps.min()) if steps.size else 1e6
+        digits = 1 + math.ceil(math.log10(max(ratio, 10.0)))
+        return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
+
+    def _windows_grid(self, direction: str) -> Grid:
+        """Return the verdicts of one direction: how many windows, how wide together, the widest one."""
+        windows = sorted(self.windows(direction), key=lambda window: (window.period or 1000, window.verdict))
+        total = sum(window.width for window in windows) or 1.0
+        groups = [
+            list(group) for _verdict, group in itertools.groupby(windows, key=lambda each: each.verdict)
+        ]
+        widest = [max(group, key=lambda window: window.width) for group in groups]
+        shares = [100.0 * sum(window.width for window in group) / total for group in groups]
+        value, unit = self._value_text()
+        columns = [
+            Cells("verdict", [window.verdict.replace("-", " ") for window in widest], left=True),
+            Cells("windows", [len(group) for group in groups]),
+            Cells("share", shares, "%", ".2f"),
+            Cells("widest from", [value(window.low) for window in widest], unit),
+            Cells("to", [value(window.high) for window in widest], unit),
+        ]
+        return Grid(columns, direction, most=12)
+
+    def _undecided(self) -> list[str]:
+        """Return why trains that came to their end are undecided, a sentence for each reason."""
+        undecided = (self.verdicts == "undecided") & (self.status == "ok")
+        known = undecided & np.isfinite(self.exponents)
+        settling = known & (self.exponents < -SIGNIFICANT * self.standard_errors)
+        reasons = (
+            (
+                settling,
+                "neighbouring motions approach each other: they still settle, more firings show the period",
+            ),
+            (known & ~settling, "the exponent lies within three standard errors of zero"),
+            (
+                undecided & ~known,
+                "no exponent was computed: the option exponents does so, except where a touch grazes",
+            ),
+        )
+        count = int(undecided.sum())
+        return [
+            f"{int(some.sum())} of {count} undecided trains: {why}." for some, why in reasons if some.any()
+        ]
 
     @property
     @derived("1", "part of the period between a firing and its point")

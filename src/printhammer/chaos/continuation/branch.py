@@ -21,6 +21,13 @@ from printhammer.errors import InputError
 from printhammer.results import Column, Declared, Result, column, derived, part, scalar
 from printhammer.results.declare import heading
 from printhammer.results.files import plain
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+    multiplier,
+    styled,
+)
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -229,6 +236,25 @@ class Branch(Result):
     def title(self) -> str:
         """One line that says what the branch is."""
         return f"period-{self.firings} orbits of {self.regime.hammer.name} along {self.parameter}"
+
+    def summary(self) -> Summary:
+        """Return where the orbit is stable, and the events of the branch."""
+        stable = [
+            f"   {styled('good', 'stable')} from {low:.9g} to {high:.9g} {self.unit}"
+            for low, high in self.stable_ranges
+        ]
+        columns = [
+            Cells(
+                self.parameter,
+                [event.value for event in self.events],
+                self.unit if self.unit != "1" else "",
+                ".9g",
+            ),
+            Cells("what happens", [event.message for event in self.events], left=True),
+            Cells("multipliers", ["  ".join(map(multiplier, event.multipliers)) for event in self.events]),
+            Cells("", ["" if event.sharp else "between two orbits" for event in self.events], left=True),
+        ]
+        return Summary([*stable, *([Grid(columns)] if self.events else [])])
 
     def __len__(self) -> int:
         return len(self.values)

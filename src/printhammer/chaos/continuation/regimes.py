@@ -27,6 +27,11 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import RATE
 from printhammer.results import Column, Result, part
 from printhammer.results.result import stacked
+from printhammer.results.summary import (
+    Grid,
+    Summary,
+    styled,
+)
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import Progress, mapped
@@ -62,6 +67,15 @@ class Branches(Result):
     def title(self) -> str:
         """One line that says what the branches are."""
         return f"branches of periodic orbits along {self.found[0].parameter if self.found else ''}"
+
+    def summary(self) -> Summary:
+        """Return what branches were found, what happens on them, and why they end."""
+        parts: list[str | Grid] = []
+        for number, branch in enumerate(self, 1):
+            parts.append(f"{styled('strong', number)}  {branch.message}")
+            parts += [*branch.summary(), ""]
+        refused = [f"{styled('poor', 'not followed')} {sentence}" for sentence in self.refused]
+        return Summary([*parts, self.message, *refused])
 
     def __len__(self) -> int:
         return len(self.found)

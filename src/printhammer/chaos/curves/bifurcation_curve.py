@@ -25,6 +25,12 @@ from printhammer.chaos.strobe.train import States, Train, run_trains
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
 from printhammer.results import Column, Reopened, Result, column, derived, part, provenance, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+    multiplier,
+)
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -104,6 +110,19 @@ class BifurcationCurve(Result, rows="point"):
     def title(self) -> str:
         """One line that says what the curve is."""
         return f"{self.kind} of period-{self.firings} orbits of {self.regime.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return what the curve is, and its points of codimension two."""
+        if not self.points:
+            return Summary([self.message])
+        first, second = (unit if unit != "1" else "" for unit in self.units)
+        columns = [
+            Cells(self.names[0], [point.first for point in self.points], first, ".9g"),
+            Cells(self.names[1], [point.second for point in self.points], second, ".9g"),
+            Cells("what happens", [point.message for point in self.points], left=True),
+            Cells("multipliers", ["  ".join(map(multiplier, point.multipliers)) for point in self.points]),
+        ]
+        return Summary([Grid(columns), "", self.message])
 
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")

@@ -30,6 +30,9 @@ from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
+from printhammer.results.summary import (
+    Summary,
+)
 from printhammer.run.regime import Firing, Regime
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress, mapped, thread_count
@@ -66,6 +69,10 @@ class StabilityChart(Result):
     def title(self) -> str:
         """One line that says what the chart is."""
         return f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return what was found, in one line."""
+        return Summary([self.message])
 
     @property
     @derived("", "what was found")

@@ -36,6 +36,11 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, coordinate, part, provenance, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+)
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime, regimes_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
@@ -75,6 +80,34 @@ class LyapunovChart(Result, rows="period"):
     def title(self) -> str:
         """One line that says what the exponents are of."""
         return f"Lyapunov exponents of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return exponents and verdicts, a row for each train, and how often both tests agree."""
+        from printhammer.chaos.exponents.lyapunov import dimension_text, verdict_text
+
+        pairs = list(zip(self.growth, self.zero_one, strict=True))
+        agree = sum(growth == zero_one != "undecided" for growth, zero_one in pairs)
+        undecided = sum("undecided" in pair for pair in pairs)
+        chaotic = sum(pair == ("chaotic", "chaotic") for pair in pairs)
+        tally = (
+            f"{len(pairs)} trains: both tests agree on {agree}, {chaotic} of them chaotic;"
+            f" they differ on {len(pairs) - agree - undecided}; on {undecided} one of them is undecided"
+        )
+        first, second = (
+            [f"{each:+.4g} ± {error:.2g}" for each, error in zip(values, errors, strict=True)]
+            for values, errors in zip(self.exponents.T, self.standard_errors.T, strict=True)
+        )
+        dimensions = zip(self.dimension.tolist(), self.dimension_error.tolist(), strict=True)
+        columns = [
+            Cells("period", 1e3 * self.period, "ms", ".6g"),
+            Cells("exponent 1", first, "1/firing"),
+            Cells("exponent 2", second, "1/firing"),
+            Cells("dimension", [dimension_text(*each) for each in dimensions], left=True),
+            Cells("K", np.round(self.k, 2) + 0.0, "", ".2f"),
+            Cells("0-1 test", [verdict_text(each) for each in self.zero_one], left=True),
+            Cells("verdict", [verdict_text(each) for each in self.verdict], left=True),
+        ]
+        return Summary([Grid(columns, most=40), "", tally])
 
     @property
     def provenance(self) -> dict[str, Any]:

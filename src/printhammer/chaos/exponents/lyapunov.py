@@ -24,6 +24,13 @@ from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, derived, part, scalar
+from printhammer.results.summary import (
+    FactRow,
+    Facts,
+    Summary,
+    judged,
+    styled,
+)
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime
 from printhammer.run.supply import current_of
@@ -49,6 +56,18 @@ _RUNNING: Final = ("count", "exponent")
 _COUNTS: Final = 100
 _CYCLES: Final = 8
 """Number of cycles below which their scatter says nothing."""
+
+
+def dimension_text(value: float, error: float) -> str:
+    """Return a dimension with its standard error; a dash where it is not known."""
+    if math.isnan(value):
+        return "–"
+    return f"{value:.4g} ± {error:.1g}" if error else f"{value:.4g}"
+
+
+def verdict_text(verdict: str) -> str:
+    """Return a verdict as a summary shows it."""
+    return judged(verdict != "undecided", verdict.replace("period-", "period "))
 
 
 class Lyapunov(Result, rows="firing exponent"):
@@ -88,6 +107,31 @@ class Lyapunov(Result, rows="firing exponent"):
     def title(self) -> str:
         """One line that says what the exponents are of."""
         return f"Lyapunov exponents of {self.hammer.name}, fired every {self.period:.9g} s"
+
+    def summary(self) -> Summary:
+        """Return what is known of the train: exponents, dimension, and both tests."""
+        rows: list[FactRow] = [("period", f"{self.period:.9g} s")]
+        for k in (0, 1):
+            each, error, second = (
+                float(values[k]) for values in (self.exponents, self.standard_errors, self.per_second)
+            )
+            rows.append(
+                (f"exponent {k + 1}", f"{each:+.4g} ± {error:.2g} per firing, {second:+.4g} per second")
+            )
+        test = self.zero_one
+        agree = {True: "agree", False: styled("bad", "differ"), None: "do not both decide"}
+        kink = "the motion passes a touch without velocity, where it has no derivative"
+        rows += [
+            ("sum", f"{self.total:+.6g} ± {self.total_error:.2g} per firing"),
+            ("dimension", dimension_text(self.dimension, self.dimension_error)),
+            ("0-1 test", "–" if test is None else f"{verdict_text(test.verdict)}: {test.phrase}"),
+            ("because", (test.reason or None) if test is not None else None),
+            ("verdict", verdict_text(self.verdict.name)),
+            ("because", self.verdict.reason or None),
+            ("both tests", agree[self.agree]),
+            ("remark", None if self.smooth else kink),
+        ]
+        return Summary([Facts(rows)])
 
     @property
     def hammer(self) -> Hammer:

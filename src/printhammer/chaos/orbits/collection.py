@@ -5,17 +5,40 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, orbits_table
 from printhammer.results import Column, Result, part, scalar
 from printhammer.results.result import stacked
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Style,
+    Summary,
+    multiplier,
+    styled,
+)
 from printhammer.run.regime import Regime
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_STYLES: Final[dict[str, Style]] = {
+    "stable": "good",
+    "saddle": "cyan",
+    "unstable": "magenta",
+    "undecided": "poor",
+}
+
+
+def energies_of(regime: Regime) -> list[str]:
+    """Return the names of the energies in a summary: the work of the drive, the losses of the hammer."""
+    work = "drive_work" if regime.fired.quantity == "force" else "coil_work"
+    damping = [] if regime.hammer.damping is None else ["damping_loss"]
+    return [work, "pack_loss", "backstop_loss", *damping]
 
 
 class Orbits(Result):
@@ -38,6 +61,24 @@ class Orbits(Result):
     def title(self) -> str:
         """One line that says what the orbits are."""
         return f"periodic orbits of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
+
+    def summary(self) -> Summary:
+        """Return the orbits, a row each, and how the search ended."""
+        if not self.found:
+            return Summary([self.message])
+        columns = [
+            Cells("firings", [orbit.firings for orbit in self]),
+            Cells("kind", [styled(_STYLES[orbit.kind], orbit.kind) for orbit in self], left=True),
+            Cells("multipliers", ["  ".join(map(multiplier, orbit.multipliers)) for orbit in self]),
+            Cells("backstop\ncontacts", [orbit.backstop_contacts for orbit in self]),
+            Cells("dots", [orbit.printed for orbit in self]),
+            Cells("lost", [orbit.lost for orbit in self]),
+            *(
+                Cells(name.replace("_", " "), [getattr(orbit.energy, name, None) for orbit in self], "J")
+                for name in energies_of(self.regime)
+            ),
+        ]
+        return Summary([Grid(columns), "", self.message])
 
     def __len__(self) -> int:
         return len(self.found)

@@ -30,6 +30,14 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    FactRow,
+    Facts,
+    Summary,
+    interval,
+    repeated,
+    styled,
+)
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime, Window, regimes_of, window_of
@@ -88,6 +96,25 @@ class Strobe(Result):
     def title(self) -> str:
         """One line that says what the points are."""
         return f"strobe points of {self.hammer.name}, every {self.period:.9g} s"
+
+    def summary(self) -> Summary:
+        """Return points and verdict."""
+        known = np.isfinite(self.x)
+        at = f", {self.phase:g} of a period later" if self.phase else ""
+        rows: list[FactRow] = [
+            ("points", f"{int(known.sum())}, at the firings {self.firing[0]} to {self.firing[-1]}{at}"),
+            ("displacement", interval(self.x[known], "m")),
+            ("velocity", interval(self.v[known], "m/s")),
+            ("current", None if self.current is None else interval(self.current[known], "A")),
+        ]
+        if (verdict := self.verdict) is not None:
+            named = styled("poor" if verdict.name == "undecided" else "best", verdict.name.replace("-", " "))
+            rows += [
+                ("verdict", named),
+                ("because", verdict.reason or None),
+                *repeated("evidence", verdict.phrases),
+            ]
+        return Summary([Facts(rows)])
 
     @property
     def ok(self) -> bool:

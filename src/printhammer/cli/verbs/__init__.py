@@ -1,1 +1,1 @@
-"""The verbs, a folder each family."""
+"""The verbs of the command line, one module for each family."""

@@ -30,6 +30,12 @@ from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+    interval,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
@@ -92,6 +98,26 @@ class Feedback(Result, rows=_DOTS):
     def title(self) -> str:
         """What is driven."""
         return f"feedback on {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return the patterns within limits and the deviations of dots, a row for each way to drive."""
+        count = self.passed.shape[1]
+        known = [force[np.isfinite(force)] for force in self.force]
+        late = [times[np.isfinite(times)] for times in self.arrival]
+        off = [
+            f"{100.0 * each.min():+.1f} to {100.0 * each.max():+.1f} %" if each.size else None
+            for each in known
+        ]
+        columns = [
+            Cells("", self.strategies, left=True),
+            Cells("patterns within limits", [f"{int(passed.sum())} of {count}" for passed in self.passed]),
+            Cells("force off", off),
+            Cells("arrival off", [interval(times, "s") for times in late]),
+            self.cells("lost"),
+            self.cells("extra_contacts", "extra"),
+            self.cells("peak_current"),
+        ]
+        return Summary([Grid(columns)])
 
     def entries(self) -> Entries:
         """Return the columns, and what the sensor showed in the run."""

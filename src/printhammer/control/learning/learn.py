@@ -27,6 +27,11 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Judgement, Limits
 from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+)
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import together
 
@@ -91,6 +96,11 @@ def calibrate(
 _DOTS = "stage dot"
 
 
+def _worst(values: FloatArray) -> float:
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if known.size else float("nan")
+
+
 class Learning(Result, rows=_DOTS):
     """A unit that calibrates its table, and what it prints at each stage, first in an open loop."""
 
@@ -122,6 +132,32 @@ class Learning(Result, rows=_DOTS):
     def title(self) -> str:
         """What it is, in a line."""
         return f"{self.hammer.name} learns its table at {self.rate:g} Hz"
+
+    def summary(self) -> Summary:
+        """Return what is printed at each stage, and what is believed of the constants in the end."""
+        stages = [
+            Cells("test dots", self.dots),
+            Cells(
+                "printed with", ["table" if learned else "open loop" for learned in self.learned], left=True
+            ),
+            Cells("within limits", [f"{100.0 * share:.1f} %" for share in self.share]),
+            Cells("worst force", [f"{100.0 * _worst(force):.1f} %" for force in self.force_deviation]),
+            Cells("worst arrival", [_worst(arrival) for arrival in self.arrival_deviation], "s"),
+        ]
+        nominal = np.array([self.hammer.constants[name].si for name in self.constants])
+        off, error = self.believed / nominal - 1.0, self.uncertainty / np.abs(nominal)
+        constants = [
+            Cells("constant", self.constants, left=True),
+            Cells("off by", [f"{100.0 * each:+.2f} %" for each in off]),
+            Cells("known to", [f"{100.0 * each:.2f} %" for each in error]),
+        ]
+        unit = self.table.serial
+        return Summary(
+            [
+                Grid(stages, f"Unit {unit} of {self.hammer.name} at {self.rate:g} Hz"),
+                Grid(constants, f"Constants of unit {unit}, from its readings"),
+            ]
+        )
 
     @property
     def share(self) -> FloatArray:

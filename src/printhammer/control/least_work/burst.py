@@ -37,6 +37,14 @@ from printhammer.results import Declared, Result, Rows, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import frame, plain
 from printhammer.results.provenance import provenance
+from printhammer.results.summary import (
+    Cells,
+    Facts,
+    Grid,
+    Summary,
+    quantity,
+    styled,
+)
 from printhammer.run.contacts import Contact
 from printhammer.run.energy import CoilWork, Ledger, coil_power, stored_energy
 from printhammer.run.ensemble import Ensemble
@@ -88,6 +96,16 @@ class SupplyCheck(Declared):
     )
     spread: FloatArray = part("largest deviation of a touch from its slot, s; NaN where a dot is lost")
     status: TextArray = part("how the runs ended")
+
+    def summary(self, count: int) -> Summary:
+        """Return how a burst of `count` dots fares, a row for each change of the current."""
+        columns = [
+            Cells("current", [f"{100.0 * change:+.1f} %" for change in self.changes]),
+            Cells("adequate dots", [f"{adequate} of {count}" for adequate in self.adequate]),
+            Cells("weakest force", self.weakest, "", ".3f"),
+            Cells("late by", self.spread, "s"),
+        ]
+        return Summary([Grid(columns)])
 
 
 class LeastWork(Result, rows="node"):
@@ -233,6 +251,39 @@ class LeastWork(Result, rows="node"):
     def title(self) -> str:
         """What the burst is of."""
         return f"burst of least work of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return what the burst prints, and what it costs."""
+        work, ledger = self.work, self.ledger
+        weakest = (
+            f", the weakest with {self.forces.min():.4f} of the single pulse's force" if self.contacts else ""
+        )
+        allowed = f"{self.slew:.4g} A/s allowed" if self.shape == "free" else "pulses of the hammer"
+        net, positive = (styled("strong", f"{each:.4f}") for each in (self.net_ratio, self.positive_ratio))
+        rows = [
+            ("dots", f"{self.adequate} of {self.count} adequate at {self.rate:.6g} Hz{weakest}"),
+            ("current", f"at most {quantity(self.drive.peak, 'A')}, {allowed}"),
+            ("at rest", f"after {quantity(self.rest_time, 's')}"),
+            ("absorbed by the pack", quantity(ledger.pack_loss, "J")),
+            ("lost at the backstop", quantity(ledger.backstop_loss, "J")),
+            (
+                "net work W",
+                (
+                    f"{quantity(work.net, 'J')}, {net} of what the pack absorbs;"
+                    f" {self.single_ratio:.2f} with single pulses"
+                ),
+            ),
+            (
+                "positive work W+",
+                (
+                    f"{quantity(work.positive, 'J')}, {positive} of it; no current does with less than"
+                    f" {self.bound_ratio:.4f} for this force"
+                ),
+            ),
+            ("heat of the coil", None if work.heat is None else quantity(work.heat, "J")),
+            ("ledger", f"residual {ledger.residual / ledger.throughput:.1e} of the throughput"),
+        ]
+        return Summary([Facts(rows)])
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -12,6 +12,11 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+)
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 FOUND = "ok"
@@ -37,6 +42,18 @@ class LeastWorkRates(Result):
     def title(self) -> str:
         """What the bursts are of."""
         return f"bursts of least work of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return what a burst costs, a row for each rate."""
+        columns = [
+            self.cells("rates", "rate", ".6g"),
+            Cells("adequate dots", [f"{adequate} of {self.count}" for adequate in self.adequate]),
+            self.cells("net_ratio", "W", ".4f"),
+            self.cells("positive_ratio", "W+", ".4f"),
+            self.cells("bound_ratio", "least W+", ".4f"),
+            Cells("", ["" if status == FOUND else str(status) for status in self.status]),
+        ]
+        return Summary([Grid(columns)])
 
 
 def least_work_rates(

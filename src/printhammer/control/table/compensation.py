@@ -44,6 +44,11 @@ from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.declare import Column
 from printhammer.results.files import csv_text, frame, plain
 from printhammer.results.provenance import versions
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray
 from printhammer.support.files import read_text, write_file
@@ -252,6 +257,26 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     def title(self) -> str:
         """What the table is made for."""
         return f"compensation table for {self.hammer}"
+
+    def summary(self) -> Summary:
+        """Return the entries at the highest rate, a row for each history."""
+        every = histories(self.gaps, self.reach)
+        places = [number_of(history, self.reach) for history in every]
+        advance, width, delay, brake, worst = (
+            getattr(self, name)[-1, places]
+            for name in ("advance", "width", "brake_delay", "brake_width", "deviation")
+        )
+        columns = [
+            Cells("gaps before", [history_text(history) for history in every], left=True),
+            Cells("advance", advance, "s"),
+            Cells("width", width, "s"),
+            Cells("brake after", np.where(brake > 0.0, delay, np.nan), "s"),
+            Cells("brake", np.where(brake > 0.0, brake, np.nan), "s"),
+            Cells("worst,\nof the limits", 100.0 * worst, "%", ".1f"),
+        ]
+        low, high, count = self.rates[0], self.rates[-1], self.rates.size
+        span = f"{low:g} Hz to {high:g} Hz, {count} rates, at " if count > 1 else ""
+        return Summary([Grid(columns, f"Table for {span}{high:g} Hz", most=12)])
 
     @property
     def provenance(self) -> dict[str, Any]:

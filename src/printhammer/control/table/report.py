@@ -18,6 +18,12 @@ from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+    styled,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray
 
@@ -86,6 +92,22 @@ class TableReport(Result, rows=_AXES):
     def title(self) -> str:
         """What is judged."""
         return f"compensation table for {self.hammer.name} beside open loop"
+
+    def summary(self) -> Summary:
+        """Return what the table gains and loses, a row for each hammer."""
+        rates = self.rates
+        span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
+        share, lost = 100.0 * self.good.mean(axis=(2, 3)), self.lost.sum(axis=(2, 3))
+        columns = [
+            Cells("hammer driven", self.hammers, left=True),
+            Cells("open loop:\ngood dots", [f"{each:.2f} %" for each in share[0]]),
+            Cells("lost", lost[0], "", ".0f"),
+            Cells("table:\ngood dots", [styled("strong", f"{each:.2f} %") for each in share[1]]),
+            Cells("lost", lost[1], "", ".0f"),
+            Cells("worst force", [f"{100.0 * each:.1f} %" for each in self.force[1].max(axis=(1, 2))]),
+            Cells("worst arrival", self.arrival[1].max(axis=(1, 2)), "s"),
+        ]
+        return Summary([Grid(columns, f"On patterns it was not tuned on, {span}")])
 
     def notes(self) -> dict[str, Any]:
         """Return the limits."""

@@ -13,6 +13,7 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.results import Declared, column, part
+from printhammer.results.summary import quantity
 from printhammer.run.ensemble import DotTable
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -130,6 +131,14 @@ class Limits(Declared):
         """In words."""
         return (
             f"force within {100.0 * self.force:g} %, arrival within {1e6 * self.arrival:g} us,"
+            f" {self.extra_contacts} extra contacts"
+        )
+
+    @property
+    def said(self) -> str:
+        """In words, as a summary shows them."""
+        return (
+            f"force within {100.0 * self.force:g} %, arrival within {quantity(self.arrival, 's')},"
             f" {self.extra_contacts} extra contacts"
         )
 

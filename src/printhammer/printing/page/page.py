@@ -29,6 +29,12 @@ from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.page.head import Head, head_of
 from printhammer.printing.page.pattern import Pattern
 from printhammer.results import Column, Result, column, derived, part, scalar
+from printhammer.results.summary import (
+    FactRow,
+    Facts,
+    Summary,
+    quantity,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 from printhammer.support.threads import Progress
@@ -88,6 +94,46 @@ class Page(Result, rows="dot"):
     def title(self) -> str:
         """What it is, in a line."""
         return f"page printed by {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return what is on the paper: dots, where they are, how dark they are."""
+        on, count = self.printed, self.line.size
+        dots = f"{count} wanted, {int(on.sum())} printed, {int(self.lost.sum())} lost"
+        if not self.run.all():
+            dots += f", {int((~self.run).sum())} not run"
+        faults = ", ".join(f"{name} {number}" for name, number in self.fault_counts.items() if number)
+        others = f"; the others by first fault: {faults}" if faults else ""
+        rows: list[FactRow] = [
+            ("dots", f"{dots}, {int(self.extra_contacts.sum())} extra contacts"),
+            ("within limits", f"{int(self.good.sum())} of {count} dots{others}"),
+            ("carriage", f"{self.rate:.6g} slots a second, {quantity(self.speed, 'm/s')}"),
+        ]
+        if not on.any():
+            return Summary([Facts(rows)])
+        error, flight, dark = self.placement_error[on], self.flight_time[on], self.darkness[on]
+        worst = int(np.argmax(np.abs(error)))
+        line, wire, slot = (each[on][worst] + 1 for each in (self.line, self.wire, self.slot))
+        rows += [
+            (
+                "placement",
+                (
+                    f"spread {quantity(float(np.std(error)), 'm')}, worst {quantity(error[worst], 'm')}"
+                    f" (line {line}, wire {wire}, slot {slot}, counted from 1)"
+                ),
+            ),
+            (
+                "flight time",
+                (
+                    f"spread {quantity(flight.std(), 's')},"
+                    f" peak to peak {quantity(float(np.ptp(flight)), 's')}"
+                ),
+            ),
+            (
+                "darkness",
+                f"{dark.min():.2f} to {dark.max():.2f}, mean {dark.mean():.2f}, spread {np.std(dark):.3f}",
+            ),
+        ]
+        return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
         """Return pattern, head, single pulse and limits."""

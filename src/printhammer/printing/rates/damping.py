@@ -30,6 +30,12 @@ from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_g
 from printhammer.printing.rates.variability import changed
 from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.results.declare import columns_of
+from printhammer.results.summary import (
+    Cells,
+    Grid,
+    Summary,
+    styled,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray, TextArray
 from printhammer.support.threads import Progress
@@ -181,6 +187,29 @@ class DampingStudy(Result):
     def title(self) -> str:
         """What it is, in a line."""
         return f"damping study of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return the materials, a row each."""
+        rates = [None if math.isnan(rate) else f"{rate:g}" for rate in self.safe_rate.tolist()]
+        if self.best is not None:
+            rates[self.best] = styled("best", rates[self.best])
+        return Summary(
+            [
+                Grid(
+                    [
+                        Cells("", [material.kind for material in self.materials], left=True),
+                        Cells("material", [m.label.replace(" us", " µs") for m in self.materials], left=True),
+                        self.cells("peak_current", "current", ".3f"),
+                        self.cells("settle_out", "settle-out"),
+                        self.cells("rebounds", format=".0f"),
+                        self.cells("restitution", "first\nrestitution", ".2f"),
+                        self.cells("loss", "backstop"),
+                        Cells("safe rate", rates, "Hz"),
+                        Cells("", ["" if s == "ok" else styled("poor", s) for s in self.status], left=True),
+                    ]
+                )
+            ]
+        )
 
     def notes(self) -> dict[str, Any]:
         """Return limits, print force and the grid of rates."""

@@ -29,6 +29,12 @@ from printhammer.printing.dots.strategy import (
     slots_of,
 )
 from printhammer.results import Declared, Result, column, derived, part, scalar
+from printhammer.results.summary import (
+    Facts,
+    Summary,
+    judged,
+    quantity,
+)
 from printhammer.run.contacts import Dot
 from printhammer.run.energy import Ledger, squared_current
 from printhammer.run.ensemble import DotTable
@@ -58,6 +64,14 @@ class Spread(Declared):
     def peak_to_peak(self) -> float:
         """Largest less least."""
         return self.high - self.low
+
+    def said(self, unit: str, single: float | None = None) -> str:
+        """Return the spread in words, of quantities in a unit, beside that of the single pulse."""
+        if not self.count:
+            return "–"
+        mean, most = (quantity(each, unit, bare=True) for each in (self.mean, self.peak_to_peak))
+        alone = "" if single is None else f", single pulse {quantity(single, unit, bare=True)}"
+        return f"{mean} ± {quantity(self.deviation, unit)}, {most} peak to peak{alone}"
 
 
 class Quality(Result):
@@ -104,6 +118,45 @@ class Quality(Result):
     def title(self) -> str:
         """What it is, in a line."""
         return f"quality of {self.hammer.name} at {self.rate:g} Hz"
+
+    def summary(self) -> Summary:
+        """Return the figures of the report: dots within limits, spreads, classes of print, wear and work."""
+        count, good = len(self.slot), int((self.fault < 0).sum())
+        what = "the de Bruijn cycle of order 8" if self.judged_from > 0 else f"{len(self.wanted)} slots"
+        lost, extra = int(self.lost.sum()), int(self.extra_contacts.sum())
+        wear, single, hardest = self.wear, self.nominal, self.wear.largest_force
+        pressed = "" if hardest is None else f", up to {quantity(hardest, 'N')}"
+        heat = "" if self.mean_heat is None else f", {self.mean_heat:.3f} W heat"
+        alone = {"flight_time": single.flight_time, "force": single.force, "indentation": single.indentation}
+        spreads = [
+            (name.replace("_", " "), getattr(self, f"{name}_spread").said(unit, alone.get(name)))
+            for name, unit in _SPREADS.items()
+        ]
+        matrix, engraved = "arrivals within 200 µs of each other", "arrivals within 30 µs of each other"
+        rows = [
+            ("pattern", f"{what}, {count} dots judged, {self.rate:g} Hz, {self.strategy}"),
+            ("limits", self.limits.said),
+            ("paper", None if self.paper is None else self.paper.text),
+            (
+                "dots",
+                (
+                    f"{judged(good == count, f'{good} of {count} within limits')}, {lost} lost"
+                    f" ({100.0 * self.missing:.3g} %), {extra} extra contacts"
+                ),
+            ),
+            *spreads,
+            ("dot matrix", _verdict(self.dot_matrix, matrix)),
+            ("engraved", _verdict(self.engraved, engraved)),
+            (
+                "backstop",
+                (
+                    f"{wear.touches / self.fired:.2f} touches a dot, {1e3 * self.backstop_impulse:.3f} mN·s"
+                    f" and {quantity(self.backstop_loss, 'J')} a dot{pressed}"
+                ),
+            ),
+            ("coil", f"{quantity(self.work, 'J')} a dot, {self.mean_power:.3f} W in the mean{heat}"),
+        ]
+        return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
         """Return the figures of the report, by names that end in their units."""
@@ -331,6 +384,12 @@ def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
     if not wanted.any() or len(wanted) > MOST_SLOTS:
         raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots")
     return wanted
+
+
+def _verdict(good: bool, what: str) -> str:
+    return f"{judged(good, 'yes' if good else 'no')}: " + (
+        f"{what}, none lost" if good else f"not all {what}, or lost"
+    )
 
 
 def spread_of(values: FloatArray) -> Spread:

@@ -35,6 +35,11 @@ from printhammer.printing.dots.strategy import (
 )
 from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.results import Declared, Result, column, coordinate, part, scalar
+from printhammer.results.summary import (
+    Facts,
+    Summary,
+    styled,
+)
 from printhammer.run.problem import TOLERANCE
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import Progress
@@ -130,6 +135,26 @@ class SafeRate(Result):
     def title(self) -> str:
         """What it is, in a line."""
         return f"safe rate of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return the safe rate and what limits it."""
+        none, waveform = math.isnan(self.rate), self.hammer.waveform
+        more = "at least " if self.at_least else ""
+        first, last = float(self.rates[0]), float(self.rates[-1])
+        rows = [
+            ("limits", self.limits.said),
+            ("drive", self.strategy),
+            (
+                "safe rate",
+                f"{styled('bad', 'none')}: not even {first:g} Hz"
+                if none
+                else styled("best", f"{more}{self.rate:g} Hz"),
+            ),
+            ("peak", None if none else f"{self.peak_drive:.3f} {waveform.unit if waveform else ''}"),
+            ("because", "the grid ends" if self.failure is None else self.failure.text),
+            ("grid", f"{first:g} to {last:g} Hz, every {self.step:g} Hz"),
+        ]
+        return Summary([Facts(rows)])
 
     @property
     def at_least(self) -> bool:

@@ -19,6 +19,12 @@ from printhammer.printing.dots.trial import Case
 from printhammer.printing.rates.safe_rate import FIRST, LAST, all_pass, grid_notes, rate_grid, safe_rates
 from printhammer.printing.rates.variability import changed
 from printhammer.results import Result, column, derived, part, scalar
+from printhammer.results.summary import (
+    FactRow,
+    Facts,
+    Summary,
+    styled,
+)
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 from printhammer.support.threads import Progress
@@ -35,6 +41,10 @@ GAP: Final = "pack.front"
 
 FIXED: Final = ("backstop.position", "platen")
 """Constants that have no spread unless it is stated: the origin, and one that enters no force."""
+
+
+_SHARES: Final = (0.95, 0.5)
+"""Shares of the hammers whose largest common rates a summary tells."""
 
 
 class ToleranceYield(Result):
@@ -87,6 +97,37 @@ class ToleranceYield(Result):
     def title(self) -> str:
         """What it is, in a line."""
         return f"tolerance yield of {self.hammer.name}"
+
+    def summary(self) -> Summary:
+        """Return the yield, or how safe rates are spread."""
+        spreads = sorted(set(self.spreads.values()))
+        within = f"{100.0 * spreads[0]:g} %" + (f" to {100.0 * spreads[-1]:g} %" if len(spreads) > 1 else "")
+        odd = self.status[self.status != "ok"]
+        rows: list[FactRow] = [
+            ("limits", f"{self.limits.said}, judged by {self.judged_by} single pulse"),
+            (
+                "draw",
+                (
+                    f"{len(self.status)} hammers, {len(self.spreads)} constants within {within},"
+                    f" seed {self.seed}"
+                ),
+            ),
+            *(
+                ("", styled("poor", f"{int((odd == name).sum())} {name}"))
+                for name in sorted(set(odd.tolist()))
+            ),
+        ]
+        if not math.isnan(self.rate):
+            share = f"{100.0 * self.share:.1f} ± {100.0 * self.share_error:.1f} %"
+            return Summary([Facts([*rows, ("pass", f"{styled('strong', share)} at {self.rate:g} Hz")])])
+        for part_of_all in _SHARES:
+            rates = [rate for rate in self.grid.tolist() if self.share_at(rate) >= part_of_all]
+            reached = f"up to {rates[-1]:g} Hz" if rates else "at no rate tried"
+            rows.append((f"{100.0 * part_of_all:g} % print well", reached))
+        known = self.safe_rates[~np.isnan(self.safe_rates)]
+        if known.size:
+            rows.append(("safe rates", f"{known.min():g} to {known.max():g} Hz"))
+        return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
         """Return limits, spreads and the grid of rates, and the rate where there is one."""

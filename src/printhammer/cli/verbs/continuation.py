@@ -1,23 +1,20 @@
-"""The verb `continue`: a periodic orbit followed through a constant, all regimes in the rate, or a chart."""
+"""The verbs `continue` and `curve`: an orbit followed through a constant, a bifurcation through two."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
-
-from rich.console import RenderableType
-from rich.markup import escape
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, firing_of, verb
-from printhammer.cli.screen import Column, multiplier, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.regimes import Branches
     from printhammer.hammer.hammer import Hammer
 
-_START: Final = "Start (or --regimes)"
+_START: Final = "Start"
 _ALL: Final = "All regimes in the rate"
 _CHART: Final = "Chart of two constants"
 
@@ -32,6 +29,15 @@ def read_state(written: str, name: str) -> tuple[float, float]:
             f"{name} {written!r}: expected displacement and velocity, such as '46.2 um, 12 mm/s'"
         )
     return read_number(parts[0], "m", name), read_number(parts[1], "m/s", name)
+
+
+_FIRINGS: Final = opt.whole("Firings after which the orbit repeats.", panel=_START)
+_STATE: Final = opt.text(
+    "X,V", "State near the orbit, such as '46.2 um, 12 mm/s'.", panel=_START, read=read_state
+)
+_PHASE: Final = opt.number(
+    "Part of the period between firing and section, from 0 to 1.", panel=_START, metavar="P", default=0.0
+)
 
 
 @verb(
@@ -56,13 +62,9 @@ def continue_(
     highest: str | None = opt.HIGHEST,
     period: str | None = opt.PERIOD,
     rate: str | None = opt.RATE,
-    firings: int | None = opt.whole("Firings after which the orbit repeats.", panel=_START),
-    state: tuple[float, float] | None = opt.text(
-        "X,V", "State near the orbit, such as '46.2 um, 12 mm/s'.", panel=_START, read=read_state
-    ),
-    phase: float = opt.number(
-        "Part of the period between firing and section, from 0 to 1.", panel=_START, metavar="P", default=0.0
-    ),
+    firings: int | None = _FIRINGS,
+    state: tuple[float, float] | None = _STATE,
+    phase: float = _PHASE,
     doublings: int = opt.whole("How often period doublings are followed as well.", default=0),
     regimes: bool = opt.switch("Search for orbits and follow all.", panel=_ALL),
     longest: int = opt.whole("Most firings after which a motion repeats.", panel=_ALL, default=3),
@@ -114,14 +116,11 @@ def continue_(
             result = _followed(job, hammer, parameter, bounds, doublings, **firing, **start, **passed)
     except InterruptedBranches as interrupt:
         interrupted, result = True, interrupt.branches
-    job.show(*described(result))
+    job.show(*render(result.summary()))
     if second is not None and ends is not None and not interrupted:
         with job.counting("curves", remaining=False) as tell:
             chart = stability_chart(result[0], second, ends, grid=(grid, grid), progress=tell)
-        return Answer(
-            ["", escape(chart.message)],
-            files={"out": Content.of(chart)},
-        )
+        return Answer(["", *render(chart.summary())], files={"out": Content.of(chart)})
     known = len(result) and second is None
     nothing = "no branch was found; more --seeds or a larger --longest may find one"
     return Answer(
@@ -151,27 +150,85 @@ def _followed(
     return follow_doublings(branch, levels, most=options["most"])
 
 
-def described(result: Branches) -> list[RenderableType]:
-    """Return what branches were found, what happens on them, and why they end."""
-    parts: list[RenderableType] = []
-    for i, branch in enumerate(result):
-        parts.append(f"[bold]{i + 1}[/bold]  {escape(branch.message)}")
-        parts += [
-            f"   [green]stable[/green] from {low:.9g} to {high:.9g} {branch.unit}"
-            for low, high in branch.stable_ranges
-        ]
-        if branch.events:
-            parts.append(table(_columns(branch), branch.events))
-        parts.append("")
-    refused = [f"[yellow]not followed[/yellow] {escape(sentence)}" for sentence in result.refused]
-    return [*parts, escape(result.message), *refused]
+def read_event(written: str, name: str) -> int | str:
+    """Read the number or the kind of an event; InputError where it is neither."""
+    from printhammer.chaos.curves.starts import FIRST, LAST
+    from printhammer.chaos.curves.systems import KINDS
+
+    if written.strip().isdecimal():
+        return int(written)
+    if written not in (*KINDS, FIRST, LAST):
+        raise InputError(f"{name} {written!r}: expected a number, {FIRST}, {LAST}, {' or '.join(KINDS)}")
+    return written
 
 
-def _columns(branch: Branch) -> tuple[Column[Any], ...]:
-    unit = branch.unit if branch.unit != "1" else ""
-    return (
-        Column(branch.parameter, lambda event: event.value, unit=unit, format=".9g"),
-        Column("what happens", lambda event: event.message, left=True),
-        Column("multipliers", lambda event: "  ".join(multiplier(complex(m)) for m in event.multipliers)),
-        Column("", lambda event: "" if event.sharp else "between two orbits", left=True),
-    )
+@verb(
+    "curve",
+    "printhammer curve hendriks-1983 --rate '745 Hz' --from '740 Hz' --to '750 Hz'"
+    " --second backstop.damping --second-from '3.6e10 N*s/m^2.5' --second-to '3.7e10 N*s/m^2.5'"
+    " --out curve.png",
+    {
+        "most": opt.whole("Steps in either direction.", default=200),
+        "overlap": opt.overlapping(),
+        "drive": opt.DRIVE,
+        "tolerance": opt.TOLERANCE,
+    },
+    out=opt.results("BifurcationCurve"),
+)
+def curve(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    parameter: str = opt.text("NAME", "First constant, see 'continue'.", default="rate"),
+    lowest: str | None = opt.LOWEST,
+    highest: str | None = opt.HIGHEST,
+    second: str = opt.text("NAME", "Second constant, such as 'backstop.damping'.", default=...),
+    second_from: str | None = opt.text("VALUE", "Its least value."),
+    second_to: str | None = opt.text("VALUE", "Its largest value."),
+    period: str | None = opt.PERIOD,
+    rate: str | None = opt.RATE,
+    firings: int | None = _FIRINGS,
+    state: tuple[float, float] | None = _STATE,
+    phase: float = _PHASE,
+    event: int | str | None = opt.text(
+        "EVENT",
+        "Number of an event of the branch from 0 on, its kind, or 'first' or 'last' for an end in a grazing.",
+        panel=_START,
+        read=read_event,
+    ),
+    start: Path | None = opt.source(
+        "A file with a branch or a curve instead, saved by 'continue' or 'curve'.", panel=_START
+    ),
+    grid: int = opt.whole("Values of either constant at which trains from rest are judged.", default=0),
+    **passed: Any,
+) -> Answer:
+    """Follow a fold, a period doubling or a grazing of a periodic motion through the plane of two constants.
+
+    Tells where the curve ends, and at which points more happens.
+    """
+    from printhammer.chaos.continuation.continuation import continuation
+    from printhammer.chaos.curves.bifurcation_curve import bifurcation_curve
+    from printhammer.chaos.curves.systems import check_two
+    from printhammer.run.regime import Regime
+
+    bounds = both(second_from, second_to, "--second-from", "--second-to", second)
+    most = passed.pop("most")
+    passed |= {"period": period, "rate": rate}
+    firing = firing_of(job, hammer, passed, "--rate '745 Hz'")
+    chosen: dict[str, Any] = {"event": event, "grid": (grid, grid), "most": most}
+    if start is not None:
+        if (firings, state) != (None, None):
+            raise InputError(f"--start {start}: expected no --firings and no --state beside it")
+        own = (
+            None if lowest is None and highest is None else both(lowest, highest, "--from", "--to", parameter)
+        )
+        result = bifurcation_curve(
+            start, second, bounds, regime=Regime.of(hammer, **firing), first=own, **chosen
+        )
+    else:
+        ends = both(lowest, highest, "--from", "--to", parameter)
+        check_two(parameter, second)
+        orbit: dict[str, Any] = {"firings": firings, "state": state, "phase": phase}
+        with job.counting("orbits", remaining=False) as tell:
+            branch = continuation(hammer, parameter, ends, progress=tell, **firing, **orbit, **passed)
+        result = bifurcation_curve(branch, second, bounds, **chosen)
+    return Answer(render(result.summary()), files={"out": Content.of(result)})

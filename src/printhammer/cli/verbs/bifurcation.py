@@ -1,32 +1,26 @@
-"""The verb `bifurcation`: the states at the firings against a parameter, windows, and the way into chaos."""
+"""The verbs `bifurcation` and `basins`: attractors against a parameter, and the states that lead to them."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
-from rich.table import Table
 
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
-from printhammer.cli.screen import Column, table
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.chaos.bifurcation.diagram import Bifurcation
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
 
 _RANGE: Final = ("0.8 ms", "1.35 ms")
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
-_ROWS: Final = 12
 _JUDGED: Final = 200
 """Firings that are judged, where there are enough."""
-_UNITS: Final = {"s": "ms", "m": "um"}
-"""Units of values of the parameter that are not shown in SI."""
 _of = partial(opt.text, panel=_PARAMETER)
 
 
@@ -89,10 +83,11 @@ def bifurcation(
     except InterruptedDiagram as interrupt:
         interrupted, result = True, interrupt.diagram
     done = int((result.status != "not run").sum())
-    windows = [summary(result, name) for name in result.directions]
+    between = int((result.levels > 0).sum())
+    more = f" and {between} between those that differ" if between else ""
     return Answer(
-        [*windows, *map(escape, sentences(result))] if done else [],
-        note=f"{escape(result.parameter)}: {counted(result)}, {done} trains of"
+        render(result.summary()) if done else [],
+        note=f"{escape(result.parameter)}: {len(result.values) - between} values{more}, {done} trains of"
         f" {int(result.firing[-1])} firings, tolerance {result.tolerance:g}; computed in {job.seconds:.2g} s",
         files={"out": Content.of(result, show=show)} if done else {},
         complaints=[] if interrupted else ended_early(result.status.ravel()),
@@ -101,11 +96,7 @@ def bifurcation(
 
 
 def _axis(
-    hammer: Hammer,
-    parameter: str,
-    ends: tuple[str | None, str | None],
-    count: int,
-    firing: Firing,
+    hammer: Hammer, parameter: str, ends: tuple[str | None, str | None], count: int, firing: Firing
 ) -> dict[str, Any]:
     """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
     import numpy as np
@@ -136,88 +127,79 @@ def _axis(
     return {"parameter": parameter, "values": grid, **firing}
 
 
-def counted(result: Bifurcation) -> str:
-    """Return how many values there are, and how many of them were put between those asked for."""
-    between = int((result.levels > 0).sum())
-    more = f" and {between} between those that differ" if between else ""
-    return f"{len(result.values) - between} values{more}"
+_BASINS: Final = "Basins"
+_QUENCH: Final = "Quench map"
+_count = partial(opt.whole, panel=_BASINS)
 
 
-def shown_with(result: Bifurcation) -> tuple[Callable[[float], str], str]:
-    """Return what writes values of the parameter, with digits that tell neighbours apart, and the unit."""
-    import numpy as np
+@verb(
+    "basins",
+    "printhammer basins hendriks-1983 --period '1.05 ms' --x '30 um, 260 um, 24'"
+    " --v '-1 m/s, 1 m/s, 20' --out basins.png",
+    {
+        **opt.FIRED_TRAIN,
+        "x": opt.span("Displacements, such as '30 um, 260 um, 128' (the strobe window).", panel=_BASINS),
+        "v": opt.span("Velocities, such as '-1 m/s, 1 m/s, 128' (the strobe window).", panel=_BASINS),
+        "firings": _count("Firings of a round (200)."),
+        "rounds": _count("Rounds that a cell gets at most (20)."),
+        "gaps": opt.span("Times between the two firings ('0.5 ms, 0.9 ms, 128').", panel=_QUENCH),
+        "widths": opt.span("Widths of the second pulse (half to 1.5 of the first, 128).", panel=_QUENCH),
+        "tail": opt.text("TIME", "Time within which a second dot is waited for (1 ms).", panel=_QUENCH),
+        "tolerance": opt.TOLERANCE,
+        "threads": opt.THREADS,
+    },
+    out=opt.results("Cells"),
+)
+def basins(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    box: int | None = _count("Cells along the side of a box, for the entropy (4)."),
+    saddles: int | None = _count("Draw the manifolds of saddles of up to so many firings."),
+    quench: bool = opt.switch("Map two pulses from rest instead.", panel=_QUENCH),
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Tell which states lead to which attractor, or with --quench which second pulses lose their dot.
 
-    from printhammer.units import from_si
+    Ends with status 1 where a run stopped before its end.
+    """
+    from printhammer.chaos.basins.basins import NO_STATE_STATUS
+    from printhammer.chaos.basins.basins import basins as computed
+    from printhammer.chaos.basins.quench import quench_map
+    from printhammer.drive.input import read_count
 
-    si = result.regime.quantity(result.parameter).si
-    unit = _UNITS.get(si, si)
-    steps = np.diff(result.values)
-    ratio = float(np.abs(result.values).max() / steps.min()) if steps.size else 1e6
-    digits = 1 + math.ceil(math.log10(max(ratio, 10.0)))
-    return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
+    of_quench = {name: passed.get(name) for name in ("gaps", "widths", "tail")}
+    if quench:
+        of_basins = {name: passed.get(name) for name in ("period", "rate", "overlap", "drive", "x", "v")}
+        more = {name: passed.get(name) for name in ("firings", "rounds")}
+        opt.refuse({**of_basins, **more, "box": box, "saddles": saddles}, "none beside --quench")
+    else:
+        opt.refuse(of_quench, "--quench beside it")
+        firing = firing_of(job, hammer, passed, "--period '1.05 ms', or --quench")
+    if saddles is not None:
+        read_count(saddles, "saddles")
+    with job.counting("cells") as tell:
+        if quench:
+            mapped = quench_map(hammer, progress=tell, **passed)
+            status, content, summary = mapped.status, Content.of(mapped), mapped.summary()
+        else:
+            planes = computed(hammer, progress=tell, **firing, **passed)
+            status, summary = planes.status, planes.summary(box)
+            content = Content.of(planes)
+    shown = render(summary, units)
+    if saddles is not None:
+        from printhammer.chaos.basins.saddles import saddle_manifolds
 
-
-def summary(result: Bifurcation, direction: str) -> Table:
-    """Return the verdicts of one direction: how many windows, how wide together, the widest one."""
-    windows = result.windows(direction)
-    total = sum(window.width for window in windows) or 1.0
-    some = {
-        verdict: [window for window in windows if window.verdict == verdict]
-        for _period, verdict in sorted({(window.period or 1000, window.verdict) for window in windows})
-    }
-    shown, unit = shown_with(result)
-    widest = {verdict: max(same, key=lambda window: window.width) for verdict, same in some.items()}
-    columns: tuple[Column[str], ...] = (
-        Column("verdict", lambda verdict: verdict.replace("-", " "), left=True),
-        Column("windows", lambda verdict: len(some[verdict])),
-        Column(
-            "share", lambda verdict: 100.0 * sum(each.width for each in some[verdict]) / total, "", "%", ".2f"
-        ),
-        Column("widest from", lambda verdict: shown(widest[verdict].low), unit=unit),
-        Column("to", lambda verdict: shown(widest[verdict].high), unit=unit),
+        with job.counting("saddles") as tell:
+            curves, hidden = saddle_manifolds(planes, saddles, progress=tell)
+        shown.append(
+            f"manifolds of {len(curves)} saddles drawn"
+            + ("" if not hidden else f", {hidden} more are in the pack at the firing")
+        )
+        content = Content.of(planes, manifolds=curves)
+    return Answer(
+        shown,
+        note=f"{status.size} cells, computed in {job.seconds:.2g} s",
+        files={"out": content},
+        complaints=ended_early(status[status != NO_STATE_STATUS], status.size),
     )
-    return table(columns, some, title=direction, most=_ROWS)
-
-
-def sentences(result: Bifurcation) -> list[str]:
-    """Return what the diagram tells: routes to strange trains, hysteresis, why trains are undecided."""
-    from printhammer.chaos.bifurcation.diagram import cells, hysteresis
-
-    lines = [""]
-    shown, unit = shown_with(result)
-    several = len(result.directions) > 1
-    for direction in result.directions:
-        lines += [
-            (f"{direction}: " if several else "") + route.worded(lambda value: f"{shown(value)} {unit}")
-            for route in result.routes(direction)
-        ]
-    if several:
-        widths = cells(result.values)
-        share = float(widths[hysteresis(result)].sum() / (widths.sum() or 1.0))
-        lines.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
-    return [*lines, *why_undecided(result)]
-
-
-def why_undecided(result: Bifurcation) -> list[str]:
-    """Return why trains that came to their end are undecided, a sentence for each reason."""
-    import numpy as np
-
-    from printhammer.chaos.strobe.verdict import SIGNIFICANT
-
-    exponents, errors = result.exponents, result.standard_errors
-    undecided = (result.verdicts == "undecided") & (result.status == "ok")
-    known = undecided & np.isfinite(exponents)
-    settling = known & (exponents < -SIGNIFICANT * errors)
-    reasons = (
-        (
-            settling,
-            "neighbouring motions approach each other: they still settle, more --firings show the period",
-        ),
-        (known & ~settling, "the exponent lies within three standard errors of zero"),
-        (
-            undecided & ~known,
-            "no exponent was computed: --exponents does so, except where a touch grazes",
-        ),
-    )
-    every = int(undecided.sum())
-    return [f"{int(some.sum())} of {every} undecided trains: {why}." for some, why in reasons if some.any()]

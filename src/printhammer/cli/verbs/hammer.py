@@ -1,7 +1,10 @@
-"""The verbs `hammer show`, `check`, `schema` and `list`."""
+"""The verbs `hammer show`, `check`, `schema`, `list` and `from-datasheet`."""
 
 from __future__ import annotations
 
+from importlib.resources import files
+from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import typer
@@ -11,14 +14,16 @@ from rich.padding import Padding
 from rich.table import Table
 
 from printhammer.cli import options as opt
-from printhammer.cli.options import Units, with_unit
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.screen import STATUS_STYLES, Column, coloured, facts, honesty, table
+from printhammer.cli.screen import STATUS_STYLES, Column, honesty, render, table
 from printhammer.cli.terminal import warn
+from printhammer.errors import InputError, nearest
 
 if TYPE_CHECKING:
     from printhammer.hammer.equilibrium import EquilibriumPicture
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results import Summary
     from printhammer.support.constants import Constant
 
 GROUP: Final = "Show and check hammer files."
@@ -56,7 +61,7 @@ def show(
             constants_table(loaded, sources),
             *numbered(sources),
             "",
-            statics(loaded, picture, units),
+            *render(statics(loaded, picture), units),
         ]
     )
 
@@ -71,7 +76,7 @@ def check(hammer: str = opt.NAMED) -> Answer:
     for warning in warnings:
         warn(f"{loaded.path}: {warning}")
     count = f"{len(warnings)} warning{'s' if len(warnings) > 1 else ''}"
-    return Answer([f"{escape(hammer)}: {count if warnings else coloured(True, 'ok')}; {honesty(loaded)}"])
+    return Answer([f"{escape(hammer)}: {count if warnings else '[green]ok[/green]'}; {honesty(loaded)}"])
 
 
 @verb(
@@ -99,7 +104,7 @@ def list_shipped() -> Answer:
 
     columns: tuple[Column[str], ...] = (
         Column("name", str, left=True),
-        Column("title", lambda name: escape(load(name).title), left=True),
+        Column("title", lambda name: load(name).title, left=True),
     )
     return Answer([table(columns, shipped())])
 
@@ -116,56 +121,53 @@ def constants_table(hammer: Hammer, sources: list[str]) -> Table:
     if hammer.waveform is not None:
         laws["waveform"] = f"shape {hammer.waveform.shape}"
 
-    def own(constant: Constant) -> bool:
-        return constant.unit == constant.si_unit
+    def cells(constant: Constant) -> tuple[str, ...]:
+        own, style = constant.unit == constant.si_unit, STATUS_STYLES[constant.status]
+        return (
+            constant.key.rpartition(".")[2],
+            format(constant.value, ".9g"),
+            escape(constant.unit),
+            "" if own else f"{constant.si:.6g}",
+            "" if own else escape(constant.si_unit),
+            f"[{style}]{constant.status}[/{style}]",
+            f"[dim]{sources.index(constant.source) + 1}[/dim]",
+            f"[dim]{escape(constant.meaning)}[/dim]",
+        )
 
-    def status(constant: Constant) -> str:
-        style = STATUS_STYLES[constant.status]
-        return f"[{style}]{constant.status}[/{style}]"
-
-    columns: tuple[Column[Constant], ...] = (
-        Column("constant", lambda constant: constant.key.rpartition(".")[2], left=True),
-        Column("value", lambda constant: constant.value, format=".9g"),
-        Column("unit", lambda constant: escape(constant.unit), left=True),
-        Column("SI", lambda constant: "" if own(constant) else f"{constant.si:.6g}"),
-        Column("", lambda constant: "" if own(constant) else escape(constant.si_unit), left=True),
-        Column("status", status, left=True),
-        Column("source", lambda constant: f"[dim]{sources.index(constant.source) + 1}[/dim]"),
-        Column("meaning", lambda constant: f"[dim]{escape(constant.meaning)}[/dim]", left=True),
-    )
-    made = table(columns, ())
-    current = ""
-    for key, constant in hammer.constants.items():
-        section = key.rpartition(".")[0]
-        if section != current:
+    numbers = "value", "SI", "source"
+    heads = ("constant", "value", "unit", "SI", "", "status", "source", "meaning")
+    made = table([Column(head, str, left=head not in numbers) for head in heads], ())
+    for section, group in groupby(hammer.constants.items(), lambda entry: entry[0].rpartition(".")[0]):
+        if section:
             made.add_row("")
             made.add_row(f"[bold]\\[{section}][/bold]", f"[dim]{laws.get(section, '')}[/dim]")
-            current = section
-        made.add_row(*(column.cell(constant, Units.SI) for column in columns))
+        for _key, constant in group:
+            made.add_row(*cells(constant))
     return made
 
 
-def statics(hammer: Hammer, picture: EquilibriumPicture, units: Units) -> Table:
+def statics(hammer: Hammer, picture: EquilibriumPicture) -> Summary:
     """Return rest state, equilibria, release current and holding margin."""
     from printhammer.hammer.equilibrium import holding_margin
+    from printhammer.results.summary import FactRow, Facts, Summary, judged, quantity, styled
 
     def force(margin: float) -> str:
-        text = with_unit(margin, "force", units)
-        return text if margin > 0.0 else f"[yellow]{text}[/yellow]"
+        text = quantity(margin, "N")
+        return text if margin > 0.0 else styled("poor", text)
 
-    rest = "[red]none[/red]"
+    rest = styled("bad", "none")
     if picture.rest is not None:
         depth = None if hammer.position is None else hammer.position - picture.rest
-        deep = f", {with_unit(depth, 'length', units)} deep in the backstop" if depth else ""
-        rest = with_unit(picture.rest, "length", units) + deep
-    rows: list[tuple[str, str | None]] = [("rest state", rest)]
+        deep = f", {quantity(depth, 'm')} deep in the backstop" if depth else ""
+        rest = quantity(picture.rest, "m") + deep
+    rows: list[FactRow] = [("rest state", rest)]
     for point in picture.equilibria:
-        kind = coloured(point.stable, "stable" if point.stable else "unstable")
+        kind = judged(point.stable, "stable" if point.stable else "unstable")
         rate = f", {point.frequency / 1e3:.3f} kHz" if point.frequency is not None else ""
         where = f", in the {point.surface}" if point.surface else ""
-        rows.append(("equilibrium", f"{with_unit(point.x, 'length', units)}  {kind}{rate}{where}"))
+        rows.append(("equilibrium", f"{quantity(point.x, 'm')}  {kind}{rate}{where}"))
     if hammer.magnet is not None and hammer.backstop is not None:
-        rows.append(("release current", with_unit(picture.release_current, "current", units)))
+        rows.append(("release current", quantity(picture.release_current, "A")))
     if hammer.magnet is not None or hammer.spring is not None:
         places = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
         rows += [
@@ -174,5 +176,63 @@ def statics(hammer: Hammer, picture: EquilibriumPicture, units: Units) -> Table:
             if x is not None
         ]
         x, margin = picture.weakest
-        rows.append(("held least", f"{force(margin)} at {with_unit(x, 'length', units)}"))
-    return facts(rows, "statics, no current")
+        rows.append(("held least", f"{force(margin)} at {quantity(x, 'm')}"))
+    return Summary([Facts(rows, "statics, no current")])
+
+
+POOR = 0.15
+"""Relative misfit of a force above which a fit is called poor."""
+
+
+@verb(
+    "hammer from-datasheet",
+    "printhammer hammer from-datasheet --example impact-wire > sheet.toml"
+    " && printhammer hammer from-datasheet sheet.toml --out wire.toml",
+    out=opt.file("Write the hammer file here.", ".toml"),
+)
+def from_datasheet(
+    sheet: Path | None = opt.argument("SHEET", "A data sheet, TOML.", type=Path, is_input=True),
+    example: str | None = opt.text("NAME", "Print the data sheet of a shipped hammer, to begin with."),
+) -> Answer:
+    """Make a hammer of what a maker prints; every constant says whether it is printed, derived or assumed."""
+    if example is not None:
+        typer.echo(_example(example), nl=False)
+        return Answer()
+    if sheet is None:
+        raise InputError("SHEET is missing, expected a data sheet; --example NAME prints one")
+    from printhammer.identify.datasheet.build import hammer_of
+    from printhammer.identify.datasheet.sheet import read_sheet
+    from printhammer.results import Cells, Grid, Summary
+
+    read = read_sheet(sheet)
+    made, magnet = hammer_of(read)
+    if magnet.misfit > POOR:
+        warn(
+            f"{sheet}: a force is met to {100.0 * magnet.misfit:.2g} % only: poles that are not flat, or a"
+            " typing error"
+        )
+    gaps, printed = zip(*read.force, strict=True)
+    forces = [
+        Cells("gap", [f"{gap.value:g} {gap.unit}" for gap in gaps]),
+        Cells("printed", [f"{force.value:g} {force.unit}" for force in printed]),
+        Cells("of the law", magnet.forces, "N", ".4g"),
+    ]
+    sources = list(dict.fromkeys(constant.source for constant in made.constants.values()))
+    return Answer(
+        [
+            f"[bold]{made.name}[/bold]  {honesty(made)}\n",
+            constants_table(made, sources),
+            *numbered(sources),
+            "",
+            *render(Summary([Grid(forces, "Forces")])),
+        ],
+        files={"out": Content.text(made.to_toml)},
+    )
+
+
+def _example(name: str) -> str:
+    folder = files("printhammer").joinpath("hammers", "sheets")
+    known = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir())
+    if name not in known:
+        raise InputError(f"--example = {name!r}, expected {nearest(name, known)}")
+    return folder.joinpath(f"{name}.toml").read_text(encoding="utf-8")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Content, Job, announce_compiling, verb
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -303,7 +304,6 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
 
 def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit]) -> Answer:
     """Fit, and return what is shown and written."""
-    from printhammer.cli.verbs.laboratory.fit_report import described
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file
 
@@ -319,7 +319,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     }
     if job.wanted["into"] and known is not None:
         files["into"] = Content(fit.into(known).save)
-    return Answer(described(fit), files=files, failed=strict and bool(fit.rejected))
+    return Answer(render(fit.summary()), files=files, failed=strict and bool(fit.rejected))
 
 
 def _with_error(text: str, flag: str, si: str) -> tuple[float, float]:

@@ -1,25 +1,89 @@
-"""The verb `lyapunov`: how fast neighbouring motions part, and the 0-1 test as a second opinion."""
+"""The verbs `strobe`, `orbits` and `lyapunov`: states at the firings, periodic orbits, exponents."""
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from rich.table import Table
-
 from printhammer.cli import options as opt
+from printhammer.cli.options import Units
 from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
-from printhammer.cli.screen import Column, coloured, facts, table, train_line
+from printhammer.cli.screen import render, train_line
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
-    from printhammer.chaos import Lyapunov, LyapunovChart
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
+
+@verb(
+    "strobe",
+    "printhammer strobe hendriks-1983 --period '1.10 ms' --points 200 --out points.csv",
+    {
+        **opt.FIRED_TRAIN,
+        "points": opt.whole("Number of points.", default=200),
+        "transient": opt.whole("Firings left out before the first.", default=0),
+        "phase": opt.number("Part of the period between a firing and its point, from 0 to 1.", metavar="P"),
+        "tolerance": opt.TOLERANCE,
+        "verdict": opt.switch("Judge firings 1001 to 2000.", default=True),
+    },
+    out=opt.results("Points"),
+)
+def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
+    """Fire a hammer without end and tell what its state is at each firing: periodic, or strange.
+
+    Ends with status 1 where the run stopped before its end.
+    """
+    from printhammer.chaos import strobe as points_of
+
+    firing = firing_of(job, hammer, passed, "--period '1.10 ms'")
+    result = points_of(hammer, **firing, **passed)
+    drive = result.drive
+    return Answer(
+        render(result.summary(), units),
+        note=train_line(drive.waveform.shape, drive.quantity, drive.overlap, result.period),
+        files={"out": Content.of(result)},
+        complaints=[] if result.ok else [f"the run ended early: {result.status}"],
+    )
+
+
+_search = partial(opt.whole, panel="Search")
+
+
+@verb(
+    "orbits",
+    "printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv",
+    {
+        **opt.FIRED_TRAIN,
+        "longest": _search("Most firings after which a motion repeats.", default=8),
+        "starts": _search("States from which motions are followed.", default=1024),
+        "guesses": _search("Guesses that are tried for each number of firings.", default=48),
+        "follow": _search("Most firings of orbits through which branches are followed.", default=2),
+        "tolerance": opt.TOLERANCE,
+    },
+    out=opt.results("Orbits"),
+)
+def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
+    """Search for the motions that repeat after some firings, stable or not, and tell what they do.
+
+    Ends with status 1 where none was found.
+    """
+    from printhammer.chaos.orbits.search import orbits as search
+
+    firing = firing_of(job, hammer, passed, "--period '1.05 ms'")
+    with job.counting("orbits", remaining=False) as tell:
+        result = search(hammer, progress=tell, **firing, **passed)
+    regime = result.regime
+    missing = "no periodic orbit was found; more --starts or --guesses may find one"
+    return Answer(
+        render(result.summary(), units),
+        note=train_line(regime.fired.shape, regime.fired.quantity, regime.overlap, regime.period),
+        files={"out": Content.of(result)},
+        complaints=[] if len(result) else [missing],
+    )
+
+
 _STEPS: Final = 100
-_MOST_ROWS: Final = 40
 _TRAINS: Final = "Trains (--period, --rate, or --from and --to)"
 _trains = partial(opt.text, panel=_TRAINS)
 
@@ -68,15 +132,14 @@ def lyapunov(
             firing["period"] = float(periods[0])
         single = exponents_of(hammer, **firing, **passed)
         chart, plot = LyapunovChart.of([single]), single.plot
-        shown: list[Table | str] = [facts(summary(single))]
+        shown = render(single.summary())
     else:
         with job.counting("trains") as tell:
             chart = lyapunovs(
                 hammer, periods, overlap=firing.get("overlap"), threads=threads, progress=tell, **passed
             )
         plot = chart.plot
-        shown = [table(_columns(chart), range(len(chart.period)), most=_MOST_ROWS)]
-        shown += ["", tally(chart)]
+        shown = render(chart.summary())
     drive = chart.drive
     train = train_line(drive.waveform.shape, drive.quantity, drive.overlap)
     return Answer(
@@ -118,67 +181,3 @@ def _periods(
     if count < 2:
         raise InputError(f"--steps {steps}: expected at least 2")
     return np.linspace(low, high, count)
-
-
-def summary(result: Lyapunov) -> list[tuple[str, str | None]]:
-    """Return what is known of one train."""
-    rows: list[tuple[str, str | None]] = [("period", f"{result.period:.9g} s")]
-    for k in (0, 1):
-        each, second = float(result.exponents[k]), float(result.per_second[k])
-        error = float(result.standard_errors[k])
-        rows.append((f"exponent {k + 1}", f"{each:+.4g} ± {error:.2g} per firing, {second:+.4g} per second"))
-    test = result.zero_one
-    agree = {True: "agree", False: "[bold red]differ[/bold red]", None: "do not both decide"}
-    kink = "the motion passes a touch without velocity, where it has no derivative"
-    return [
-        *rows,
-        ("sum", f"{result.total:+.6g} ± {result.total_error:.2g} per firing"),
-        ("dimension", _dimension(result.dimension, result.dimension_error)),
-        ("0-1 test", "–" if test is None else f"{_named(test.verdict)}: {test.phrase}"),
-        ("because", (test.reason or None) if test is not None else None),
-        ("verdict", _named(result.verdict.name)),
-        ("because", result.verdict.reason or None),
-        ("both tests", agree[result.agree]),
-        ("remark", None if result.smooth else kink),
-    ]
-
-
-def tally(chart: LyapunovChart) -> str:
-    """Count in one line how often both tests agree."""
-    pairs = list(zip(chart.growth, chart.zero_one, strict=True))
-    agree = sum(growth == zero_one != "undecided" for growth, zero_one in pairs)
-    open_cases = sum("undecided" in pair for pair in pairs)
-    chaotic = sum(pair == ("chaotic", "chaotic") for pair in pairs)
-    return (
-        f"{len(pairs)} trains: both tests agree on {agree}, {chaotic} of them chaotic;"
-        f" they differ on {len(pairs) - agree - open_cases}; on {open_cases} one of them is undecided"
-    )
-
-
-def _dimension(value: float, error: float) -> str:
-    if math.isnan(value):
-        return "–"
-    return f"{value:.4g} ± {error:.1g}" if error else f"{value:.4g}"
-
-
-def _named(verdict: str) -> str:
-    return coloured(verdict != "undecided", verdict.replace("period-", "period "))
-
-
-def _columns(chart: LyapunovChart) -> tuple[Column[int], ...]:
-    def exponent(k: int, row: int) -> str:
-        return f"{chart.exponents[row][k]:+.4g} ± {chart.standard_errors[row][k]:.2g}"
-
-    return (
-        Column("period", lambda row: 1e3 * chart.period[row], unit="ms", format=".6g"),
-        Column("exponent 1", partial(exponent, 0), unit="1/firing"),
-        Column("exponent 2", partial(exponent, 1), unit="1/firing"),
-        Column(
-            "dimension",
-            lambda row: _dimension(float(chart.dimension[row]), float(chart.dimension_error[row])),
-            left=True,
-        ),
-        Column("K", lambda row: round(float(chart.k[row]), 2) + 0.0, format=".2f"),
-        Column("0-1 test", lambda row: _named(chart.zero_one[row]), left=True),
-        Column("verdict", lambda row: _named(chart.verdict[row]), left=True),
-    )

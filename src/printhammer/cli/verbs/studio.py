@@ -1,4 +1,4 @@
-"""The verb `warm`: machine code for a hammer, made before it is needed."""
+"""The verbs `studio` and `warm`: the laboratory in a browser, and machine code compiled beforehand."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.queues import SimpleQueue
+from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Final
 
@@ -16,6 +17,32 @@ from printhammer.cli.terminal import say
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
+
+
+@verb("studio", "printhammer studio hendriks-1983 --port 8080")
+def studio(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    port: int | None = opt.whole(
+        "Port on 127.0.0.1 (19830, or a free one where that is taken; 0: a free one)."
+    ),
+    state: Path | None = opt.source("State to open with, as the studio's export saves it."),
+    browser: bool = opt.switch(
+        "Open the page in the browser of the desktop.", flag="--open/--no-open", default=True
+    ),
+) -> Answer:
+    """Open the studio: a page on this machine, for its user alone; Ctrl-C ends it."""
+    from printhammer.studio import serve
+
+    def ready(address: str) -> None:
+        job.screen.print(f"The studio is at {address}", soft_wrap=True)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    serve(hammer, port=port, state=state, ready=ready)
+    return Answer()
 
 
 def _runs(hammer: Hammer) -> None:

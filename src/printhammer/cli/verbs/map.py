@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import PICTURES, Answer, Content, Job, verb
-from printhammer.cli.screen import facts
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def map_(
 
     Ends with status 1 where a run stopped before its end; its rate is named.
     """
-    from printhammer.maps.frequency import frequency_map
+    from printhammer.maps.frequency import frequency_map, summary_of
     from printhammer.maps.measured import load_measured_map
     from printhammer.results.files import save_dataset
 
@@ -65,7 +65,8 @@ def map_(
     with job.counting("rates") as tell:
         chart = frequency_map(hammer, grid, times=moments, progress=tell, **passed)
     return Answer(
-        [facts(summary(chart, beside, job.seconds))],
+        render(summary_of(chart, beside)),
+        note=f"computed in {job.seconds:.2g} s",
         files={"out": Content(partial(save_dataset, chart), partial(_drawn, hammer, chart, beside, drawn))},
         complaints=_complaints(chart),
     )
@@ -112,48 +113,6 @@ def _axes(
             f"--from {low:.9g} Hz and --to {high:.9g} Hz: expected the second to be the higher one"
         )
     return np.linspace(low, high, count), moments
-
-
-def summary(chart: xr.Dataset, beside: xr.Dataset | None, seconds: float) -> list[tuple[str, str | None]]:
-    """Return what was computed: size, dots, the first lost one, the difference from a measured map."""
-    import numpy as np
-
-    rates, time = chart["rate"].values, chart["time"].values
-    fired = np.isfinite(chart["fired_at"].values)
-    lost = fired & ~chart["struck"].values
-    dots = f"{int(fired.sum())} fired, {int((fired & ~lost).sum())} struck, {int(lost.sum())} lost"
-    if lost.any():
-        row = int(np.argmax(lost.any(axis=1)))
-        dots += f"; the first at {rates[row]:.6g} Hz, firing {int(np.argmax(lost[row])) + 1}"
-    failed = int((chart["status"].values != 0).sum())
-    return [
-        (
-            "map",
-            (
-                f"{rates.size} rates from {rates[0]:g} to {rates[-1]:g} Hz, {chart.attrs['pulses']} pulses,"
-                f" {time.size} times up to {1e3 * float(time[-1]):.4g} ms; computed in {seconds:.2g} s"
-            ),
-        ),
-        ("dots", dots),
-        ("status", f"{failed} of {rates.size} runs did not reach their end" if failed else "ok"),
-        ("measured", None if beside is None else _difference(chart, beside)),
-    ]
-
-
-def _difference(chart: xr.Dataset, beside: xr.Dataset) -> str:
-    import numpy as np
-
-    from printhammer.maps.frequency import rms_difference
-
-    both, difference = rms_difference(chart, beside)
-    known = difference[np.isfinite(difference)]
-    said = "not known, no rate is in both maps"
-    if known.size:
-        said = (
-            f"RMS {1e6 * float(np.median(known)):.3g} µm (median of {known.size} rates),"
-            f" {1e6 * float(known.max()):.3g} µm at {both[np.nanargmax(difference)]:.6g} Hz"
-        )
-    return f"{beside['rate'].size} rates; difference {said}"
 
 
 def _complaints(chart: xr.Dataset) -> list[str]:

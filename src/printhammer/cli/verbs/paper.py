@@ -1,4 +1,4 @@
-"""The verb `figure`: one figure of the paper, for any hammer."""
+"""The verbs `figure` and `paper`: one figure of the paper for any hammer, or all figures and claims."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.runner import Answer, Job, verb
+from printhammer.cli.screen import Column, marked, table
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
+    from printhammer.results.summary import Style
 
 _POINCARE: Final = 11
 
@@ -61,3 +63,47 @@ def figure(
     for path in save(entry.draw(hammer, **options), out, name):
         job.wrote(path)
     return Answer()
+
+
+_STYLES: Final[dict[str, Style]] = {"holds": "good", "fails": "bad", "not yet": "poor"}
+
+
+def _verdict(verdict: str, said: object) -> str:
+    from printhammer.results.summary import styled
+
+    return styled(_STYLES[verdict], said)
+
+
+_COLUMNS: Final[tuple[Column[Any], ...]] = (
+    Column("claim", lambda result: result.claim.name, left=True),
+    Column("kind", lambda result: result.claim.kind, left=True),
+    Column("verdict", lambda result: _verdict(result.verdict, result.verdict), left=True),
+    Column("measured", lambda result: result.detail, left=True),
+)
+
+
+@verb("paper", "printhammer paper hendriks-1983 --out build/paper")
+def paper(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    out: Path = opt.folder(
+        "Where to write the report, in place of an earlier one.", default=Path("build/paper")
+    ),
+    pdf: bool = opt.switch("Write the report as report.pdf too."),
+    strict: bool = opt.switch("End with status 1 if a claim fails."),
+) -> Answer:
+    """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
+    from printhammer.report import write_report
+    from printhammer.report.build import check_place
+
+    if not job.force:
+        check_place(out)
+    with job.counting("paper,") as count:
+        report = write_report(hammer, out, progress=count, pdf=pdf)
+    counts = ", ".join(_verdict(verdict, f"{report.count(verdict)} {verdict}") for verdict in _STYLES)
+    job.show(table(_COLUMNS, report.results), "", marked(f"{len(report.results)} claims: {counts}"))
+    reports = [path for path in report.files if path.parent == out]
+    for path in reports:
+        job.wrote(path)
+    job.wrote(f"{out / 'figures'}, {len(report.files) - len(reports)} files")
+    return Answer(failed=strict and report.count("fails") > 0)

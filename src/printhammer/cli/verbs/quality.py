@@ -1,4 +1,4 @@
-"""The verb `quality`: what a hammer prints at a rate, how fast it may go, and what materials would buy."""
+"""The verbs `quality` and `print`: what a hammer prints at a rate, by its figures and on paper."""
 
 from __future__ import annotations
 
@@ -9,12 +9,52 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
-from printhammer.cli.runner import Answer, Content, Job, verb
-from printhammer.cli.verbs.printing.strategy import FEEDBACK, SERIAL, TABLE, chosen_strategy
+from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
+from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
 if TYPE_CHECKING:
+    from printhammer.cli.runner import Job
+    from printhammer.control.table.compensation import CompensationTable
     from printhammer.hammer.hammer import Hammer
+    from printhammer.printing.page.pattern import Pattern
+
+TABLE: Final = opt.source("Compensation table to drive by (.csv, .json), from `printhammer tune`.")
+SERIAL: Final = opt.text(
+    "TEXT", "Serial number of the unit, for a table that was learned on one; 'any' to drive another."
+)
+FEEDBACK: Final = opt.switch("Drive with feedback, see `printhammer feedback`; takes a while.")
+
+
+def chosen_strategy(
+    job: Job, hammer: Hammer, table: Path | None, feedback: bool, serial: str | None = None
+) -> tuple[dict[str, Any], CompensationTable | None]:
+    """Return the argument `strategy` of what prints, empty for an open loop, and the table if there is one.
+
+    Raises
+    ------
+    InputError
+        Table and feedback are asked for at once, a serial without a table, or the table cannot be used for
+        this hammer.
+    """
+    if serial is not None and table is None:
+        raise InputError(f"--serial {serial}: expected a table that was learned, --table, beside it")
+    if feedback and table is not None:
+        raise InputError(f"--table {table} and --feedback: expected one of them")
+    if table is not None:
+        from printhammer.control.table.compensation import load_table
+
+        loaded = load_table(table)
+        return {"strategy": loaded.strategy(hammer, serial)}, loaded
+    if not feedback:
+        return {}, None
+    from printhammer.control.feedback.closed_loop import FeedbackStrategy
+    from printhammer.control.feedback.controller import Controller
+    from printhammer.control.feedback.plant import driver_of
+
+    with job.counting("tables of the controller") as tell:
+        return {"strategy": FeedbackStrategy(Controller(hammer, driver_of(hammer), progress=tell))}, None
+
 
 _MORE: Final = "Instead of the report"
 _GRID: Final = "Limits and grid of rates"
@@ -25,9 +65,7 @@ _instead = partial(opt.switch, panel=_MORE)
 
 
 @verb(
-    "quality",
-    "printhammer quality hendriks-1983 --rate 900Hz --out quality.png",
-    out=opt.results("Numbers"),
+    "quality", "printhammer quality hendriks-1983 --rate 900Hz --out quality.png", out=opt.results("Numbers")
 )
 def quality(
     job: Job,
@@ -69,7 +107,6 @@ def quality(
 
     Ends with status 1 where a run stopped before its end.
     """
-    from printhammer.cli.verbs.printing import quality_report
     from printhammer.printing.dots.judging import limits_named
 
     instead = {"safe-rate": safe_rate, "yield": yield_ is not None, "damping": damping}
@@ -95,6 +132,7 @@ def quality(
         # It says nothing of other rates.
         many = {"first": float(loaded_table.rates[0]), "last": float(loaded_table.rates[-1]), **many}
     result: Any
+    bad: list[str] = []
     if task == "report":
         from printhammer.printing.dots.paper import Paper
         from printhammer.printing.rates.quality import quality as report
@@ -104,13 +142,11 @@ def quality(
             varied = None if paper is None else Paper.load(paper)
             result = report(hammer, rate or 0.0, slots, **common, **opt.given(pitch=pitch, paper=varied))
         bad = [] if result.ok else [f"the run ended early: {result.status}"]
-        lines = quality_report.report(result, units)
     elif task == "safe-rate":
         from printhammer.printing.rates.safe_rate import safe_rate as safe
 
         with job.telling("patterns") as say:
             result = safe(hammer, progress=lambda at: say(f"patterns up to {at:g} Hz"), **many)
-        lines, bad = quality_report.safe_rate(result, units), []
     elif task == "yield":
         from printhammer.printing.rates.tolerance import tolerance_yield
 
@@ -120,15 +156,13 @@ def quality(
         drawn = opt.given(seed=seed, judged_by=judged_by)
         with job.counting("hammers") as tell:
             result = tolerance_yield(hammer, rate, number=yield_, progress=tell, **spreads, **drawn, **many)
-        lines, bad = quality_report.tolerance_yield(result, units), []
     else:
         from printhammer.printing.rates.damping import damping_study
 
         with job.counting("materials") as tell:
             result = damping_study(hammer, progress=tell, **opt.given(current=current), **many)
-        lines, bad = quality_report.damping(result, units), []
     return Answer(
-        [lines],
+        render(result.summary(), units),
         note=f"computed in {job.seconds:.2g} s",
         files={"out": Content.of(result)},
         complaints=bad,
@@ -171,3 +205,115 @@ def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
         if sign:
             spreads[key.strip()] = opt.read_share(value, f"--spread {key.strip()}")
     return {"spreads": spreads}
+
+
+_USUAL: Final = ("printed.png", "printed.pdf", "printed-zoom.png")
+_PATTERN: Final = "What to print (a text, or --pattern)"
+_HEAD: Final = "Print head"
+_FILES: Final = "Files"
+_length = partial(opt.quantity, "m", "LENGTH", panel=_HEAD, positive=True)
+
+
+@verb(
+    "print",
+    "printhammer print 'Bounce and chaotic motion' --rate 1.4kHz --out page.png",
+    {"tolerance": opt.TOLERANCE, "threads": opt.THREADS},
+    out=opt.files(
+        "Page (.png, .pdf, .svg) or its dots (.nc, .csv); may be given repeatedly. Without --out, --zoom,"
+        f" --sheet and --save: {', '.join(_USUAL)}.",
+        ".nc",
+        ".csv",
+        panel=_FILES,
+    ),
+    zoom=opt.files("Picture of the worst place (.png, .pdf, .svg).", many=False, panel=_FILES),
+    sheet=opt.files("The paper alone, at its true size (.png, .pdf, .svg).", many=False, panel=_FILES),
+    save=opt.file(
+        "The pattern itself (.toml, .png, .pbm, .bmp).", ".toml", ".png", ".pbm", ".bmp", panel=_FILES
+    ),
+)
+def print_(
+    job: Job,
+    text: str | None = opt.argument("[TEXT]", "Text to print; \\n begins a new line."),
+    rate: str | None = opt.text("RATE", "Slots per second on each wire, such as '1.2 kHz'."),
+    hammer: Hammer = opt.HAMMER_OPTION,
+    pattern: Path | None = opt.source("Pattern file (.toml) or bitmap (.png, .pbm, .bmp).", panel=_PATTERN),
+    wires: int | None = opt.whole("Wires: 9 (the built-in font), 18, 24 or another number.", panel=_PATTERN),
+    font: Path | None = opt.source(
+        "TrueType font (built-in for 9 wires, DejaVu Sans Mono for others).", panel=_PATTERN
+    ),
+    columns: int | None = opt.whole("Most characters of a print line (40).", panel=_PATTERN),
+    pitch: float | None = _length("From slot to slot (1/60 in for 9 wires)."),
+    wire_diameter: float | None = _length("Thickness of the wires (0.35 mm for 9 wires).", flag="--wire"),
+    density: float | None = opt.number("Optical density of the dot of a single pulse (1).", panel=_HEAD),
+    line_gap: float | None = opt.number(
+        "Between print lines, in parts of the height of the wires (1/3; 0 for a bitmap).", panel=_HEAD
+    ),
+    limits: str | None = opt.text("NAME", "Limits: slots (default), dot-matrix or engraved."),
+    table: Path | None = TABLE,
+    serial: str | None = SERIAL,
+    feedback: bool = FEEDBACK,
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Print a text or a pattern of dots at a rate, and see the page.
+
+    A hammer on every wire, each print line from rest. Ends with status 1 where a run stopped before its end.
+    """
+    from printhammer.drive.input import read_positive
+    from printhammer.printing.dots.judging import limits_named
+    from printhammer.printing.page.head import head_of
+    from printhammer.printing.page.page import print_page
+    from printhammer.printing.page.pattern import BITMAPS
+
+    if rate is None:
+        raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
+    often = read_positive(rate, "Hz", "--rate")
+    if not job.outputs:
+        *pages, last = (Path(name) for name in _USUAL)
+        job.wanted |= {"out": pages, "zoom": [last]}
+        job.check()
+    asked = _pattern(text, pattern, font, wires, columns)
+    if line_gap is None and pattern is not None and pattern.suffix.lower() in BITMAPS:
+        # A drawing goes on from print line to print line.
+        line_gap = 0.0
+    head = head_of(
+        asked.wires, **opt.given(pitch=pitch, wire_diameter=wire_diameter, density=density, line_gap=line_gap)
+    )
+    if limits is not None:
+        passed["limits"] = limits_named(limits)
+    passed |= chosen_strategy(job, hammer, table, feedback, serial)[0]
+    with job.telling("printing"):
+        page = print_page(hammer, asked, often, head=head, **passed)
+    save = page.save
+    views: dict[str, Any] = {name: Content(save, partial(page.plot, view=name)) for name in ("zoom", "sheet")}
+    return Answer(
+        render(page.summary(), units),
+        note=f"{page.status.size} runs, {page.line.size} dots, computed in {job.seconds:.2g} s",
+        files={"out": Content(save, page.plot), **views, "save": Content(asked.save)},
+        complaints=ended_early(page.status.ravel()),
+    )
+
+
+def _pattern(
+    text: str | None, path: Path | None, font: Path | None, wires: int | None, columns: int | None
+) -> Pattern:
+    from printhammer.printing.page.lettering import COLUMNS, WIRES
+    from printhammer.printing.page.pattern import Pattern
+
+    if path is not None:
+        if text is not None:
+            raise InputError("TEXT and --pattern: both are given, expected one of them")
+        for name, value in (("--font", font), ("--columns", columns)):
+            if value is not None:
+                raise InputError(
+                    f"{name} {value} is given beside --pattern {path}, expected with a text only"
+                )
+        return Pattern.load(path, wires)
+    if text is None:
+        raise InputError("TEXT and --pattern: neither is given, expected one of them")
+    return Pattern.from_text(
+        text.replace("\\n", "\n"),
+        WIRES if wires is None else wires,
+        font=font,
+        columns=COLUMNS if columns is None else columns,
+    )

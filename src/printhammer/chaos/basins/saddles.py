@@ -1,0 +1,49 @@
+"""Manifolds of the saddles in a plane of basins, which are the boundaries between basins."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from printhammer.chaos.basins.basins import Basins
+from printhammer.chaos.orbits.manifolds import Manifolds, manifolds
+from printhammer.chaos.orbits.orbit import SADDLE
+from printhammer.chaos.orbits.search import orbits
+from printhammer.support.threads import Progress
+
+_CROSSINGS: Final = 6  # Length of a manifold over the longer side of the plane
+_PIECES: Final = 200  # Points of a manifold over that side
+
+
+def saddle_manifolds(
+    planes: Basins, longest: int, *, progress: Progress | None = None
+) -> tuple[list[Manifolds], int]:
+    """Compute the manifolds of all saddles of up to `longest` firings.
+
+    Parameters
+    ----------
+    planes : Basins
+        Basins of the same hammer and drive.
+    longest : int
+        Largest orbit period, firings.
+    progress : callable, optional
+        Called with the number of saddles done and of all.
+
+    Returns
+    -------
+    list of Manifolds
+        One for each saddle that lies in the plane of the states at a firing.
+    int
+        Number of saddles that are in the pack at the firing, and not in that plane.
+    """
+    spans = np.array([np.ptp(planes.x), np.ptp(planes.v)]) / planes.regime.window.half_widths
+    side = float(spans.max())
+    saddles = [orbit for orbit in orbits(planes.regime, longest=longest) if orbit.kind == SADDLE]
+    in_plane = [orbit for orbit in saddles if orbit.phase == planes.regime.phase]
+    curves = []
+    for number, saddle in enumerate(in_plane, 1):
+        curves.append(manifolds(saddle, length=_CROSSINGS * side, spacing=side / _PIECES))
+        if progress is not None:
+            progress(number, len(in_plane))
+    return curves, len(saddles) - len(in_plane)

@@ -1,0 +1,161 @@
+"""The verbs `dead-time`, `impact-time` and `duty`: when a pulse strikes, and how hot its coil gets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.cli import options as opt
+from printhammer.cli.options import Units
+from printhammer.cli.runner import Answer, Content, Job, ended_early, load_hammer, verb
+from printhammer.cli.screen import render
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+
+
+@verb(
+    "dead-time",
+    "printhammer dead-time impact-wire --voltage '36 V, 40 V, 2' --temperature '20 degC, 100 degC, 2'"
+    " --out dead.csv --out dead.h",
+    {
+        "blow": opt.text("SPEED", "Speed of impact whose pulse is sought (that of the own rail)."),
+        "tolerance": opt.TOLERANCE,
+    },
+    out=opt.results("Table", ".h"),
+)
+def dead_time(
+    job: Job,
+    hammer: Hammer = opt.FIRED,
+    voltage: tuple[str, str, int] | None = opt.span("Rails (own rail, 10 % less, 10 % more)."),
+    temperature: tuple[str, str, int] | None = opt.span("Temperatures of the coil (20, 60, 100 degC)."),
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Find the time from switching on to impact against rail and temperature, and pulses of the same blow."""
+    from printhammer.control.dead_time import dead_time as timed
+
+    grid: dict[str, Any] = {
+        "voltage": opt.between(voltage, "V", "--voltage"),
+        "temperature": opt.between(temperature, "degC", "--temperature"),
+    }
+    with job.counting("fired") as tell:
+        made = timed(hammer, progress=tell, **grid, **passed)
+    return Answer(
+        render(made.summary(), units),
+        files={"out": Content.of(made)},
+        complaints=ended_early(made.status.ravel()),
+    )
+
+
+@verb(
+    "impact-time",
+    "printhammer impact-time impact-wire --noise '2 mA, 20 mA, 4' --sampling-rate '200 kHz, 1 MHz, 2'"
+    " --bits 12 --out impact.svg",
+    {
+        "signal": opt.choice("current|voltage", "What is sampled.", default="current"),
+        "full_scale": opt.text("VALUE", "Largest value that the converter shows."),
+        "dots": opt.whole("Dots in each way to sample.", default=50),
+        "seed": opt.whole("Of hammers and noise.", default=0),
+    },
+    out=opt.results("Errors"),
+)
+def impact_time(
+    job: Job,
+    hammer: Hammer = opt.FIRED,
+    noise: tuple[str, str, int] | None = opt.span(
+        "Of a sample (0.1, 0.3, 1 % of the largest current; of 10 V)."
+    ),
+    sampling_rate: tuple[str, str, int] | None = opt.span("Samples per second (1 MHz)."),
+    bits: list[str] | None = opt.text("N", "Of the converter (12); may be given repeatedly.", many=True),
+    hammers: int = opt.whole("Hammers of a production that are drawn.", default=20),
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Estimate times of impact from samples of current or voltage of the coil, and tell their error."""
+    from printhammer.control.impact_estimator import UNITS
+    from printhammer.control.impact_time import impact_time as studied
+
+    grids: dict[str, Any] = {
+        "noise": opt.between(noise, UNITS[passed.get("signal", "current")], "--noise"),
+        "sampling_rate": opt.between(sampling_rate, "Hz", "--sampling-rate"),
+        "bits": [opt.read_whole(each, "--bits") for each in bits or ()],
+    }
+    with job.counting("sampled") as tell:
+        study = studied(
+            hammer,
+            progress=tell,
+            units=hammers,
+            **{name: grid for name, grid in grids.items() if grid},
+            **passed,
+        )
+    return Answer(render(study.summary(), units), files={"out": Content.of(study)})
+
+
+_COIL: Final = "Coil"
+_NEEDED: Final = ("thermal_resistance", "limit")
+
+
+def _coil(si: str, metavar: str, what: str) -> Any:
+    return opt.quantity(si, metavar, what, positive=True, panel=_COIL)
+
+
+@verb(
+    "duty",
+    "printhammer duty --heat '4 mJ' --thermal-resistance '12 K/W' --limit '91 degC' --ambient '25 degC'"
+    " --ambient '50 degC' --out duty.csv",
+    {
+        "thermal_resistance": _coil("K/W", "K/W", "From the winding to the ambient air, or the body."),
+        "thermal_capacity": _coil("J/K", "J/K", "Heat capacity of the winding, for times."),
+        "body_resistance": _coil("K/W", "K/W", "From the body to the ambient air, of two masses."),
+        "body_capacity": _coil("J/K", "J/K", "Heat capacity of the body."),
+        "limit": opt.quantity("degC", "TEMPERATURE", "Largest temperature of the winding.", panel=_COIL),
+        "ambient": opt.text("TEMPERATURE", "Of the ambient air (25 degC); repeatedly.", many=True),
+        "burst": opt.text("RATE", "How long and how often this rate is allowed; repeatedly.", many=True),
+        "feed": opt.choice("voltage|current|energy", "What a driver keeps in a warm coil (voltage)."),
+    },
+    out=opt.results("Rates"),
+)
+def duty(
+    hammer: str | None = opt.text(
+        "HAMMER", "A hammer whose coil has a resistance, instead of --heat.", argument=True, is_input=True
+    ),
+    heat: float | None = opt.quantity(
+        "J", "ENERGY", "Heat of one dot with the winding at 20 degC.", positive=True
+    ),
+    rates: Path | None = opt.source("Rates that a maker allows (.csv): tell the limit behind them instead."),
+    **passed: Any,
+) -> Answer:
+    """Find the largest rate that a coil stands at an ambient temperature, and what faster bursts may last."""
+    if rates is not None:
+        from printhammer.control.thermal_limit import read_rates, thermal_limit
+        from printhammer.errors import located
+
+        opt.refuse(
+            {"heat": heat, **{name.replace("_", "-"): passed.get(name) for name in passed}},
+            "none beside --rates",
+        )
+        if hammer is not None:
+            raise InputError(f"{hammer} is given, expected no hammer beside --rates")
+        with located(str(rates)):
+            behind = thermal_limit(**read_rates(rates))
+        return Answer(render(behind.summary()), files={"out": Content.of(behind)})
+    from printhammer.control.duty import thermal_duty
+
+    if (hammer is None) == (heat is None):
+        raise InputError("HAMMER and --heat: expected one of them, such as --heat '4 mJ'")
+    for name in _NEEDED:
+        if name not in passed:
+            raise InputError(f"--{name.replace('_', '-')} is missing, expected it beside the heat of a dot")
+    made = thermal_duty(heat if heat is not None else _fired(hammer, passed), **passed)
+    return Answer(render(made.summary()), files={"out": Content.of(made)})
+
+
+def _fired(name: str | None, passed: dict[str, Any]) -> Any:
+    """Return the heat of one dot of a hammer."""
+    from printhammer.control.duty import heat_of
+
+    if "feed" in passed:
+        raise InputError("--feed is given, expected it beside --heat only: a hammer has a driver of its own")
+    return heat_of(load_hammer(str(name), fired=True))

@@ -1,0 +1,147 @@
+"""The verbs `energy` and `feedback`: a burst of least work, and a drive that sees the hammer."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.cli import options as opt
+from printhammer.cli.options import Units
+from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.screen import render
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.hammer.hammer import Hammer
+
+_MOST_RATES: Final = 200
+
+
+@verb(
+    "energy",
+    "printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png",
+    {
+        "dots": opt.whole("Number of dots.", default=8),
+        "force": opt.number("Least force in parts of that of the single pulse (0.9).", flag="--least-force"),
+        "largest": opt.text("CURRENT", "Largest current of either sign, such as '2 A'.", default="2 A"),
+        "slew": opt.number("Largest slope of the current, A/s (the hammer's own waveform's).", metavar="A/S"),
+        "spacing": opt.text("TIME", "Time between nodes of the current, such as '50 us'."),
+        "tolerance": opt.TOLERANCE,
+    },
+    out=opt.results("Burst, as .csv its current as a sampled waveform"),
+)
+def energy(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    rate: str = opt.text("RATE", "Dots per second, such as '1.2 kHz'.", default="1 kHz"),
+    rates: list[float] | None = opt.rates_between(
+        "Bursts at several rates instead, such as '600 Hz, 1.8 kHz, 7'.", _MOST_RATES
+    ),
+    heat: bool = opt.switch("Make the squared current least instead of the positive work."),
+    pulses: bool = opt.switch("Only pulses of the hammer, of times and widths that are sought."),
+    supply: bool = opt.switch("Show as well how the burst fares with other currents, up to 3 %."),
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Find the current that prints a burst with least work: the swing drive of the paper's discussion.
+
+    Every dot has the force asked for, the hammer starts from rest and comes to rest again. Ends with status 1
+    where a dot of the burst found is not adequate.
+    """
+    from printhammer.control.least_work.burst import least_work
+
+    passed |= {"least": "heat" if heat else "positive work", "shape": "pulses" if pulses else "free"}
+    current = any(path.suffix.lower() == ".csv" for path in job.outputs)
+    if pulses and current:
+        raise InputError("--pulses is given, expected no current (.csv) beside it")
+    if rates is not None:
+        if supply or current:
+            raise InputError("--rates is given, expected neither --supply nor a current (.csv) beside it")
+        from printhammer.control.least_work.rates import FOUND, least_work_rates
+
+        with job.counting("rates") as tell:
+            several = least_work_rates(hammer, rates, progress=tell, **passed)
+        missing = int((several.status != FOUND).sum())
+        complaint = f"no current was found at {missing} of {several.status.size} rates"
+        return Answer(
+            render(several.summary()),
+            files={"out": Content.of(several)},
+            complaints=[complaint] if missing else [],
+        )
+    with job.counting("dots planned") as tell:
+        result = least_work(hammer, rate, progress=tell, **passed)
+    shown = render(result.summary(), units)
+    if supply:
+        shown += ["", *render(result.under_supply().summary(result.count), units)]
+    short = result.adequate < result.count
+    return Answer(
+        shown,
+        files={"out": Content.of(result)},
+        complaints=[f"{result.adequate} of {result.count} dots are adequate"] if short else [],
+    )
+
+
+@verb(
+    "feedback",
+    "printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png",
+    {
+        "current": opt.text("CURRENT", "Largest current of either sign, such as '2 A'.", default="2 A"),
+        "edge": opt.text("TIME", "Time constant of the driver (the hammer's own decay)."),
+        "tolerance": opt.TOLERANCE,
+        "threads": opt.THREADS,
+    },
+    out=opt.results("Deviations"),
+    run=opt.files(
+        "Picture of one run (.svg, .png, .pdf), or its drive (.toml); may be given repeatedly.",
+        ".toml",
+        panel="The run that is shown",
+    ),
+)
+def feedback(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    rate: str = opt.text("RATE", "Slots per second.", default="1.6 kHz"),
+    noise: float | None = opt.number("Noise of a sample, in parts of the way to the pack (0.01)."),
+    delay: float | None = opt.quantity("s", "TIME", "Delay of the sensor ('20 us')."),
+    interval: float | None = opt.quantity("s", "TIME", "Between samples ('2 us').", positive=True),
+    step: float | None = opt.number("Quantisation, in parts of the way to the pack (1/1024)."),
+    seed: int | None = opt.whole("Of the noise (0)."),
+    supply: float = opt.number("Current of the hammer driven, in parts of the nominal one.", default=1.0),
+    travel: float | None = opt.quantity(
+        "m", "LENGTH", "By how much its pack lies farther away, such as '10 um' (0)."
+    ),
+    beside: Path | None = opt.source(
+        "Compensation table to compare with, from `printhammer tune`.", flag="--table"
+    ),
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Drive a hammer with feedback: all patterns of eight slots, and two dots at all distances.
+
+    Ends with status 1 where a pattern is not printed within limits with feedback.
+    """
+    from printhammer.control.feedback.comparison import feedback as compared
+    from printhammer.control.feedback.estimator.sensor import PositionSensor
+    from printhammer.control.table.compensation import TableStrategy, load_table
+    from printhammer.drive.file import save_drive
+    from printhammer.drive.input import read_positive
+    from printhammer.printing.rates.variability import Perturbation, perturbed
+
+    if beside is not None:
+        passed["beside"] = [TableStrategy(load_table(beside), hammer)]
+    change = Perturbation(current=read_positive(supply, "1", "supply") - 1.0, travel=travel or 0.0)
+    sensor = PositionSensor(**opt.given(noise=noise, delay=delay, interval=interval, step=step, seed=seed))
+    driven = perturbed(hammer, change)
+    with job.counting("tables, closed loops") as tell:
+        result = compared(hammer, rate, driven=driven, sensor=sensor, progress=tell, **passed)
+    bad, patterns = int((~result.passed[-1]).sum()), result.passed.shape[1]
+    complaint = f"{bad} of {patterns} patterns are not printed within limits with feedback"
+    return Answer(
+        render(result.summary(), units),
+        files={
+            "out": Content.of(result),
+            "run": Content(partial(save_drive, result.run.motion.drive), result.plot_run),
+        },
+        complaints=[complaint] if bad else [],
+    )

@@ -1,1 +1,0 @@
-"""Verbs of hammers: their files, constants from measurements, and the hammer of the paper."""

@@ -1,1 +1,0 @@
-"""Verbs of what is printed, how well, and how to drive better."""

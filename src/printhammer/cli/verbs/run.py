@@ -1,0 +1,93 @@
+"""The verb `run`: one hammer, one drive, its dots on the terminal and files on request."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from rich.markup import escape
+
+from printhammer.cli import options as opt
+from printhammer.cli.options import Units
+from printhammer.cli.runner import Answer, Content, Job, tables_beside, verb
+from printhammer.cli.screen import render
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    from printhammer.drive.trains import Drive
+    from printhammer.hammer.hammer import Hammer
+
+_DRIVE: Final = "Drive (default: a single pulse)"
+_FILES: Final = "Files (always SI)"
+_drive = partial(opt.text, panel=_DRIVE)
+_record = partial(opt.file, panel=_FILES)
+
+
+@verb(
+    "run",
+    "printhammer run hendriks-1983 --at '0 us, 700 us' --units inch",
+    {
+        "duration": opt.quantity("s", "TIME", "End of the run (4 ms after the last firing)."),
+        "tolerance": opt.TOLERANCE,
+        "scheme": opt.choice(
+            "default|trapezoid|runge-kutta-4", "Integrator: default, or those of 1983.", default="default"
+        ),
+        "points": opt.whole("Points in the record of the motion."),
+    },
+    out=opt.results("Motion, as .json its dots, contacts and energies", panel=_FILES),
+    dots=_record("Dots, .csv or .parquet.", ".csv", ".parquet"),
+    contacts=_record("Contacts, .csv or .parquet.", ".csv", ".parquet"),
+)
+def run(
+    job: Job,
+    hammer: Hammer = opt.HAMMER,
+    rate: str | None = _drive("RATE", "Firings per second, such as '1.2 kHz'."),
+    period: str | None = _drive("TIME", "Time between firings, such as '1.05 ms'."),
+    at: str | None = _drive("TIMES", "Firing times, such as '0 us, 700 us'."),
+    pulses: int | None = opt.whole("Number of firings with --rate or --period (9).", panel=_DRIVE),
+    overlap: str | None = opt.overlapping(_DRIVE),
+    drive: Path | None = opt.source("A drive file instead.", panel=_DRIVE),
+    units: Units = opt.UNITS,
+    **passed: Any,
+) -> Answer:
+    """Fire a hammer and tell what each pulse prints.
+
+    Ends with status 1 where the run stopped before its end, which the status line names.
+    """
+    from printhammer.run.simulate import simulate
+
+    train = {"rate": rate, "period": period, "at": at, "pulses": pulses, "overlap": overlap}
+    fired = _fired(hammer, drive, train)
+    if drive is not None:
+        job.check(*tables_beside(drive, fired.waveform))
+    motion = simulate(hammer, fired, **passed)
+    return Answer(
+        render(motion.summary(), units),
+        note=escape(repr(motion.drive)[1:-1]),
+        files={
+            "out": Content(motion.write, motion.plot),
+            "dots": Content(motion.dots.save),
+            "contacts": Content(motion.contacts.save),
+        },
+        complaints=[] if motion.ok else [motion.message],
+    )
+
+
+def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
+    """Make the drive that the options describe."""
+    from printhammer.drive.file import load_drive
+    from printhammer.drive.trains import PulseTrain
+
+    beside = opt.given(**train)
+    if file is not None:
+        for name in beside:
+            raise InputError(f"--{name} is given beside --drive {file}, expected one or the other")
+        return load_drive(file, hammer.waveform)
+    if hammer.waveform is None:
+        raise InputError(
+            f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE"
+        )
+    if "at" in beside:
+        beside["at"] = [each.strip() for each in beside["at"].split(",")]
+    return PulseTrain(hammer.waveform, **beside)

@@ -1,0 +1,159 @@
+"""The verb `sweep`: many hammers under many drives, into a store that can be continued."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Self
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from printhammer.cli import options as opt
+from printhammer.cli.runner import Answer, Job, announce_compiling, verb
+from printhammer.cli.screen import render
+from printhammer.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@verb("sweep", "printhammer sweep --example > sweep.toml && printhammer sweep sweep.toml --out results.zarr")
+def sweep(
+    job: Job,
+    spec: Path | None = opt.argument("SPEC", "A spec file, TOML.", type=Path),
+    out: Path | None = opt.folder(
+        "Store of the results (Zarr): a new one, or one to be continued.", writes=False
+    ),
+    threads: int | None = opt.THREADS,
+    dask: str | None = opt.text("ADDRESS", "Work on a dask cluster: address of its scheduler."),
+    check: bool = opt.switch("Say what would be done and how much room it takes; do nothing."),
+    example: bool = opt.switch("Print a spec to begin with."),
+    schema: bool = opt.switch("Print the JSON schema of specs."),
+) -> Answer:
+    """Run a sweep over any constants, drives and initial states.
+
+    Whatever ends it, the same command goes on where it ended. A member that fails is a row with a status.
+    """
+    if schema:
+        from printhammer.sweep import tables
+
+        typer.echo(json.dumps(tables.schema(), indent=2))
+        return Answer()
+    if example:
+        text = files("printhammer").joinpath("sweep", "example.toml").read_text(encoding="utf-8")
+        typer.echo(text, nl=False)
+        return Answer()
+    from printhammer.sweep.plan import make_plan
+    from printhammer.sweep.spec import read_spec
+
+    if spec is None:
+        raise InputError("SPEC is missing, expected a spec file; --example prints one")
+    if threads is not None and dask is not None:
+        raise InputError("--threads is given beside --dask, expected one or the other")
+    if check:
+        return Answer(render(make_plan(read_spec(spec)).summary()))
+    if out is None:
+        raise InputError("--out is missing, expected a folder for the results")
+    from printhammer.sweep import sweep as run_sweep
+
+    announce_compiling()
+    began = time.monotonic()
+    with Telling() as telling:
+        result = run_sweep(spec, out, threads=threads, dask=dask, progress=telling.tell)
+    job.show(ended(result, telling.new, time.monotonic() - began))
+    job.wrote(out)
+    return Answer()
+
+
+def ended(result: xr.Dataset, new: float, seconds: float) -> str:
+    """Say how the members of a sweep ended."""
+    from collections import Counter
+
+    from printhammer.sweep.outputs import STATUSES
+
+    counts = Counter(result["status"].values.ravel().tolist())
+    each = ", ".join(
+        f"[{'yellow' if code else 'green'}]{count} {STATUSES[code]}[/]"
+        for code, count in sorted(counts.items())
+    )
+    how = f"{new:.0f} of them now, in {duration_text(seconds)}" if new else "all of them done before"
+    return f"{result['status'].size} members: {each}; {how}"
+
+
+_LINE_EVERY: Final = 10.0
+
+
+class Telling:
+    """Tells how far a sweep is: a bar on a terminal, else a line now and then, on the standard error.
+
+    Attributes
+    ----------
+    new : float
+        Members done by this process.
+    """
+
+    def __init__(self) -> None:
+        self.new = 0.0
+        self._began = self._told = time.monotonic()
+        self._bar = (
+            Progress(
+                BarColumn(),
+                TextColumn("{task.description}"),
+                console=Console(stderr=True, highlight=False),
+                transient=True,
+            )
+            if sys.stderr.isatty()
+            else None
+        )
+        self._task = None if self._bar is None else self._bar.add_task("…", total=None)
+
+    def __enter__(self) -> Self:
+        if self._bar is not None:
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def tell(self, done: float, before: int, members: int) -> None:
+        """Take how many members are done, were done before, and there are."""
+        now = time.monotonic()
+        if self.new <= 0.0 and done <= before:
+            # Compiling and reaching a cluster are not part of the rate.
+            self._began = now
+        self.new = done - before
+        text = progress_text(done, before, members, now - self._began)
+        if self._bar is not None and self._task is not None:
+            self._bar.update(self._task, description=text, completed=done, total=members)
+        elif now - self._told >= _LINE_EVERY:
+            self._told = now
+            sys.stderr.write(f"{text}\n")
+            sys.stderr.flush()
+
+
+def progress_text(done: float, before: int, members: int, seconds: float) -> str:
+    """Say how many members are done, at which rate, and how long the others will take."""
+    text = f"{int(done)} of {members} members"
+    new = done - before
+    if new <= 0.0 or seconds <= 0.0:
+        return text
+    rate = new / seconds
+    return f"{text}, {rate:.3g}/s, {duration_text((members - done) / rate)} left"
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration in two units at most, such as "2 h 5 min"."""
+    whole = math.ceil(seconds)
+    days, hours, minutes = whole // 86400, whole // 3600 % 24, whole // 60 % 60
+    if days:
+        return f"{days} d {hours} h"
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"

@@ -1,0 +1,212 @@
+"""Summary: what a result says in short, in sentences, facts and small tables; quantities stay in SI.
+
+The terminal, ``print(result)`` and the notebook render the same summary. Its texts hold marks instead of
+finished numbers and colours: `quantity` marks a number with its SI unit, which is converted into the unit
+system of the reader when the summary is rendered, and `styled` marks words that a terminal shows in colour.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from math import isnan
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from printhammer.results.declare import html_table, shortened
+
+System = Literal["si", "inch"]
+Style = Literal["good", "poor", "bad", "strong", "best", "dim", "cyan", "magenta"]
+FactRow = tuple[str, str | None]
+
+NONE: Final = "–"
+"""Text of a quantity that is not known."""
+
+SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
+    "s": {"si": ("us", ".1f"), "inch": ("us", ".1f")},
+    "m": {"si": ("um", ".2f"), "inch": ("mil", ".3f")},
+    "m/s": {"si": ("m/s", ".3f"), "inch": ("in/s", ".1f")},
+    "N": {"si": ("N", ".2f"), "inch": ("lbf", ".3f")},
+    "J": {"si": ("mJ", ".4f"), "inch": ("in lbf", ".5f")},
+    "A": {"si": ("A", ".3f"), "inch": ("A", ".3f")},
+}
+"""Unit shown and format in either system, by SI unit."""
+_SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
+
+_QUANTITY: Final = re.compile("⟦([^ ⟧]*) ([^⟧!]*)(!?)⟧")
+_STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
+
+
+def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
+    """Mark a quantity in SI, of a unit in `SHOWN`, shown without its unit if `bare`; a dash for None."""
+    return NONE if value is None else f"⟦{float(value)!r} {unit}{'!' * bare}⟧"
+
+
+def interval(values: npt.NDArray[Any], unit: str) -> str | None:
+    """Mark the least and the largest of quantities in SI; None if there are none."""
+    return f"{quantity(values.min(), unit)} to {quantity(values.max(), unit)}" if values.size else None
+
+
+def styled(style: Style, said: object) -> str:
+    """Mark words to be shown in a style."""
+    return f"⟪{style} {said}⟫"
+
+
+def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
+    """Mark words as good, or as in another style where something is not good."""
+    return styled("good" if good else otherwise, said)
+
+
+def repeated(name: str, sentences: Iterable[str]) -> list[FactRow]:
+    """Return facts of which only the first is named."""
+    return [("" if row else name, sentence) for row, sentence in enumerate(sentences)]
+
+
+def multiplier(value: complex) -> str:
+    """Return a Floquet multiplier as text; without an imaginary part where it has none."""
+    real = f"{value.real:+.4g}"
+    return real if value.imag == 0.0 else f"{real}{value.imag:+.4g}i"
+
+
+def sign(unit: str, system: System) -> str:
+    """Return the sign of the unit in which quantities of an SI unit are shown."""
+    name = SHOWN[unit][system][0]
+    return _SIGNS.get(name, name)
+
+
+def shown(value: float, unit: str, system: System) -> str:
+    """Return a quantity in SI as text without unit."""
+    from printhammer.units import from_si
+
+    name, digits = SHOWN[unit][system]
+    text = format(from_si(value, unit, name), digits)
+    # No minus before what is rounded to zero.
+    return text if any(digit in text for digit in "123456789") else text.removeprefix("-")
+
+
+def rendered(text: str, system: System = "si", style: Callable[[str, str], str] | None = None) -> str:
+    """Replace the marks of a text; `style` shows a styled text, by default as it is."""
+    with_units = _QUANTITY.sub(
+        lambda mark: (
+            shown(float(mark[1]), mark[2], system) + ("" if mark[3] else f" {sign(mark[2], system)}")
+        ),
+        text,
+    )
+    return _STYLED.sub(lambda mark: style(mark[1], mark[2]) if style else mark[2], with_units)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A column of a table.
+
+    Numbers of a unit in `SHOWN` without a format are SI and shown in the unit system that is asked for;
+    others are shown as they are, with `unit` in the heading. None and NaN are shown as a dash.
+    """
+
+    heading: str
+    values: Sequence[Any] | npt.NDArray[Any]
+    unit: str = ""
+    format: str = ""
+    left: bool = False
+    """Whether the cells stand to the left."""
+
+    @property
+    def _converted(self) -> bool:
+        return not self.format and self.unit in SHOWN
+
+    def unit_sign(self, system: System) -> str:
+        """Return the unit in the heading, empty if there is none."""
+        return sign(self.unit, system) if self._converted else self.unit
+
+    def texts(self, system: System) -> list[str]:
+        """Return the texts of the cells, with their marks of style."""
+        values = self.values.tolist() if isinstance(self.values, np.ndarray) else self.values
+        return [self._text(value, system) for value in values]
+
+    def _text(self, value: Any, system: System) -> str:
+        if value is None or (isinstance(value, float) and isnan(value)):
+            return NONE
+        if isinstance(value, str):
+            return value
+        return shown(value, self.unit, system) if self._converted else format(value, self.format)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A small table; of more than `most` rows the first and the last are shown."""
+
+    columns: Sequence[Cells]
+    title: str = ""
+    most: int | None = None
+
+    def rows(self, system: System) -> list[Sequence[str]]:
+        """Return the texts of the cells, row by row."""
+        rows = list(zip(*(column.texts(system) for column in self.columns), strict=True))
+        return shortened(rows, self.most or len(rows))
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Names and what there is to say of them, a row each; a fact that is None is left out."""
+
+    rows: Sequence[FactRow]
+    title: str = ""
+
+    @property
+    def known(self) -> list[tuple[str, str]]:
+        """The facts that are not None."""
+        return [(name, said) for name, said in self.rows if said is not None]
+
+
+class Summary(tuple[str | Facts | Grid, ...]):
+    """Parts of a summary, in the order of reading: sentences, facts and tables."""
+
+    __slots__ = ()
+
+    def text(self, system: System = "si") -> str:
+        """Return the summary as plain text."""
+        lines: list[str] = []
+        for each in self:
+            if isinstance(each, str):
+                lines.append(rendered(each, system))
+            elif isinstance(each, Facts):
+                lines += [each.title] * bool(each.title)
+                lines += _aligned([(name, rendered(said, system)) for name, said in each.known], "<<")
+            else:
+                heads = [_plain_head(column, system) for column in each.columns]
+                cells = [[rendered(text) for text in row] for row in each.rows(system)]
+                lines += [each.title] * bool(each.title)
+                lines += _aligned([heads, *cells], "".join("<" if c.left else ">" for c in each.columns))
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        return "".join(_html(each) for each in self if each)
+
+
+def _plain_head(column: Cells, system: System) -> str:
+    unit = column.unit_sign(system)
+    return column.heading.replace("\n", " ") + (f" [{unit}]" if unit else "")
+
+
+def _aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
+    """Return rows as lines, each column to its side."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            f"{text:{side}{width}}" for text, side, width in zip(row, sides, widths, strict=True)
+        ).rstrip()
+        for row in rows
+    ]
+
+
+def _html(each: str | Facts | Grid) -> str:
+    if isinstance(each, str):
+        return f"<p>{html_table([[rendered(each)]])}</p>" if each.strip() else ""
+    if isinstance(each, Facts):
+        return html_table([(name, rendered(said)) for name, said in each.known])
+    heads = [_plain_head(column, "si") for column in each.columns]
+    return html_table([[rendered(text) for text in row] for row in each.rows("si")], heads)
