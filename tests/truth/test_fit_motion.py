@@ -45,6 +45,7 @@ def test_exact_records_give_the_constants_back(tmp_path: Path) -> None:
     assert not fit.outliers.any()
 
 
+@pytest.mark.slow
 def test_damping_in_flight_is_found_too(tmp_path: Path) -> None:
     damped = HAMMER.replace("damping", {"law": "viscous", "coefficient": "0.15 N s/m"})
     path = shots.write(tmp_path / "shot.csv", damped, noise=0.0, resolution=0.0, bandwidth=None)
