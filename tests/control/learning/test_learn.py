@@ -167,6 +167,7 @@ def test_no_rung_is_fired_while_the_armature_is_in_the_pack(by_time: LearningLaw
             assert rung.later >= dot.t_out + MARGIN - 1e-9
 
 
+@pytest.mark.slow
 def test_the_table_is_for_its_unit_only(tmp_path: Path) -> None:
     result = ph.learn(nominal(), rate=RATE, sensor=SENSOR, members=150, serial="A17")
     assert result.table.serial == "A17"
