@@ -6,9 +6,11 @@ import signal
 import subprocess
 import sys
 from collections import Counter
+from time import perf_counter
 
 import pytest
 from hypothesis import settings
+from numba.core import event
 from tests.hammers import CRUDE
 
 import printhammer as ph
@@ -28,26 +30,38 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 # Long files, and those that compile laws of their own, begin first: the workers then end together. Two that
 # compile the same laws stand far apart, so that the second one finds the machine code.
 FIRST = [
+    "test_recovery",
+    "test_states",
+    "test_learn",
+    "test_circuit",
+    "test_orbits",
+    "test_registry",
+    "test_results",
+    "test_continuation",
+    "test_strobe",
     "test_units",
+    "test_kill",
+    "test_program",
+    "test_motion",
     "test_examples",
     "test_docs",
-    "test_constant_flow_differences",
-    "test_orbits_closed_forms",
-    "test_impact_print_hammer",
-    "test_page_commands",
-    "test_fit_motion",
     "test_fits",
     "test_ensemble",
-    "test_sweep",
-    "test_burst",
-    "test_registry",
+    "test_orbits_closed_forms",
+    "test_coil",
+    "test_known_results",
+    "test_server",
+    "test_continuation_impacts",
+    "test_impact_print_hammer",
+    "test_circuit_tangent",
+    "test_axes",
     "test_tangent_finite_differences",
-    "test_results",
-    "test_report",
-    "test_motion",
-    "test_pulses",
-    "test_strobe",
-    "test_backstop",
+    "test_sequence_reference",
+    "test_circuit_constants",
+    "test_kernel_parts",
+    "test_constant_flow_differences",
+    "test_schemes_1983",
+    "test_lanes",
 ]
 
 
@@ -61,12 +75,73 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+class Compiling(event.Listener):
+    """Count the functions that numba compiles in this process, and the time spent on them.
+
+    Attributes
+    ----------
+    functions : int
+        Number of compiled functions that a test called; the functions inlined into them are not counted.
+    seconds : float
+        Wall-clock time of the compilations, s.
+    """
+
+    def __init__(self) -> None:
+        self.functions, self.seconds = 0, 0.0
+        self._depth, self._begun = 0, 0.0
+
+    def on_start(self, _event: event.Event) -> None:
+        """Start the clock at the outermost compilation."""
+        if self._depth == 0:
+            self._begun = perf_counter()
+        self._depth += 1
+
+    def on_end(self, _event: event.Event) -> None:
+        """Stop the clock at the outermost compilation."""
+        self._depth -= 1
+        if self._depth == 0:
+            self.functions += 1
+            self.seconds += perf_counter() - self._begun
+
+
+COMPILING = Compiling()
+"""Compilations of this process; those of the workers are added to it as they end."""
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Send the count of compilations from a worker to the process that reports it."""
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["compiling"] = COMPILING.functions, COMPILING.seconds
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: object) -> None:
+    """Add the compilations of a worker that has ended."""
+    functions, seconds = getattr(node, "workeroutput", {}).get("compiling", (0, 0.0))
+    COMPILING.functions += functions
+    COMPILING.seconds += seconds
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Report the share of compilation, without programs that tests start."""
+    text = f"compiled {COMPILING.functions} functions in {COMPILING.seconds:.0f} s of all workers together"
+    terminalreporter.write_line(text)
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Compile what most tests need once, before workers of their own do it side by side."""
+    event.register("numba:compile", COMPILING)
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
     if config.getoption("numprocesses", None) and not hasattr(config, "workerinput") and not compiled():
         subprocess.run([sys.executable, "-m", "printhammer", "warm", CRUDE], check=True, capture_output=True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark the tests of hypothesis as property tests."""
+    if hasattr(getattr(item, "function", None), "hypothesis"):
+        item.add_marker(pytest.mark.property)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -1,11 +1,12 @@
 """One small result of every class of `printhammer.chaos` and `printhammer.derivatives`, by its name."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 import printhammer as ph
-from printhammer.chaos import Branch, Branches, lyapunovs, orbit, strobe
+from printhammer.chaos import Branch, Branches, Orbits, lyapunovs, orbit, strobe
 from printhammer.derivatives.sensitivities import Sensitivities
 from printhammer.results import Result
 from printhammer.run.regime import Regime
@@ -13,6 +14,12 @@ from printhammer.run.regime import Regime
 PERIOD = 1.3e-3
 
 
+@cache
+def orbits(hammer: ph.Hammer) -> Orbits:
+    return ph.orbits(hammer, period=PERIOD, longest=2, starts=100, guesses=8)
+
+
+@cache
 def branch(hammer: ph.Hammer) -> Branch:
     return ph.continuation(hammer, "period", (2.95e-3, 3.05e-3), period=3e-3, most=4)
 
@@ -58,8 +65,8 @@ CHAOS: dict[str, Callable[[ph.Hammer], Result]] = {
     "Lyapunov": lambda hammer: ph.lyapunov(hammer, period=PERIOD, firings=20, transient=2),
     "LyapunovChart": lambda hammer: lyapunovs(hammer, [1.2e-3, PERIOD], firings=10, transient=0),
     "Manifolds": lambda _hammer: manifolds_of_duffing(),
-    "Orbit": lambda hammer: ph.orbits(hammer, period=PERIOD, longest=1, starts=60, guesses=6)[0],
-    "Orbits": lambda hammer: ph.orbits(hammer, period=PERIOD, longest=2, starts=60, guesses=6),
+    "Orbit": lambda hammer: orbits(hammer)[0],
+    "Orbits": orbits,
     "QuenchMap": lambda hammer: ph.quench_map(
         hammer, gaps=("650 us", "710 us", 2), widths=("300 us", "400 us", 3)
     ),

@@ -174,6 +174,7 @@ def test_a_train_without_a_period_need_not_be_strange(
     assert (value["first_strange_s"], value["last_strange_s"]) == (1.3e-3, 1.29e-3)
 
 
+@pytest.mark.golden
 @pytest.mark.slow
 def test_two_panels_of_the_shipped_hammer_keep_their_verdicts(context: Context) -> None:
     claim = claims()["poincare"]

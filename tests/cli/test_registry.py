@@ -166,8 +166,10 @@ def hammer_words(verb: Verb, path: object) -> list[object]:
 
 
 @pytest.mark.parametrize("verb", HAMMERED, ids=[verb.name for verb in HAMMERED])
-def test_a_hammer_that_is_none_is_refused(refused: Callable[..., None], verb: Verb) -> None:
+def test_a_hammer_that_is_none_is_refused(refused: Callable[..., None], verb: Verb, tmp_path: Path) -> None:
     refused(*words_of(verb, *hammer_words(verb, "nobody.toml")), said=("nobody.toml", "no such file"))
+    (tmp_path / "bad.toml").write_text("mass = = 3", "utf-8")
+    refused(*words_of(verb, *hammer_words(verb, "bad.toml")), said=("bad.toml", "TOML"))
 
 
 @pytest.mark.parametrize("verb", HAMMERED, ids=[verb.name for verb in HAMMERED])

@@ -167,6 +167,7 @@ def behind_a_rail() -> ph.Hammer:
     return ph.load("hendriks-1983").replace({"coil": coil, "waveform": rail})
 
 
+@pytest.mark.slow
 def test_between_two_rails_dots_are_those_of_the_design(behind_a_rail: ph.Hammer) -> None:
     tables = tune_along(behind_a_rail, "rail", ["94 V", "100 V"], rate=RATE, history=1)
     single = nominal(behind_a_rail)

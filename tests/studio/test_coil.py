@@ -121,6 +121,7 @@ def test_states_of_drivers_are_compared_by_what_they_have() -> None:
     assert not alike(one, of(waveform=rail(decay_voltage=3.0)))
 
 
+@pytest.mark.slow
 def test_a_full_map_tells_the_dots_of_its_runs_also_where_touches_are_short() -> None:
     state = of("dot-peen", pulses=3, low=10.0, high=40.0)
     _, arrays = unframe(map_frame(state, 1, FULL, lambda: False))

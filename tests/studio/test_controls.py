@@ -1,7 +1,9 @@
 """Controls: one for each constant, with a range that holds its value."""
 
+from contextlib import nullcontext
+
 import pytest
-from tests.hammers import CRUDE
+from tests.hammers import CRUDE, interpreted
 from tests.studio.server import STATE
 
 from printhammer.hammer.hammer import Hammer, load, shipped
@@ -14,6 +16,8 @@ from printhammer.studio.states.state import read_state
 from printhammer.units import to_si
 
 HAMMERS = [*shipped(), str(CRUDE)]
+RARE = {"dankowicz-schilder-2013", "pot-magnet"}
+"""Hammers whose combination of laws no other fast test compiles."""
 
 
 @pytest.mark.parametrize("name", HAMMERS)
@@ -74,7 +78,8 @@ def test_a_shipped_hammer_opens_with_something_that_strikes_its_backstop(name: s
     opening = controls.describe(hammer)["start"]
     assert ("waveform" in opening) == (hammer.waveform is None)
     state = read_state({**STATE, "hammer": name, **opening})
-    motion = limited_run(state.changed, state.drive, end_of_run(state.drive, None), bounds.MOST_STEPS)
+    with interpreted() if name in RARE else nullcontext():
+        motion = limited_run(state.changed, state.drive, end_of_run(state.drive, None), bounds.MOST_STEPS)
     assert motion.status == "ok"
     struck = any(contact.surface == "backstop" for contact in motion.contacts)
     # Without a spring an armature stays where it was pulled.

@@ -88,6 +88,7 @@ def test_a_line_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) 
     assert "would take more than 10 steps" in heading["reason"]
 
 
+@pytest.mark.slow
 def test_a_line_is_printed_with_a_measured_pulse() -> None:
     times = [5e-6 * k for k in range(93)]
     hammer = of().fired

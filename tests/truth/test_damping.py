@@ -60,7 +60,15 @@ def test_free_oscillations_from_none_to_creeping(coefficient: float) -> None:
 
 def test_machine_code_does_the_same() -> None:
     t = np.linspace(0.0, 8e-3, 101)
-    motion = ph.simulate(oscillator(0.5), idle(), times=t, duration=8e-3, state=(START, 0.0))
+    # The backstop is out of reach: other tests have the machine code for these laws.
+    place = -1.2e-4
+    hammer = oscillator(0.5).replace(
+        {
+            "backstop": {"law": "rigid", "position": place, "restitution": 0.5},
+            "spring.preload": -STIFFNESS * place,
+        }
+    )
+    motion = ph.simulate(hammer, idle(), times=t, duration=8e-3, state=(START, 0.0))
     assert np.abs(motion.x - decay(0.5, t)).max() < 1e-9 * START
 
 
@@ -122,6 +130,7 @@ def test_what_the_constant_does_against_differences(row: int, constant: str) -> 
         assert far_off(hammer, drive, [constant], 1.0e-3, STATE) == []
 
 
+@pytest.mark.slow
 def test_lanes_take_damped_hammers_too(hammer: ph.Hammer) -> None:
     """Dots, states and pictures are those of members that run one by one."""
     coefficients = np.linspace(0.0, 8.0, 40)
@@ -164,7 +173,7 @@ def test_a_file_says_it_with_a_unit(hammer: ph.Hammer) -> None:
         hammer.replace({"damping": {"law": "viscous", "coefficient": "-1.0 N s/m"}})
 
 
-@pytest.mark.parametrize("row", [0, 2])
+@pytest.mark.parametrize("row", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_sensitivities_of_the_energies_against_differences(row: int) -> None:
     """Also through impacts on a rigid backstop, before and after which damping slows at other speeds."""
     hammer, drive = case_of(CASES[row])

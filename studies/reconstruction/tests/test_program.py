@@ -35,6 +35,7 @@ NEEDED = {
 ELSEWHERE = {
     "schemes": "test_verbs.py, and the count in judging/test_schemes.py",
     "search": "the other examples begin with a shorter one",
+    "judge": "the example of family begins with the same commands",
     "base-rates": "test_verbs.py, with claims at no cost",
     "ship": "test_verbs.py, with the stated claims",
 }

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.chaos import samples
 from tests.hammers import CRUDE
 from tests.strobe_maps import strobe_map
 
@@ -20,7 +21,7 @@ SMALL = {"longest": 2, "starts": 100, "guesses": 8}
 
 @pytest.fixture(scope="module")
 def found() -> Orbits:
-    return ph.orbits(ph.load(CRUDE), period=PERIOD, **SMALL)
+    return samples.orbits(ph.load(CRUDE))
 
 
 @pytest.fixture(scope="module")
@@ -150,6 +151,8 @@ def test_a_search_that_finds_nothing_says_so(hammer: ph.Hammer) -> None:
     assert len(found.to_dataset()["orbit"]) == 0
 
 
+@pytest.mark.golden
+@pytest.mark.slow
 def test_branches_lead_to_orbits_that_no_motion_comes_close_to() -> None:
     # Saddles with multipliers of 89 and -4, partners in a fold, and one of period 2 between them with -315.
     hammer = ph.load("hendriks-1983")
@@ -164,6 +167,7 @@ def test_branches_lead_to_orbits_that_no_motion_comes_close_to() -> None:
         assert min(gaps) < 1e-4
 
 
+@pytest.mark.slow
 def test_more_effort_finds_no_fewer_orbits(hammer: ph.Hammer) -> None:
     lists = {
         (starts, guesses): ph.orbits(

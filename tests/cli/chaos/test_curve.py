@@ -26,7 +26,7 @@ def ball(tmp_path: Path) -> tuple[object, ...]:
     return ("bouncing-ball", "--drive", path, *along, "--state", f"{x!r} m, {v!r} m/s")
 
 
-@pytest.mark.parametrize("event", ["fold", "period doubling"])
+@pytest.mark.parametrize("event", [pytest.param("fold", marks=pytest.mark.slow), "period doubling"])
 def test_a_curve(cli: Callable, tmp_path: Path, ball: tuple[object, ...], event: str) -> None:
     out, picture = tmp_path / "curve.nc", tmp_path / "curve.png"
     done = cli("curve", *ball, *SECOND, "--event", event, "--grid", "3", "--out", out, "--out", picture)

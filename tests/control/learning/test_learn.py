@@ -95,14 +95,8 @@ def test_a_start_from_the_hammer_believed_in_prints_all_its_dots(law: LearningLa
             assert history[0] / RATE - advance >= clear - 1e-12
 
 
-@pytest.mark.parametrize(
-    "late",
-    [
-        400e-6,
-        pytest.param(-400e-6, marks=pytest.mark.slow),
-        pytest.param(float("nan"), marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("late", [400e-6, -400e-6, float("nan")])
 def test_no_reading_leads_beyond_the_bounds(law: LearningLaw, late: float) -> None:
     learner, task = Learner(law), law.entries.task
     while not learner.finished:
@@ -173,6 +167,7 @@ def test_no_rung_is_fired_while_the_armature_is_in_the_pack(by_time: LearningLaw
             assert rung.later >= dot.t_out + MARGIN - 1e-9
 
 
+@pytest.mark.slow
 def test_the_table_is_for_its_unit_only(tmp_path: Path) -> None:
     result = ph.learn(nominal(), rate=RATE, sensor=SENSOR, members=150, serial="A17")
     assert result.table.serial == "A17"

@@ -169,6 +169,7 @@ def test_constants_lie_where_they_are_said_to_lie(many: Callable[[ImpactSensor],
 
 
 @pytest.mark.slow
+@pytest.mark.golden
 def test_golden_figures_of_what_falls_short(many: Callable[[ImpactSensor], Many]) -> None:
     """What the page says of these units: a loss by times alone, and how well forces tell constants.
 

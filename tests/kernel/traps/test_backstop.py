@@ -67,7 +67,8 @@ def test_a_graze_of_a_rigid_backstop(depth: float, restitution: float) -> None:
     hammer = hammers.made_of(
         spring=hammers.preload(4.0), pack=hammers.power(), backstop=hammers.rigid(restitution)
     )
-    motion = ph.simulate(hammer, edges_at(1.0 / PULL), duration=1.5e-4, state=falling(depth))
+    with hammers.interpreted():
+        motion = ph.simulate(hammer, edges_at(1.0 / PULL), duration=1.5e-4, state=falling(depth))
     assert motion.ok
     assert len(touches(motion)) == (1 if depth > 0.0 else 0)
     assert motion.x.min() >= STOP
@@ -262,7 +263,9 @@ def test_a_backstop_that_may_not_pull_lets_go_once(gentle: float) -> None:
     hammer = hammers.made_of(
         spring=hammers.preload(-2.0), pack=hammers.PACKS["dashpot"], backstop=hammers.BACKSTOPS["elastomer"]
     )
-    found = hammers.compare(hammer, hammers.idle(), 4e-4, state=(STOP + gentle * 1e-2, -gentle), scale=STROKE)
+    state = STOP + gentle * 1e-2, -gentle
+    with hammers.interpreted():
+        found = hammers.compare(hammer, hammers.idle(), 4e-4, state=state, scale=STROKE)
     assert found.motion.status == "ok"
     assert found.error < 1e-9
     assert found.motion.steps < 2000

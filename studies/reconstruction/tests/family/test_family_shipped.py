@@ -63,6 +63,7 @@ def test_what_is_said_of_all_follows_from_the_table() -> None:
             assert (entry.low, entry.high) == pytest.approx((found["low"], found["high"]))
 
 
+@pytest.mark.golden
 @pytest.mark.slow
 def test_a_member_judged_again_is_one() -> None:
     for member, hammer in list(zip(members(), family_hammers(), strict=True))[-1:] if members() else []:

@@ -33,6 +33,7 @@ def test_changes_are_counted_with_panels_of_a_hammer_as_one(monkeypatch: pytest.
     assert rows[-1]["differ"] == 0
 
 
+@pytest.mark.golden
 @pytest.mark.slow
 def test_what_ships_can_be_made_again_and_is_about_all_ways(monkeypatch: pytest.MonkeyPatch) -> None:
     import printhammer as ph
