@@ -16,7 +16,7 @@ class Batch(NamedTuple):
     hammer_of, waveform_of : int64 array, shape (M,)
         Row of `hammers`, `controls` and `bounds`, and set of waveforms, of each member.
     hammers, controls, bounds : float64 array, shape (H, any), (H, 4), (H, 4)
-        As `hammer`, `control` and `bounds` in :func:`printhammer.kernel.single.run.run`.
+        As in :class:`printhammer.kernel.single.carry.Setup`.
     piece_starts, pieces
         Pieces of all sets of waveforms one after the other, and the first of each set.
     rates : float64 array, shape (W, 3)

@@ -263,7 +263,7 @@ def turn_in_pack(
 ) -> int:
     """Go on after the velocity became zero inside the pack at displacement `x`.
 
-    As `printhammer.kernel.single.run.reversed_mode` tells; where the armature would rest, the member leaves.
+    As `printhammer.kernel.single.around.reversed_mode`; where the armature would rest, the member leaves.
     """
     # As in the plain kernel: swings too small to be told from rest would never end.
     still = R.STILL * control[1] * control[1] / control[0]

@@ -42,7 +42,7 @@ BRANCHES = (M.UNLOADING, M.LOADING, M.RELOADING)
 @inlined
 def stillness(control: Any) -> float:
     """Return the acceleration [m/s2] below which an armature without velocity rests."""
-    return STILL * control[1] / (control[0] / control[1])
+    return float(STILL * control[1] / (control[0] / control[1]))
 
 
 @inlined

@@ -194,11 +194,11 @@ def flow(
     Parameters
     ----------
     nodes, train, hammer
-        As recorded and given in :func:`printhammer.kernel.single.run.run`.
+        As recorded by :func:`printhammer.kernel.single.run.run` and given in its setup.
     scales : tuple of float
         Scales of displacement and velocity.
     bounds : tuple of float
-        As in :func:`printhammer.kernel.single.run.run`.
+        As in :class:`printhammer.kernel.single.carry.Setup`.
     forced_by : tuple
         A plain tuple of the fields of `printhammer.kernel.variational.layout.Forcing`; else an empty one.
     marks : float64 array, shape (m,)
