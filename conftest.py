@@ -124,8 +124,11 @@ def pytest_testnodedown(node: object) -> None:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Report the share of compilation, without programs that tests start."""
-    text = f"compiled {COMPILING.functions} functions in {COMPILING.seconds:.0f} s of all workers together"
-    terminalreporter.write_line(text)
+    if COMPILING.functions:
+        text = (
+            f"compiled {COMPILING.functions} functions in {COMPILING.seconds:.0f} s, summed over the workers"
+        )
+        terminalreporter.write_line(text)
 
 
 def pytest_configure(config: pytest.Config) -> None:

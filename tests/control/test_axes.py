@@ -194,6 +194,11 @@ def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
     )
     cold, warm = tables.tables
     assert warm.width[0, 0] > cold.width[0, 0] + 3e-6
+    single = nominal(behind_a_rail)
+    driven = behind_a_rail.replace("coil.temperature", "50 degC")
+    drive = tables.strategy(behind_a_rail, "50 degC")(driven, [(0, 1, 2)], 600.0)[0]
+    for dot in ph.simulate(driven, drive).dots:
+        assert dot.peak_force == pytest.approx(single.force, rel=0.05)
     assert steps == sorted(steps)
     assert steps[-1][0] <= steps[-1][1]
     with pytest.raises(ph.InputError, match=r"rail = 130 V: .* the waveform peaks at"):

@@ -8,7 +8,7 @@ from printhammer.chaos import Orbits
 
 @pytest.fixture(scope="module")
 def found() -> Orbits:
-    return ph.orbits(ph.load(CRUDE), period=1.3e-3, longest=1, starts=60, guesses=6)
+    return ph.orbits(ph.load(CRUDE), period=1.3e-3, longest=1, starts=60, guesses=6, follow=0)
 
 
 def lines(figure: object, gid: str) -> list:

@@ -88,6 +88,13 @@ def test_a_line_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) 
     assert "would take more than 10 steps" in heading["reason"]
 
 
+def test_a_line_is_printed() -> None:
+    heading, arrays = unframe(line_frame(of(line="I"), 1, lambda: False))
+    assert heading["reason"] == ""
+    assert heading["wanted"] > 0
+    assert arrays
+
+
 @pytest.mark.slow
 def test_a_line_is_printed_with_a_measured_pulse() -> None:
     times = [5e-6 * k for k in range(93)]
