@@ -161,7 +161,7 @@ def test_a_moving_coil_is_linear() -> None:
 
 
 def paper(resistance: float, inductance: float, **more: Any) -> ph.Hammer:
-    """The paper's hammer behind a rail; its pack is out of reach, but most tests have machine code for one."""
+    """The hammer of the paper behind a rail, its pack out of reach; other tests share the machine code."""
     paper = {"pack.front": "1 mm", "platen": "1.1 mm", "pack.thickness": "0.1 mm"}
     return ph.load("hendriks-1983").replace(
         {"coil.resistance": resistance, "coil.inductance": inductance, **paper, **more}
