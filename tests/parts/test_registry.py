@@ -25,8 +25,8 @@ from printhammer.parts import (
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
-from printhammer.parts.coil.winding import Winding
-from printhammer.parts.damping.viscous import ViscousDamping
+from printhammer.parts.coil import Winding
+from printhammer.parts.damping import ViscousDamping
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.magnet.linkage_table import LinkageTableMagnet
 from printhammer.parts.magnet.moving_coil import MovingCoilMagnet

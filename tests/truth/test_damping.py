@@ -21,7 +21,7 @@ from tests.moved import far_off, quantity_differences
 
 import printhammer as ph
 from printhammer.derivatives.states import tangent_map
-from printhammer.parts.damping.viscous import ViscousDamping
+from printhammer.parts.damping import ViscousDamping
 
 STATE = STOP + 20e-6, -0.4
 MASS, STIFFNESS, START = 0.4e-3, 2e4, 80e-6

@@ -13,7 +13,7 @@ from tests.truth.impact_orbits import BouncingBall, DampedImpacts
 
 import printhammer as ph
 from printhammer.chaos import orbit
-from printhammer.parts.damping.viscous import ViscousDamping
+from printhammer.parts.damping import ViscousDamping
 from printhammer.parts.spring.cubic import CubicSpring
 from printhammer.run.regime import Regime
 

@@ -36,7 +36,7 @@ from printhammer.drive.input import read_number, read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.parts.coil.winding import COPPER, REFERENCE
+from printhammer.parts.coil import COPPER, REFERENCE
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.summary import (
     Cells,

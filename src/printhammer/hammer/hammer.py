@@ -384,7 +384,7 @@ class Hammer:
     @staticmethod
     def schema() -> dict[str, Any]:
         """Return the JSON schema of hammer files."""
-        from printhammer.hammer.schema import schema
+        from printhammer.hammer.file import schema
 
         return schema()
 

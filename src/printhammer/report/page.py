@@ -11,10 +11,10 @@ from typing import Any, Final
 from printhammer.claims import JudgedClaim
 from printhammer.hammer.hammer import Hammer
 from printhammer.report.contents import Report, linked_source
-from printhammer.report.family_views import family_view
 from printhammer.report.quantities import band_text, percent, split_name, typeset, value_text, words_of
 from printhammer.report.views import (
     failing_view,
+    family_view,
     panels_view,
     predictions_view,
     rates_view,

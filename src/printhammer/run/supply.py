@@ -14,7 +14,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model import layout
 from printhammer.parts import absent
-from printhammer.parts.coil.winding import Winding
+from printhammer.parts.coil import Winding
 from printhammer.support.arrays import FloatArray
 
 _PLACES: Final = 33

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import printhammer as ph
 from printhammer.control.duty import FEEDS, DotHeat, ThermalCoil, dot_heat, steady, time_to
-from printhammer.parts.coil.winding import COPPER
+from printhammer.parts.coil import COPPER
 
 AMBIENT = [25.0, 50.0] * 3
 RAIL = [21.6, 21.6, 24.0, 24.0, 26.4, 26.4]

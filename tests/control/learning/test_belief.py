@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from printhammer.control.learning.belief import Belief, Evidence, believe
-from printhammer.control.learning.ladder import Surrogate
 from printhammer.control.learning.learner import mean
+from printhammer.control.learning.lines import Surrogate
 from printhammer.support.threads import answered
 
 Readings = Callable[[np.ndarray], np.ndarray]

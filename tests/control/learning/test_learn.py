@@ -9,10 +9,9 @@ from tests.hammers import crude
 
 import printhammer as ph
 from printhammer.control.learning.belief import Belief, Mode
-from printhammer.control.learning.ladder import DOTS, Rung, candidates
 from printhammer.control.learning.law import MARGIN, RUNS, WIDTH, LearningLaw, order_good
 from printhammer.control.learning.learner import Learner
-from printhammer.control.learning.lines import LINE, Press, printed
+from printhammer.control.learning.lines import DOTS, LINE, Press, Rung, candidates, printed
 from printhammer.control.learning.sensor import ImpactSensor, Readings
 from printhammer.control.pulses import of_width
 from printhammer.control.table.drive import driven_by, histories, number_of

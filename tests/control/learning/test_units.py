@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.control.learning.ladder import DOTS, Rung
 from printhammer.control.learning.law import RUNS, LearningLaw
 from printhammer.control.learning.learn import Progress, calibrate
 from printhammer.control.learning.learner import Learner
-from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.learning.lines import DOTS, LINE, Press, Rung
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.sensor import ImpactSensor, Readings
 from printhammer.control.table.drive import with_pulse

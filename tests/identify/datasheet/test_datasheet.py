@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.identify.datasheet.build import damping_ratio, hammer_of
-from printhammer.identify.datasheet.magnet import Sheet, fit_magnet, forces_of
+from printhammer.identify.datasheet.build import Sheet, damping_ratio, fit_magnet, forces_of, hammer_of
 from printhammer.identify.datasheet.sheet import DataSheet, read_sheet
 from printhammer.parts.magnet import reluctance as law
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet

@@ -13,8 +13,7 @@ from printhammer.drive.waveforms.shapes import Rectangle
 from printhammer.printing.dots.judging import PRESETS
 from printhammer.printing.dots.strategy import FIRST_SLOT, open_loop
 from printhammer.printing.page import page as page_module
-from printhammer.printing.page.head import head_of
-from printhammer.printing.page.page import Page, darkness, print_page
+from printhammer.printing.page.page import Page, darkness, head_of, print_page
 from printhammer.printing.page.pattern import Pattern
 
 TIGHT = 1e-12

@@ -261,8 +261,7 @@ def print_(
     """
     from printhammer.drive.input import read_positive
     from printhammer.printing.dots.judging import limits_named
-    from printhammer.printing.page.head import head_of
-    from printhammer.printing.page.page import print_page
+    from printhammer.printing.page.page import head_of, print_page
     from printhammer.printing.page.pattern import BITMAPS
 
     if rate is None:

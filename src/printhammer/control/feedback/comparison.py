@@ -18,8 +18,8 @@ import numpy.typing as npt
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.estimator.sensor import PositionSensor
-from printhammer.control.feedback.fronts import OFFSETS, STEPS
 from printhammer.control.feedback.plant import LARGEST_CURRENT, Driver, driver_of
+from printhammer.control.feedback.policy import OFFSETS, STEPS
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer

@@ -16,11 +16,18 @@ import numpy as np
 from printhammer.control.feedback.estimator.adaptation import Contacts
 from printhammer.control.feedback.estimator.flight import Expected, FreeForce, flight_from_samples
 from printhammer.control.feedback.estimator.sensor import Samples
-from printhammer.control.feedback.fronts import between_fronts, fronts
 from printhammer.control.feedback.impact_map import ALWAYS, FREE, PUSHED, blend_known, force_map
 from printhammer.control.feedback.loop import APART, REMEMBERED, Loop, Printed, Pulse, Touched
 from printhammer.control.feedback.plant import Driver, Plant
-from printhammer.control.feedback.policy import KNOWN, Choice, Committed, Policy, between
+from printhammer.control.feedback.policy import (
+    KNOWN,
+    Choice,
+    Committed,
+    Policy,
+    between,
+    between_fronts,
+    fronts,
+)
 from printhammer.control.feedback.soft_landing import launch
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer

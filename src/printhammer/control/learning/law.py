@@ -31,8 +31,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from printhammer.control.learning.belief import Belief
-from printhammer.control.learning.ladder import Rung, Surrogate
-from printhammer.control.learning.lines import LINE
+from printhammer.control.learning.lines import LINE, Rung, Surrogate
 from printhammer.control.learning.production import Production
 from printhammer.control.table.drive import (
     COLUMNS,

@@ -13,10 +13,9 @@ from typing import Any, NamedTuple, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.ladder import DOTS
 from printhammer.control.learning.law import PRINTED, RUNS, LearningLaw
 from printhammer.control.learning.learner import Learner
-from printhammer.control.learning.lines import LINE, Press, printed
+from printhammer.control.learning.lines import DOTS, LINE, Press, printed
 from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.table.compensation import CompensationTable

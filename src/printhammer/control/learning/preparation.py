@@ -7,9 +7,8 @@ from typing import Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.ladder import Rung, Surrogate, candidates, choose
 from printhammer.control.learning.law import Adjustable, LearningLaw
-from printhammer.control.learning.lines import printed
+from printhammer.control.learning.lines import Rung, Surrogate, candidates, choose, printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.table.compensation import CompensationTable

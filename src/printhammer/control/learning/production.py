@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.control.learning.ladder import Rung
-from printhammer.control.learning.lines import LINE, Press
+from printhammer.control.learning.lines import LINE, Press, Rung
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.control.table.task import Task
 from printhammer.hammer.hammer import Hammer

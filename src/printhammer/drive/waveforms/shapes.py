@@ -13,9 +13,8 @@ from typing import ClassVar, Final, Self
 from printhammer.drive.segments import EXPONENTIAL, POLYNOMIAL, SINE, table
 from printhammer.drive.waveforms.base import DECAY_TIMES, QUANTITY_UNITS, QuantityName, Waveform
 from printhammer.drive.waveforms.chain import Chain
-from printhammer.drive.waveforms.drivers import DRIVERS
+from printhammer.drive.waveforms.drivers import DRIVERS, Switched
 from printhammer.drive.waveforms.sampled import Sampled
-from printhammer.drive.waveforms.switched import Switched
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantity
 

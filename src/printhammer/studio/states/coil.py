@@ -42,7 +42,7 @@ def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
     """Return the constants of the coil that a hammer file leaves open and a control sets, by dotted key."""
     if not has_rail(hammer):
         return {}
-    from printhammer.parts.coil.winding import REFERENCE, Winding
+    from printhammer.parts.coil import REFERENCE, Winding
 
     values: dict[str, float] = {"temperature": REFERENCE}
     if hammer.coil is None or getattr(hammer.coil, "resistance", None) is None:
