@@ -60,7 +60,7 @@ FIGURES: Final[dict[int, PaperFigure]] = {
     for entry in (
         PaperFigure(
             2,
-            "statics.statics",
+            "forces.statics",
             "Magnetic force and spring force",
             "Net magnetic force against displacement at coil currents of 0, 0.5, 1, 1.5 and 2 A, the spring"
             " force and its reflection (dashed). Double lines: backstop, front of the ribbon and paper pack,"
