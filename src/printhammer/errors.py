@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Self
 
 
 class PrinthammerError(Exception):
@@ -14,17 +15,86 @@ class InputError(PrinthammerError, ValueError):
     """Input from outside that cannot be used.
 
     The message is one sentence that names the file, the key, the value and what was expected. The command
-    line prints it and ends with status 2.
+    line prints it and ends with status 2. The attributes hold the same for programs; None where the message
+    has no such part.
+
+    Attributes
+    ----------
+    file : str or None
+        Path of the file, or name of the object, that holds the key.
+    key : str or None
+        Name of the argument, option, entry or column.
+    value : object
+        The value that cannot be used.
+    expected : str or None
+        What was expected instead.
     """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: object = None,
+        key: str | None = None,
+        value: object = None,
+        expected: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.file = None if file is None else str(file)
+        self.key, self.value, self.expected = key, value, expected
+
+    @classmethod
+    def of(
+        cls,
+        key: str,
+        value: object,
+        expected: object,
+        *,
+        file: object = None,
+        written: str | None = None,
+        unit: str = "",
+        said: str = ", expected",
+    ) -> Self:
+        """Compose the message of a value that is not as expected.
+
+        Parameters
+        ----------
+        key, value, expected, file
+            The attributes.
+        written : str, optional
+            Text of the value in the message, by default its `repr`.
+        unit : str
+            Unit of the value in the message.
+        said : str
+            Words between the value and what was expected.
+        """
+        where = "" if file is None else f"{file}: "
+        text = repr(value) if written is None else written
+        text += unit and f" {unit}"
+        message = f"{where}{key} = {text}{said} {expected}"
+        return cls(message, file=file, key=key, value=value, expected=str(expected))
+
+    def within(self, file: object = None, *, key: str | None = None) -> InputError:
+        """Return the error with a file, a key, or both before its message and its own file and key."""
+        before = [str(part) for part in (file, key) if part is not None]
+        places = [str(part) for part in (file, self.file) if part is not None]
+        keys = [part for part in (key, self.key) if part is not None]
+        return InputError(
+            ": ".join([*before, str(self)]),
+            file=": ".join(places) or None,
+            key=".".join(keys) or None,
+            value=self.value,
+            expected=self.expected,
+        )
 
 
 @contextmanager
-def located(where: str) -> Iterator[None]:
-    """Begin the message of an `InputError` with where it comes from, such as a file or a key."""
+def located(file: object = None, *, key: str | None = None) -> Iterator[None]:
+    """Begin the message of an `InputError` with the file or the key it comes from; see `within`."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise error.within(file, key=key) from None
 
 
 def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:

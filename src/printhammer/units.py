@@ -135,12 +135,16 @@ def split(text: str, si_unit: str) -> tuple[float, str]:
     match = _NUMBER.fullmatch(text)
     value = float(match[1]) if match else math.nan
     if match is None or not math.isfinite(value):
-        raise InputError(f"{text!r} is not a finite number with a unit, expected {describe(si_unit)}")
+        raise InputError(
+            f"{text!r} is not a finite number with a unit, expected {describe(si_unit)}", value=text
+        )
     unit = match[2].strip()
     if re.match(r",\s*\d", unit):
-        raise InputError(f"{text!r} has a comma, expected a number with a decimal point, such as '1.2 kHz'")
+        raise InputError(
+            f"{text!r} has a comma, expected a number with a decimal point, such as '1.2 kHz'", value=text
+        )
     if not unit and si_unit != "1":
-        raise InputError(f"{text!r} has no unit, expected {describe(si_unit)}")
+        raise InputError(f"{text!r} has no unit, expected {describe(si_unit)}", value=text)
     return value, unit or "1"
 
 
@@ -151,7 +155,7 @@ def describe(si_unit: str) -> str:
 
 def _scaled(value: object, factor: Fraction, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"{value!r} {unit} is not a number")
+        raise InputError(f"{value!r} {unit} is not a number", value=value)
     try:
         number = float(value)
         if math.isfinite(number):
@@ -159,7 +163,7 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
             return number + 0.0 if factor == 1 else float(Fraction(repr(number)) * factor)
     except OverflowError:
         pass
-    raise InputError(f"{value!r} {unit} is not a finite number")
+    raise InputError(f"{value!r} {unit} is not a finite number", value=value)
 
 
 @lru_cache(maxsize=1024)
@@ -171,7 +175,7 @@ def _factor(unit: str, si_unit: str) -> Fraction:
         known = (name for name in DIMENSIONS if _measure(name)[1] == dimension)
         same = next(known, None)
         is_what = f"is {DIMENSIONS[same]}" if same else "is of another dimension"
-        raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}")
+        raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}", key="unit", value=unit)
     return size / si_size
 
 

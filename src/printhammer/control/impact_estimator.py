@@ -81,10 +81,16 @@ class ImpactEstimator:
         if self.pulse.quantity != "voltage":
             raise InputError(
                 f"{hammer.path}: the waveform is a {self.pulse.quantity}, expected the voltage of a driver"
-                " on a coil, whose current and voltage an impact changes"
+                " on a coil, whose current and voltage an impact changes",
+                file=hammer.path,
+                key="waveform",
             )
         if hammer.front is None:
-            raise InputError(f"{hammer.path}: the hammer has no pack, expected one that it strikes")
+            raise InputError(
+                f"{hammer.path}: the hammer has no pack, expected one that it strikes",
+                file=hammer.path,
+                key="pack",
+            )
         self.step = 1.0 / sampling.sampling_rate
         self.flight, self.contact = self._dot()
         parts = min(BEFORE * self.contact, _MOST_BEFORE * self.flight), AFTER * self.contact
@@ -93,13 +99,17 @@ class ImpactEstimator:
         if self._size < _LEAST:
             raise InputError(
                 f"sampling_rate = {sampling.sampling_rate:g} Hz: {self._size} samples fall on the contact of"
-                f" {1e6 * self.contact:.3g} us, expected {_LEAST} at least"
+                f" {1e6 * self.contact:.3g} us, expected {_LEAST} at least",
+                key="sampling_rate",
+                value=sampling.sampling_rate,
             )
         self.count = math.ceil((1.0 + REACH) * self.flight / self.step) + after + 2
         if self.count > _MOST:
             raise InputError(
                 f"sampling_rate = {sampling.sampling_rate:g} Hz: {self.count} samples a dot, expected at most"
-                f" {_MOST}"
+                f" {_MOST}",
+                key="sampling_rate",
+                value=sampling.sampling_rate,
             )
         fine = np.asarray(self.step / PHASES * np.arange(PHASES * self.count), np.float64)
         run = simulate(hammer, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
@@ -184,7 +194,10 @@ class ImpactEstimator:
             if dot.flight_time is not None and dot.contact_time is not None:
                 return float(dot.flight_time), float(dot.contact_time)
             span *= 2.0
-        raise InputError(f"{self.hammer.path}: a single pulse makes no dot, expected a hammer that prints")
+        raise InputError(
+            f"{self.hammer.path}: a single pulse makes no dot, expected a hammer that prints",
+            file=self.hammer.path,
+        )
 
     def _without_pack(self, sampling: Sampling, fine: FloatArray) -> FloatArray:
         """Return the signal where the pack does nothing, A or V; where that run ends early, its last."""
@@ -201,18 +214,24 @@ class ImpactEstimator:
         if sampling.signal == "voltage" and not self.clearness > 0.0:
             raise InputError(
                 f"{self.hammer.path}: the voltage shows no impact, since the supply or a diode holds it, or"
-                " the magnet is not permanent, expected signal = 'current'"
+                " the magnet is not permanent, expected signal = 'current'",
+                file=self.hammer.path,
+                key="signal",
             )
         if sampling.signal == "current" and abs(now) < _FLOWING * largest:
             raise InputError(
                 f"{self.hammer.path}: the current shows no impact, since {1e3 * now:.3g} mA of"
                 f" {1e3 * largest:.3g} mA are left of it by then, expected a pulse that lasts until the"
-                " impact, a slower decay, or signal = 'voltage' if the magnet is permanent"
+                " impact, a slower decay, or signal = 'voltage' if the magnet is permanent",
+                file=self.hammer.path,
+                key="signal",
             )
         raise InputError(
             f"{self.hammer.path}: the impact changes the {sampling.signal} by {self.clearness:.2g} standard"
             f" deviations, expected less noise than {sampling.noise:g} {sampling.unit}, more bits than"
-            f" {sampling.bits}, or faster sampling"
+            f" {sampling.bits}, or faster sampling",
+            file=self.hammer.path,
+            key="signal",
         )
 
 
@@ -246,15 +265,17 @@ class Sampling(Declared):
 
     def __post_init__(self) -> None:
         if self.signal not in SIGNALS:
-            raise InputError(f"signal = {self.signal!r}, expected {' or '.join(SIGNALS)}")
+            raise InputError.of("signal", self.signal, " or ".join(SIGNALS))
         if not 0.0 <= self.noise < math.inf:
-            raise InputError(f"noise = {self.noise!r} is expected to be a number not below 0")
+            raise InputError.of("noise", self.noise, "a number not below 0", said=" is expected to be")
         if not 0.0 < self.sampling_rate < math.inf:
-            raise InputError(f"sampling_rate = {self.sampling_rate!r} is expected to be a number above 0")
+            raise InputError.of(
+                "sampling_rate", self.sampling_rate, "a number above 0", said=" is expected to be"
+            )
         if type(self.bits) is not int or not 1 <= self.bits <= _MOST_BITS:
-            raise InputError(f"bits = {self.bits!r}, expected a whole number from 1 to {_MOST_BITS}")
+            raise InputError.of("bits", self.bits, f"a whole number from 1 to {_MOST_BITS}")
         if self.full_scale is not None and not 0.0 < self.full_scale < math.inf:
-            raise InputError(f"full_scale = {self.full_scale!r} is expected to be a number above 0")
+            raise InputError.of("full_scale", self.full_scale, "a number above 0", said=" is expected to be")
 
     @property
     def unit(self) -> str:

@@ -71,7 +71,9 @@ class ImpactTime(Result, rows=_CELLS):
         same for every dot of a unit, is its offset.
         """
         if self.bias.size != 1:
-            raise InputError(f"{self.bias.size} ways to sample were studied, expected one for a sensor")
+            raise InputError(
+                f"{self.bias.size} ways to sample were studied, expected one for a sensor", key="index"
+            )
         noise, units = float(self.deviation[0, 0, 0]), float(self.unit_deviation[0, 0, 0])
         if not np.isfinite(noise + units):
             raise InputError("no impact was seen in the samples, expected less noise for a sensor")
@@ -146,7 +148,9 @@ def impact_time(
     if not 2 <= many <= _MOST_DOTS or not 2 <= others <= many:
         raise InputError(
             f"dots = {many} and units = {others}, expected 2 to {_MOST_DOTS} dots, and from 2"
-            " units to as many"
+            " units to as many",
+            key="dots",
+            value=many,
         )
     if not levels.size:
         scale = 10.0 if volts else _largest_current(hammer)

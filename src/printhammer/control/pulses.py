@@ -40,7 +40,9 @@ def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
             return float(times[int(np.argmax(faded))] - own.width)
     raise InputError(
         f"{hammer.path}: the current lasts {_SPAN * 2.0**_DOUBLINGS:g} times the width of the pulse, expected"
-        " a driver whose current decays sooner"
+        " a driver whose current decays sooner",
+        file=hammer.path,
+        key="waveform",
     )
 
 

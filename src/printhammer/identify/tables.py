@@ -71,33 +71,41 @@ def read_table(
     """
     source = Path(path)
     if not source.exists():
-        raise InputError(f"{source}: there is no such file, expected a table of measurements")
+        raise InputError(f"{source}: there is no such file, expected a table of measurements", file=source)
     sheet = read_sheet(source, "the table")
     lines = sheet.rows
     must = ",".join(f"{name} [{si}]" for name, si in columns.items())
     may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
     wanted = f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
     if not lines:
-        raise InputError(f"{source}: the file has no heading, expected {wanted}")
+        raise InputError(f"{source}: the file has no heading, expected {wanted}", file=source)
     names, units = _heading(source, lines[0], {**columns, **optional}, text, wanted)
     missing = [name for name in columns if name not in names]
     if missing:
         raise InputError(
-            f"{source}: line {lines[0][0]}: the column {missing[0]!r} is missing, expected {wanted}"
+            f"{source}: line {lines[0][0]}: the column {missing[0]!r} is missing, expected {wanted}",
+            file=source,
+            key=missing[0],
         )
     if len(lines) < 2:
-        raise InputError(f"{source}: the table has no rows, expected them below the heading")
+        raise InputError(f"{source}: the table has no rows, expected them below the heading", file=source)
     values: dict[str, FloatArray] = {name: np.empty(len(lines) - 1) for name in units}
     words: dict[str, list[str]] = {name: [] for name in names if name in text}
     for row, (number, cells) in enumerate(lines[1:]):
         if len(cells) != len(names):
-            raise InputError(f"{source}: line {number} has {len(cells)} cells, expected {len(names)}")
+            raise InputError(
+                f"{source}: line {number} has {len(cells)} cells, expected {len(names)}", file=source
+            )
         for name, cell in zip(names, cells, strict=True):
             where = f"{source}: line {number}, column {name!r}"
             if name in text:
                 word = cell.strip().lower()
                 if word not in text[name]:
-                    raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(text[name])}")
+                    raise InputError(
+                        f"{where}: {cell.strip()!r}, expected {' or '.join(text[name])}",
+                        file=where,
+                        value=cell,
+                    )
                 words[name].append(word)
             else:
                 values[name][row] = _number(cell, *units[name], where)
@@ -120,18 +128,27 @@ def _heading(
         name, unit = split_heading(cell)
         name = " ".join(name.lower().split())
         if name not in numbers and name not in text:
-            raise InputError(f"{where}: the column {cell.strip()!r} is not known, expected {wanted}")
+            raise InputError(
+                f"{where}: the column {cell.strip()!r} is not known, expected {wanted}",
+                file=where,
+                key=cell.strip(),
+            )
         if name in names:
-            raise InputError(f"{where}: the column {name!r} is given twice, expected it once")
+            raise InputError(
+                f"{where}: the column {name!r} is given twice, expected it once", file=where, key=name
+            )
         names.append(name)
         if name in text:
             if "[" in cell:
-                raise InputError(f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit")
+                raise InputError(
+                    f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit", file=where
+                )
             continue
         if not unit:
             such = f"{name} [{numbers[name]}]"
             raise InputError(
-                f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}"
+                f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}",
+                file=where,
             )
         with located(f"{where}: heading {cell.strip()!r}"):
             to_si(1.0, unit, numbers[name])
@@ -146,7 +163,9 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
         number = math.nan
     if not math.isfinite(number):
         raise InputError(
-            f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}"
+            f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}",
+            file=where,
+            value=cell,
         )
     with located(where):
         value = to_si(number, unit, si)
@@ -155,6 +174,8 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
     if abs(value) > LARGEST or (number != 0.0 and abs(value) < tiny):
         raise InputError(
             f"{where}: {cell.strip()} {unit}, expected a measured value, 0 or one of a magnitude from"
-            f" {tiny:.2g} to {LARGEST:g} {si}"
+            f" {tiny:.2g} to {LARGEST:g} {si}",
+            file=where,
+            value=cell,
         )
     return value

@@ -77,13 +77,15 @@ def _magic(path: Path) -> bytes:
         with path.open("rb") as file:
             return file.read(4)
     except OSError as error:
-        raise InputError(f"{path}: the measured map cannot be read ({error.strerror or error})") from None
+        raise InputError(
+            f"{path}: the measured map cannot be read ({error.strerror or error})", file=path
+        ) from None
 
 
 def _checked_times(times: npt.ArrayLike) -> FloatArray:
     grid = np.array(times, dtype=np.float64).reshape(-1)
     if not grid.size or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
-        raise InputError("times: expected ascending numbers, s")
+        raise InputError("times: expected ascending numbers, s", key="times")
     return grid
 
 
@@ -109,7 +111,9 @@ def _stored_records(path: Path) -> list[RateRecord]:
     if len(over) != 2 or "rate" not in over or dimensions["rate"] != ("rate",):
         raise InputError(
             f"{what}: displacement lies over {', '.join(over) or 'nothing'}, expected rate and one more"
-            " dimension"
+            " dimension",
+            file=what,
+            key="displacement",
         )
     if over[0] != "rate":
         x, over = x.T, over[::-1]
@@ -120,7 +124,9 @@ def _stored_records(path: Path) -> list[RateRecord]:
     elif dimensions["time"] != over:
         raise InputError(
             f"{what}: time lies over {', '.join(dimensions['time']) or 'nothing'}, expected {over[1]}, or"
-            f" rate and {over[1]}"
+            f" rate and {over[1]}",
+            file=what,
+            key="time",
         )
     records: dict[float, RateRecord] = {}
     for row, rate in enumerate(rates):
@@ -129,7 +135,9 @@ def _stored_records(path: Path) -> list[RateRecord]:
         if not known.any() or float(rate) in records:
             raise InputError(
                 f"{what}: {where}: rate {rate:.9g} Hz has no times or is given twice, expected one record for"
-                " each rate"
+                " each rate",
+                file=what,
+                key=where,
             )
         places = [f"{where}, sample {k + 1}" for k in np.flatnonzero(known)]
         records[float(rate)] = checked(what, float(rate), times[row][known], x[row][known], places)
@@ -153,17 +161,19 @@ def _opened(path: Path) -> Any:
         return xr.open_dataset(path, decode_times=False, **options)
     except Exception as error:  # noqa: BLE001 - the backends raise what they like
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path}: the measured map cannot be read ({reason[:200]})") from None
+        raise InputError(f"{path}: the measured map cannot be read ({reason[:200]})", file=path) from None
 
 
 def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
     if name not in stored.variables:
         there = ", ".join(map(str, stored.variables)) or "nothing"
-        raise InputError(f"{what}: expected the variable {name}, there is {there}")
+        raise InputError(f"{what}: expected the variable {name}, there is {there}", file=what, key=name)
     unit = stored[name].attrs.get("units")
     if not isinstance(unit, str):
         raise InputError(
-            f"{what}: {name} is expected to carry its unit in the attribute units, such as {_SI[name]!r}"
+            f"{what}: {name} is expected to carry its unit in the attribute units, such as {_SI[name]!r}",
+            file=what,
+            key=name,
         )
     try:
         factor = to_si(1.0, unit, _SI[name])
@@ -171,7 +181,11 @@ def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
     except InputError as error:
         raise InputError(f"{what}: {name}: {error}") from None
     except (OSError, TypeError, ValueError):
-        raise InputError(f"{what}: {name} is expected to hold numbers that can be read") from None
+        raise InputError(
+            f"{what}: {name} is expected to hold numbers that can be read", file=what, key=name
+        ) from None
     if np.isinf(values).any():
-        raise InputError(f"{what}: {name} is expected to hold finite numbers, or nan for a gap")
+        raise InputError(
+            f"{what}: {name} is expected to hold finite numbers, or nan for a gap", file=what, key=name
+        )
     return values

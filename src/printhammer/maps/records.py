@@ -73,7 +73,10 @@ class Cells:
             if not math.isfinite(values[k]):
                 raise InputError(
                     f"{self.what}: line {self.lines[k]}, column {name!r}: {text!r} is expected to be a finite"
-                    " number"
+                    " number",
+                    file=self.what,
+                    key=name,
+                    value=text,
                 )
         return values * factor
 
@@ -109,7 +112,12 @@ def checked(
         The rate is not positive, a time is given twice, or fewer than two displacements are known.
     """
     if not (math.isfinite(rate) and rate > 0.0):
-        raise InputError(f"{what}: {places[0]}: rate {rate:.9g} Hz is expected to be greater than 0 Hz")
+        raise InputError(
+            f"{what}: {places[0]}: rate {rate:.9g} Hz is expected to be greater than 0 Hz",
+            file=what,
+            key="rate",
+            value=rate,
+        )
     order = np.argsort(times, kind="stable")
     at, x = times[order], displacement[order]
     twice = np.flatnonzero(np.diff(at) == 0.0)
@@ -117,11 +125,13 @@ def checked(
         first, second = (places[order[twice[0] + k]] for k in (0, 1))
         raise InputError(
             f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz is given before, in {first},"
-            " expected one displacement for each time"
+            " expected one displacement for each time",
+            file=what,
+            key="time",
         )
     known = int(np.isfinite(x).sum())
     if known < 2:
-        raise InputError(f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2")
+        raise InputError(f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2", file=what)
     return RateRecord(rate, at, x)
 
 
@@ -141,7 +151,11 @@ def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[RateRecord]:
 def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateRecord]:
     columns = [k for k, (name, _unit) in enumerate(names) if name == "time"]
     if len(columns) != 1 or len(names) < 2:
-        raise InputError(f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}")
+        raise InputError(
+            f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}",
+            file=cells.what,
+            key="columns",
+        )
     times = cells.column(columns[0], "s", names[columns[0]][1])
     records: dict[float, RateRecord] = {}
     for k, (name, unit) in enumerate(names):
@@ -149,7 +163,9 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
             continue
         if name in _SI:
             raise InputError(
-                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}"
+                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}",
+                file=cells.what,
+                key="columns",
             )
         try:
             rate = parse(name, "Hz")
@@ -159,7 +175,9 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
             ) from None
         if rate in records:
             raise InputError(
-                f"{cells.what}: column {cells.heading[k]!r}: the rate {rate:.9g} Hz has two columns"
+                f"{cells.what}: column {cells.heading[k]!r}: the rate {rate:.9g} Hz has two columns",
+                file=cells.what,
+                key=cells.heading[k],
             )
         places = [f"line {line}, column {cells.heading[k]!r}" for line in cells.lines]
         x = cells.column(k, "m", unit, gaps=True)
@@ -171,7 +189,9 @@ def _named(what: str, cell: str) -> tuple[str, str]:
     """Split the cell of a heading into its name and its unit."""
     name, unit = split_heading(cell)
     if not unit:
-        raise InputError(f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'")
+        raise InputError(
+            f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'", file=what, key=cell
+        )
     return (name.lower() if name.lower() in _SI else name), unit
 
 
@@ -179,10 +199,12 @@ def _cells(path: Path) -> Cells:
     what = str(path)
     rows = read_sheet(path, "the measured map").rows
     if len(rows) < 2:
-        raise InputError(f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples")
+        raise InputError(
+            f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples", file=what
+        )
     heading = [cell.strip() for cell in rows[0][1]]
     for line, row in rows[1:]:
         if len(row) != len(heading):
-            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}")
+            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}", file=what)
     lines = np.array([line for line, _row in rows[1:]], dtype=np.int64)
     return Cells(what, heading, lines, [row for _line, row in rows[1:]])

@@ -105,8 +105,8 @@ def fresh_carry(pause_after: float = math.inf, beyond: Beyond = AT_REST) -> Floa
 def check_tolerance(tolerance: object) -> None:
     """Refuse a tolerance with which the integrator does not work."""
     if not (isinstance(tolerance, float | int) and LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE):
-        raise InputError(
-            f"tolerance = {tolerance!r}, expected a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"
+        raise InputError.of(
+            "tolerance", tolerance, f"a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"
         )
 
 
@@ -142,7 +142,9 @@ def constants_of(hammer: Hammer) -> FloatArray:
         room = layout.ROOM.get(role, len(constants))
         if len(constants) > room:
             raise InputError(
-                f"{hammer.path}: {role} has {len(constants)} packed constants, expected at most {room}"
+                f"{hammer.path}: {role} has {len(constants)} packed constants, expected at most {room}",
+                file=hammer.path,
+                key=role,
             )
         array[layout.PLACES[role] : layout.PLACES[role] + len(constants)] = constants
     return array

@@ -227,7 +227,9 @@ def make_plan(spec: Spec) -> Plan:
         dims, shape = (MEMBER,), (spec.members or 0,)
     members = math.prod(shape)
     if members > _MOST_MEMBERS:
-        raise InputError(f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}")
+        raise InputError(
+            f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}", file=spec.where
+        )
     whole = Plan(spec, shape, dims, Blocks.of(shape, members))
     most = spec.chunk
     if most is None:

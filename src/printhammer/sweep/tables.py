@@ -60,7 +60,9 @@ def read_quantity(written: Any, si: str, where: str) -> float:
         if si == "1":
             return to_si(written, "1", "1")
     raise InputError(
-        f"{where} = {shown(written)} has no unit, expected {describe(si)} as text such as '1 {si}'"
+        f"{where} = {shown(written)} has no unit, expected {describe(si)} as text such as '1 {si}'",
+        key=where,
+        value=written,
     )
 
 
@@ -73,16 +75,20 @@ def read_quantities(written: Any, si: str, where: str) -> list[float]:
         values = [{"value": value, "unit": unit} for value in column] if isinstance(column, list) else ()
     numbers = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
     if not numbers:
-        raise InputError(f"{where} = {shown(written)}: expected a list of quantities, at least one")
+        raise InputError.of(
+            where, written, "a list of quantities, at least one", written=shown(written), said=": expected"
+        )
     return numbers
 
 
 def _columns(table: Mapping[str, Any], names: tuple[str, str]) -> tuple[Any, str]:
     if set(table) != set(names):
-        raise InputError(f"{shown(dict(table))} is expected to have {names[0]} and {names[1]}")
+        raise InputError(
+            f"{shown(dict(table))} is expected to have {names[0]} and {names[1]}", value=dict(table)
+        )
     unit = table[names[1]]
     if not isinstance(unit, str):
-        raise InputError(f"the unit {shown(unit)} is expected to be text")
+        raise InputError(f"the unit {shown(unit)} is expected to be text", key="unit", value=unit)
     return table[names[0]], unit
 
 

@@ -157,7 +157,9 @@ class CurveTracer:
         if self.kind == GRAZING:
             if not near:
                 raise InputError(
-                    f"grazing at {start.first} = {start.value:.9g}: the orbit comes near no surface"
+                    f"grazing at {start.first} = {start.value:.9g}: the orbit comes near no surface",
+                    key=start.first,
+                    value=start.value,
                 )
             touch = near[0]
             return GrazingSystem(plane, touch.surface), np.array([touch.phase, start.value])

@@ -134,7 +134,8 @@ def launch(plant: Plant, forces: ForceMap) -> Launch:
     if not struck.any() or not speed[struck].min() <= wanted <= speed[struck].max():
         raise InputError(
             f"{plant.hammer.path}: no push of {driver.current:g} A from rest touches the pack at {wanted:.3g}"
-            " m/s, expected a stronger driver"
+            " m/s, expected a stronger driver",
+            file=plant.hammer.path,
         )
     order = np.argsort(speed[struck])
     width, time = (

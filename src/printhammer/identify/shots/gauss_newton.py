@@ -60,7 +60,9 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     sizes = np.sqrt((design * design).sum(axis=0))
     blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
     if blind:
-        raise InputError(f"{where}: nothing in the records depends on {blind[0]}, expected it not to be free")
+        raise InputError(
+            f"{where}: nothing in the records depends on {blind[0]}, expected it not to be free", file=where
+        )
     values, vectors = singular(design / sizes)
     if values[0] * _DEGENERATE > values[-1]:
         return
@@ -69,7 +71,8 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     listed = tied[0] if len(tied) == 1 else f"{', '.join(tied[:-1])} and {tied[-1]}"
     raise InputError(
         f"{where}: a motion cannot tell apart {listed}: changed together they leave the records as"
-        " they are, expected at least one of them to be held"
+        " they are, expected at least one of them to be held",
+        file=where,
     )
 
 

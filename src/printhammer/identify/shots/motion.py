@@ -85,9 +85,9 @@ def fit_motion(
         were fitted to it before; a constant cannot be found from it, or not be told apart from others.
     """
     if isinstance(paths, str) or not paths:
-        raise InputError(f"paths = {paths!r}, expected a sequence of at least one record")
+        raise InputError.of("paths", paths, "a sequence of at least one record")
     if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0.0):
-        raise InputError(f"bandwidth = {bandwidth!r} Hz, expected a positive number")
+        raise InputError.of("bandwidth", bandwidth, "a positive number", unit="Hz")
     for each in reversed(earlier):
         hammer = each.into(hammer)
     shots = [read_shot(path, hammer, bandwidth) for path in paths]
@@ -122,28 +122,33 @@ def _free_keys(
         return ("mass", _DAMPING) if touched and hertz else ("mass",)
     keys = (free,) if isinstance(free, str) else tuple(free)
     if not keys:
-        raise InputError("free: no constants are given, expected at least one such as 'mass'")
+        raise InputError("free: no constants are given, expected at least one such as 'mass'", key="free")
     where = " and ".join(shot.name for shot in shots)
     for number, key in enumerate(keys):
         if key in keys[:number]:
-            raise InputError(f"free: {key} is given twice, expected it once")
+            raise InputError(f"free: {key} is given twice, expected it once", key="free")
         given_otherwise = hertz and key in (_DAMPING, "backstop.stiffness")
         if (key not in hammer.constants and not given_otherwise) or key == "platen":
             known = [name for name in hammer.constants if name != "platen"]
             moving = nearest(key, known, "one such as 'mass'")
             raise InputError(
-                f"free: {key!r} is no constant of {hammer.path} that moves the armature, expected {moving}"
+                f"free: {key!r} is no constant of {hammer.path} that moves the armature, expected {moving}",
+                key="free",
             )
         if key == _DAMPING and not touched:
             raise InputError(
                 f"{where}: the record does not touch the backstop after the shot, expected one that does for"
-                f" {key}"
+                f" {key}",
+                file=where,
+                key=key,
             )
         fewest = max((touch.count for shot in shots for touch in shot.touching("backstop")), default=0)
         if key.startswith("backstop.") and touched and fewest < FEWEST:
             raise InputError(
                 f"{where}: {fewest} samples in the longest contact with the backstop, expected at least"
-                f" {FEWEST} for {key}"
+                f" {FEWEST} for {key}",
+                file=where,
+                key=key,
             )
     return keys
 
@@ -161,7 +166,11 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
     hammer = hammer.replace(changes) if changes else hammer
     for key in keys:
         if hammer.constants[key].si == 0.0:
-            raise InputError(f"{hammer.path}: {key} is 0, expected a value from which a fit can begin")
+            raise InputError(
+                f"{hammer.path}: {key} is 0, expected a value from which a fit can begin",
+                file=hammer.path,
+                key=key,
+            )
     return hammer
 
 
@@ -180,7 +189,8 @@ def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
         if print_ in used:
             raise InputError(
                 f"{path}: the constants of {hammer.path} were fitted to this record already, expected"
-                " another record, or the hammer from before that fit"
+                " another record, or the hammer from before that fit",
+                file=path,
             )
     return prints
 
@@ -193,7 +203,8 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
             if hammer.waveform is None:
                 raise InputError(
                     f"{shot.name}: neither the record has a column 'current [A]' nor {hammer.path} a"
-                    " waveform, expected one of them"
+                    " waveform, expected one of them",
+                    file=shot.name,
                 )
             pulses.append(None)
         else:

@@ -117,7 +117,8 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
     if square <= 0.0:
         raise InputError(
             f"{table.path}: at 0 A the force falls toward the magnet by no inverse root, expected a pull,"
-            " negative forces near the magnet and less of it farther away"
+            " negative forces near the magnet and less of it farther away",
+            file=table.path,
         )
     am = math.sqrt(square)
     strongest = float(current[np.argmax(np.abs(current))])
@@ -127,7 +128,8 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
     if bm <= 0.0:
         raise InputError(
             f"{table.path}: the pull grows with the current, expected currents counted positive where they"
-            " weaken it"
+            " weaken it",
+            file=table.path,
         )
     return np.array([c, am, bm, k])
 
@@ -181,7 +183,11 @@ def fit_magnet(
     table = read_table(path, {"displacement": "m", "current": "A", "force": "N"})
     alone = None if spring is None else read_table(spring, {"displacement": "m", "force": "N"})
     if alone is not None and position is None:
-        raise InputError(f"{alone.path}: the position of the backstop is missing, expected it with a spring")
+        raise InputError(
+            f"{alone.path}: the position of the backstop is missing, expected it with a spring",
+            file=alone.path,
+            key="position",
+        )
     data = _data(table, alone)
     x = data.abscissa
     # NaN where there is no magnet.
@@ -249,13 +255,16 @@ def _check(table: Readings, alone: Readings | None, zero: float, position: float
     if levels == 1:
         raise InputError(
             f"{table.path}: all forces are at {current[0]:.4g} A, expected 2 or more currents, or magnet.Bm"
-            " cannot be found"
+            " cannot be found",
+            file=table.path,
+            key="current",
         )
     places, needed = clusters(x), 3 if alone is not None else 4
     if 0 < places < needed:
         raise InputError(
             f"{table.path}: {places} different displacements, expected {needed} or more, or the pull cannot"
-            " be told from the spring"
+            " be told from the spring",
+            file=table.path,
         )
     near = x <= max(x.min(), position or 0.0) + 0.02 * np.ptp(x)
     if force[near].max() <= 0.0:

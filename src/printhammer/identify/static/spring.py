@@ -65,7 +65,8 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
     enough(data, _ROWS, "the two constants of the spring and their errors")
     if len(np.unique(x)) < 3:
         raise InputError(
-            f"{table.path}: {len(np.unique(x))} different displacements, expected 3 or more for a line"
+            f"{table.path}: {len(np.unique(x))} different displacements, expected 3 or more for a line",
+            file=table.path,
         )
     law = SpringLaw(x - position)
     solution = solved(data, law, start_of(table.path, x - position, force), robust=robust)
@@ -93,11 +94,13 @@ def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
     if not slope < 0.0:
         raise InputError(
             f"{path}: the spring force rises by {slope:.3g} N/m with the displacement, expected a force"
-            " toward the paper that falls"
+            " toward the paper that falls",
+            file=path,
         )
     if not height > 0.0:
         raise InputError(
             f"{path}: the spring force at the backstop is {height:.3g} N, expected a positive force, toward"
-            " the paper"
+            " the paper",
+            file=path,
         )
     return np.array([height, -height / slope])

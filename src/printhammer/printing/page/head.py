@@ -46,7 +46,7 @@ class Head(Declared):
             least = 0.0 if entry.name == "line_gap" else math.ulp(0.0)
             if isinstance(value, bool) or not (value >= least and math.isfinite(value)):
                 expected = "a positive number" if least else "a number not below 0"
-                raise InputError(f"head: {entry.name} = {value!r}, expected {expected}")
+                raise InputError.of(entry.name, value, expected, file="head")
 
     @property
     def line_pitch(self) -> float:
@@ -82,7 +82,7 @@ def head_of(
         than from wire to wire.
     """
     if wires < 1:
-        raise InputError(f"head: wires = {wires!r}, expected a positive number")
+        raise InputError.of("wires", wires, "a positive number", file="head")
     apart = _HEIGHT / wires
     usual = _STANDARD.get(wires, Head(wires, apart, apart, _THICKNESS * apart))
     return Head(

@@ -251,13 +251,15 @@ def print_page(
     """
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):
-        raise InputError(f"{what!r} is expected to be a pattern or a text")
+        raise InputError(f"{what!r} is expected to be a pattern or a text", value=what)
     slot_rate = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
-        raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most")
+        raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most", key="pattern")
     print_head = head_of(pattern.wires) if head is None else head
     if print_head.wires != pattern.wires:
-        raise InputError(f"head: {print_head.wires} wires, expected {pattern.wires} as the pattern has")
+        raise InputError(
+            f"head: {print_head.wires} wires, expected {pattern.wires} as the pattern has", key="head"
+        )
     bounds = PRESETS["slots"] if limits is None else limits
     single = nominal(hammer, waveform, tolerance=tolerance)
     if waveform is not None and strategy is open_loop:

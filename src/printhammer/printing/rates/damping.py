@@ -62,7 +62,11 @@ class Material(Declared):
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise InputError(f"kind = {self.kind!r} of a material, expected one of {', '.join(KINDS)}")
+            raise InputError(
+                f"kind = {self.kind!r} of a material, expected one of {', '.join(KINDS)}",
+                key="kind",
+                value=self.kind,
+            )
 
 
 def materials(hammer: Hammer, single: Nominal) -> list[Material]:
@@ -248,14 +252,22 @@ def damping_study(
     grid = rate_grid(first, last, step)
     bounds = Limits() if limits is None else limits
     if hammer.backstop is None:
-        raise InputError(f"{hammer.path}: the hammer has no backstop, expected one of some material")
+        raise InputError(
+            f"{hammer.path}: the hammer has no backstop, expected one of some material",
+            file=hammer.path,
+            key="backstop",
+        )
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":
-        raise InputError(f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current")
+        raise InputError(
+            f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current",
+            file=hammer.path,
+            key="waveform",
+        )
     single = nominal(hammer, tolerance=tolerance)
     tried = tuple(materials(hammer, single) if others is None else others)
     if not tried:
-        raise InputError("others: expected at least one material")
+        raise InputError("others: expected at least one material", key="others")
     made, fate = changed(hammer, [(material.changes, material.label) for material in tried])
     status = np.array(fate, "U17")
     values = {name: np.full(len(tried), np.nan) for name in _NUMBERS}

@@ -69,22 +69,31 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
     changes: dict[str, Any] = {}
     for key, value in asdict(by).items():
         if not math.isfinite(value) or (key != "travel" and value <= -1.0):
-            raise InputError(f"perturbation: {key} = {value!r} is expected to be finite and above -1")
+            raise InputError.of(
+                key, value, "finite and above -1", file="perturbation", said=" is expected to be"
+            )
     magnet, pack, backstop = hammer.magnet, hammer.pack, hammer.backstop
     if by.current or by.magnet:
         if not isinstance(magnet, InverseRootMagnet):
             raise InputError(
-                f"{hammer.path}: perturbation of current or magnet, expected a magnet of law 'inverse-root'"
+                f"{hammer.path}: perturbation of current or magnet, expected a magnet of law 'inverse-root'",
+                file=hammer.path,
             )
         changes["magnet.Bm"] = magnet.Bm * (1.0 + by.current)
         changes["magnet.Am"] = magnet.Am * (1.0 + by.magnet)
     if by.travel or by.forms:
         if pack is None:
-            raise InputError(f"{hammer.path}: perturbation of travel or forms, expected a hammer with a pack")
+            raise InputError(
+                f"{hammer.path}: perturbation of travel or forms, expected a hammer with a pack",
+                file=hammer.path,
+            )
         front = pack.front + by.travel
         if by.forms:
             if not isinstance(pack, PowerPack):
-                raise InputError(f"{hammer.path}: perturbation of forms, expected a pack of the law 'power'")
+                raise InputError(
+                    f"{hammer.path}: perturbation of forms, expected a pack of the law 'power'",
+                    file=hammer.path,
+                )
             front -= by.forms * pack.thickness
             changes["pack.thickness"] = pack.thickness * (1.0 + by.forms)
         changes["pack.front"] = front
@@ -97,7 +106,9 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
             changes["backstop.relaxation_time"] = backstop.relaxation_time * (1.0 + by.damping)
         else:
             raise InputError(
-                f"{hammer.path}: perturbation of damping, expected a backstop with damping or relaxation time"
+                f"{hammer.path}: perturbation of damping, expected a backstop with damping or"
+                " relaxation time",
+                file=hammer.path,
             )
     return hammer.replace(changes, source=f"perturbed: {by.name}") if changes else hammer
 
@@ -157,8 +168,8 @@ class Variability(Declared):
             most = math.inf if name == "travel" else 1.0 / WIDEST
             if not (math.isfinite(value) and 0.0 <= value < most):
                 limit = "" if name == "travel" else " and below 1/3"
-                raise InputError(
-                    f"variability: {name} = {value!r} is expected to be a number not below 0{limit}"
+                raise InputError.of(
+                    name, value, f"a number not below 0{limit}", file="variability", said=" is expected to be"
                 )
 
     @classmethod
@@ -203,7 +214,8 @@ class Variability(Declared):
                 every = ", ".join(dict.fromkeys(key for group in CONSTANTS[name] for key in group))
                 raise InputError(
                     f"{hammer.path}: variability of {name} = {value:g}, expected 0 for a hammer without any"
-                    f" of {every}"
+                    f" of {every}",
+                    file=hammer.path,
                 )
             spread |= {key: value if name == "travel" else value * abs(known[key].si) for key in there}
         return spread
@@ -227,7 +239,8 @@ class Variability(Declared):
                 return drawn[:count]
         raise InputError(
             f"{hammer.path}: {len(drawn)} of {_TRIES * count} hammers drawn with {self.text} rest at the"
-            " backstop, expected a smaller variability"
+            " backstop, expected a smaller variability",
+            file=hammer.path,
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:

@@ -242,11 +242,11 @@ class Results:
             return None
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or "not UTF-8"
-            raise InputError(f"{path}: the file cannot be read ({reason})") from None
+            raise InputError(f"{path}: the file cannot be read ({reason})", file=path) from None
         try:
             document = json.loads(text, parse_constant=_refuse)
         except ValueError as error:
-            raise InputError(f"{path}: expected JSON ({error})") from None
+            raise InputError(f"{path}: expected JSON ({error})", file=path) from None
         try:
             return model.model_validate(document)
         except ValidationError as error:

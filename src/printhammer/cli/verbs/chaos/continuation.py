@@ -29,7 +29,9 @@ def read_state(written: str, name: str) -> tuple[float, float]:
     parts = [part.strip() for part in written.split(",")]
     if len(parts) != 2:
         raise InputError(
-            f"{name} {written!r}: expected displacement and velocity, such as '46.2 um, 12 mm/s'"
+            f"{name} {written!r}: expected displacement and velocity, such as '46.2 um, 12 mm/s'",
+            key=name,
+            value=written,
         )
     return read_number(parts[0], "m", name), read_number(parts[1], "m/s", name)
 
@@ -87,9 +89,12 @@ def continue_(
 
     bounds = both(lowest, highest, "--from", "--to", parameter)
     if regimes and (period, rate, firings, state, second) != (None,) * 5:
-        raise InputError("--regimes: expected no --period, --rate, --firings, --state or --second beside it")
+        raise InputError(
+            "--regimes: expected no --period, --rate, --firings, --state or --second beside it",
+            key="--regimes",
+        )
     if regimes and parameter != "rate":
-        raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes")
+        raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes", key="--parameter")
     passed |= {"period": period, "rate": rate}
     firing = firing_of(job, hammer, passed, "--period '1.3 ms'", timed=not regimes)
     ends = None if second is None else both(second_from, second_to, "--second-from", "--second-to", second)
@@ -134,7 +139,10 @@ def continue_(
 def both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
     """Return both ends of a range; InputError where one is missing."""
     if low is None or high is None:
-        raise InputError(f"{first if low is None else last} is missing, expected the range of {parameter}")
+        raise InputError(
+            f"{first if low is None else last} is missing, expected the range of {parameter}",
+            key=first if low is None else last,
+        )
     return low, high
 
 
@@ -145,7 +153,7 @@ def _followed(
     from printhammer.chaos.continuation.regimes import follow_doublings
 
     if levels < 0:
-        raise InputError(f"doublings = {levels}, expected a whole number from 0 on")
+        raise InputError.of("doublings", levels, "a whole number from 0 on", written=str(levels))
     with job.counting("orbits", remaining=False) as tell:
         branch = continuation(hammer, parameter, bounds, progress=tell, **options)
     return follow_doublings(branch, levels, most=options["most"])

@@ -29,7 +29,11 @@ def read_event(written: str, name: str) -> int | str:
     if written.strip().isdecimal():
         return int(written)
     if written not in (*KINDS, FIRST, LAST):
-        raise InputError(f"{name} {written!r}: expected a number, {FIRST}, {LAST}, {' or '.join(KINDS)}")
+        raise InputError(
+            f"{name} {written!r}: expected a number, {FIRST}, {LAST}, {' or '.join(KINDS)}",
+            key=name,
+            value=written,
+        )
     return written
 
 
@@ -92,7 +96,9 @@ def curve(
     chosen: dict[str, Any] = {"event": event, "grid": (grid, grid), "most": most}
     if start is not None:
         if (firings, state) != (None, None):
-            raise InputError(f"--start {start}: expected no --firings and no --state beside it")
+            raise InputError(
+                f"--start {start}: expected no --firings and no --state beside it", key="--start"
+            )
         own = (
             None if lowest is None and highest is None else both(lowest, highest, "--from", "--to", parameter)
         )

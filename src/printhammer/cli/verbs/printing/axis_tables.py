@@ -35,7 +35,9 @@ def tuned_along(
 
     axis, values = _read(along)
     if "rate" not in options or "rates" in options:
-        raise InputError("--along is given without --rate, expected one rate, such as --rate 1.3kHz")
+        raise InputError(
+            "--along is given without --rate, expected one rate, such as --rate 1.3kHz", key="--along"
+        )
     check_endings(job.wanted["out"], (*opt.DATA, ".h"), "--out")
     with job.counting("tuning") as tell:
         made = tune_along(hammer, axis, values, progress=tell, **options)
@@ -53,7 +55,7 @@ def _read(written: str) -> tuple[str, list[float]]:
 
     axis, _, rest = written.strip().partition(" ")
     if axis not in AXES:
-        raise InputError(f"--along {written!r}: expected one of {', '.join(AXES)} first")
+        raise InputError(f"--along {written!r}: expected one of {', '.join(AXES)} first", key="--along")
     return axis, opt.between(opt.read_span(rest, f"--along {axis}"), AXES[axis].unit, f"--along {axis}")
 
 

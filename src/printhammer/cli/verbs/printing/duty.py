@@ -59,17 +59,21 @@ def duty(
             "none beside --rates",
         )
         if hammer is not None:
-            raise InputError(f"{hammer} is given, expected no hammer beside --rates")
+            raise InputError(
+                f"{hammer} is given, expected no hammer beside --rates", key="HAMMER", value=hammer
+            )
         with located(str(rates)):
             behind = thermal_limit(**read_rates(rates))
         return Answer(limit_shown(behind), files={"out": Content.of(behind)})
     from printhammer.control.duty import thermal_duty
 
     if (hammer is None) == (heat is None):
-        raise InputError("HAMMER and --heat: expected one of them, such as --heat '4 mJ'")
+        raise InputError("HAMMER and --heat: expected one of them, such as --heat '4 mJ'", key="HAMMER")
     for name in _NEEDED:
         if name not in passed:
-            raise InputError(f"--{name.replace('_', '-')} is missing, expected it beside the heat of a dot")
+            raise InputError(
+                f"--{name.replace('_', '-')} is missing, expected it beside the heat of a dot", key=name
+            )
     made = thermal_duty(heat if heat is not None else _fired(hammer, passed), **passed)
     return Answer(duty_shown(made), files={"out": Content.of(made)})
 
@@ -79,7 +83,9 @@ def _fired(name: str | None, passed: dict[str, Any]) -> Any:
     from printhammer.control.duty import heat_of
 
     if "feed" in passed:
-        raise InputError("--feed is given, expected it beside --heat only: a hammer has a driver of its own")
+        raise InputError(
+            "--feed is given, expected it beside --heat only: a hammer has a driver of its own", key="--feed"
+        )
     return heat_of(load_hammer(str(name), fired=True))
 
 

@@ -55,10 +55,12 @@ def energy(
     passed |= {"least": "heat" if heat else "positive work", "shape": "pulses" if pulses else "free"}
     current = any(path.suffix.lower() == ".csv" for path in job.outputs)
     if pulses and current:
-        raise InputError("--pulses is given, expected no current (.csv) beside it")
+        raise InputError("--pulses is given, expected no current (.csv) beside it", key="--pulses")
     if rates is not None:
         if supply or current:
-            raise InputError("--rates is given, expected neither --supply nor a current (.csv) beside it")
+            raise InputError(
+                "--rates is given, expected neither --supply nor a current (.csv) beside it", key="--rates"
+            )
         return _at_rates(job, hammer, rates, passed)
     with job.counting("dots planned") as tell:
         result = least_work(hammer, rate, progress=tell, **passed)

@@ -77,7 +77,7 @@ def print_(
     from printhammer.printing.page.pattern import BITMAPS
 
     if rate is None:
-        raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
+        raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'", key="--rate")
     often = read_positive(rate, "Hz", "--rate")
     if not job.outputs:
         *pages, last = (Path(name) for name in _USUAL)
@@ -113,15 +113,17 @@ def _pattern(
 
     if path is not None:
         if text is not None:
-            raise InputError("TEXT and --pattern: both are given, expected one of them")
+            raise InputError("TEXT and --pattern: both are given, expected one of them", key="--pattern")
         for name, value in (("--font", font), ("--columns", columns)):
             if value is not None:
                 raise InputError(
-                    f"{name} {value} is given beside --pattern {path}, expected with a text only"
+                    f"{name} {value} is given beside --pattern {path}, expected with a text only",
+                    key=name,
+                    value=value,
                 )
         return Pattern.load(path, wires)
     if text is None:
-        raise InputError("TEXT and --pattern: neither is given, expected one of them")
+        raise InputError("TEXT and --pattern: neither is given, expected one of them", key="--pattern")
     return Pattern.from_text(
         text.replace("\\n", "\n"),
         WIRES if wires is None else wires,

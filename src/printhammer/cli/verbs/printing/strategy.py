@@ -32,9 +32,11 @@ def chosen_strategy(
         this hammer.
     """
     if serial is not None and table is None:
-        raise InputError(f"--serial {serial}: expected a table that was learned, --table, beside it")
+        raise InputError(
+            f"--serial {serial}: expected a table that was learned, --table, beside it", key="--serial"
+        )
     if feedback and table is not None:
-        raise InputError(f"--table {table} and --feedback: expected one of them")
+        raise InputError(f"--table {table} and --feedback: expected one of them", key="--table")
     if table is not None:
         from printhammer.control.table.compensation import load_table
 

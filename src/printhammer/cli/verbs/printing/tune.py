@@ -70,9 +70,11 @@ def tune(
     from printhammer.control.table.tuning import tune as tuned
 
     if job.wanted["report"] and not judge:
-        raise InputError(f"--report {job.wanted['report'][0]} is given, expected none beside --no-judge")
+        raise InputError(
+            f"--report {job.wanted['report'][0]} is given, expected none beside --no-judge", key="--report"
+        )
     if "rate" in passed and "rates" in passed:
-        raise InputError("--rate and --rates are given, expected one of them")
+        raise InputError("--rate and --rates are given, expected one of them", key="--rate")
     if variability:
         from printhammer.printing.rates.variability import Variability
 
@@ -80,7 +82,9 @@ def tune(
     options = opt.given(tolerance=tolerance, threads=threads)
     if along is not None:
         if job.wanted["report"]:
-            raise InputError(f"--report {job.wanted['report'][0]} is given, expected none beside --along")
+            raise InputError(
+                f"--report {job.wanted['report'][0]} is given, expected none beside --along", key="--report"
+            )
         return tuned_along(job, hammer, along, opt.given(tick=tick), budget, {**passed, **options}, units)
     with job.counting("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)

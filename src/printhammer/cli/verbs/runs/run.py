@@ -95,11 +95,15 @@ def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
     beside = opt.given(**train)
     if file is not None:
         for name in beside:
-            raise InputError(f"--{name} is given beside --drive {file}, expected one or the other")
+            raise InputError(
+                f"--{name} is given beside --drive {file}, expected one or the other", key=f"--{name}"
+            )
         return load_drive(file, hammer.waveform)
     if hammer.waveform is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE"
+            f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE",
+            file=hammer.path,
+            key="waveform",
         )
     if "at" in beside:
         beside["at"] = [each.strip() for each in beside["at"].split(",")]

@@ -58,13 +58,13 @@ def sweep(
     from printhammer.sweep.spec import read_spec
 
     if spec is None:
-        raise InputError("SPEC is missing, expected a spec file; --example prints one")
+        raise InputError("SPEC is missing, expected a spec file; --example prints one", key="SPEC")
     if threads is not None and dask is not None:
-        raise InputError("--threads is given beside --dask, expected one or the other")
+        raise InputError("--threads is given beside --dask, expected one or the other", key="--threads")
     if check:
         return Answer(planned(make_plan(read_spec(spec))))
     if out is None:
-        raise InputError("--out is missing, expected a folder for the results")
+        raise InputError("--out is missing, expected a folder for the results", key="--out")
     from printhammer.sweep import sweep as run_sweep
 
     announce_compiling()
