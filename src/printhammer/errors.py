@@ -74,14 +74,22 @@ class InputError(PrinthammerError, ValueError):
         message = f"{where}{key} = {text}{said} {expected}"
         return cls(message, file=file, key=key, value=value, expected=str(expected))
 
-    def within(self, file: object = None, *, key: str | None = None) -> InputError:
-        """Return the error with a file, a key, or both before its message and its own file and key."""
-        before = [str(part) for part in (file, key) if part is not None]
-        places = [str(part) for part in (file, self.file) if part is not None]
+    def within(self, where: object, *, file: object = None, key: str | None = None) -> InputError:
+        """Return the error with words before its message, and its place in its fields.
+
+        Parameters
+        ----------
+        where : object
+            What stands before the message. It is the file where neither file nor key is given.
+        file, key : optional
+            The file and the key that the words name; before the file and the key of this error.
+        """
+        file = where if file is None and key is None else file
+        files = [str(part) for part in (file, self.file) if part is not None]
         keys = [part for part in (key, self.key) if part is not None]
         return InputError(
-            ": ".join([*before, str(self)]),
-            file=": ".join(places) or None,
+            f"{where}: {self}",
+            file=": ".join(files) or None,
             key=".".join(keys) or None,
             value=self.value,
             expected=self.expected,
@@ -89,12 +97,12 @@ class InputError(PrinthammerError, ValueError):
 
 
 @contextmanager
-def located(file: object = None, *, key: str | None = None) -> Iterator[None]:
-    """Begin the message of an `InputError` with the file or the key it comes from; see `within`."""
+def located(where: object, *, file: object = None, key: str | None = None) -> Iterator[None]:
+    """Begin the message of an `InputError` with where it comes from, such as a file or a key."""
     try:
         yield
     except InputError as error:
-        raise error.within(file, key=key) from None
+        raise error.within(where, file=file, key=key) from None
 
 
 def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
@@ -112,5 +120,6 @@ def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
 def missing_extra(needs: str, extra: str) -> InputError:
     """Return the error that says what is not installed, such as "a store needs zarr", and how to get it."""
     return InputError(
-        f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'"
+        f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'",
+        key=extra,
     )

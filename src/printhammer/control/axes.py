@@ -267,7 +267,7 @@ def tune_along(
     known, own = nominal(design, tolerance=DISPLAY_TOLERANCE), nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     fired = []
     for place in places:
-        with located(f"{axis} = {place:g} {AXES[axis].unit}"):
+        with located(f"{axis} = {place:g} {AXES[axis].unit}", key=axis):
             other = AXES[axis].change(design, place)
             pulse: Any = other.waveform
             fired.append(of_force(other, pulse, known.force, 0.5 * pulse.width, 1.5 * pulse.width))

@@ -229,7 +229,9 @@ def dead_time(
     rails = rails if rails.size else own.voltage * np.array([0.9, 1.0, 1.1])
     warm = warm if warm.size else np.array([20.0, 60.0, 100.0])
     if rails.size * warm.size > MOST:
-        raise InputError(f"{rails.size} rails and {warm.size} temperatures, expected at most {MOST} pairs")
+        raise InputError(
+            f"{rails.size} rails and {warm.size} temperatures, expected at most {MOST} pairs", key="rails"
+        )
     reference, reach = _reference(hammer, waveform, tolerance)
     wanted = reference.speed if blow is None else read_positive(blow, "m/s", "blow")
     shape = rails.size, warm.size

@@ -158,7 +158,7 @@ def impact_time(
     shape = levels.size, rates.size, widths.size
     total = int(np.prod(shape))
     if not 0 < total <= MOST:
-        raise InputError(f"{total} ways to sample are asked for, expected 1 to {MOST}")
+        raise InputError(f"{total} ways to sample are asked for, expected 1 to {MOST}", key="sampling")
     spread = Variability.of(hammer) if variability is None else variability
     drawn = spread.draw(hammer, others, first)
     rng = np.random.default_rng((first, 1))

@@ -49,7 +49,7 @@ from printhammer.drive.trains import Burst, Drive, PulseTrain, SineForce
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
 from printhammer.errors import InputError, located
-from printhammer.support.constants import options, quantities, sentence, shown
+from printhammer.support.constants import invalid, options, quantities, shown
 from printhammer.support.files import read_text
 
 _PLAIN: Final = {"pulses", "bursts", "waveforms"}
@@ -165,7 +165,7 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
 
 
 def _named(kind: str, maker: Callable[..., Drive], arguments: Mapping[str, Any]) -> Drive:
-    with located(kind):
+    with located(kind, key=kind):
         return maker(**arguments)
 
 
@@ -214,7 +214,7 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
     from printhammer.units import split, to_si
 
     if isinstance(value, str):
-        with located(where):
+        with located(where, key=where):
             number, unit = split(value, units[0])
     elif isinstance(value, dict):
         _known(value, {"value", "unit"}, where)
@@ -237,7 +237,7 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
     for si in units[1:]:
         with suppress(InputError):
             return to_si(number, unit, si), si
-    with located(where):
+    with located(where, key=where):
         return to_si(number, unit, units[0]), units[0]
 
 
@@ -315,7 +315,7 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     try:
         return model.model_validate(fields, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(sentence(error, model, f"{where}.")) from None
+        raise invalid(error, model, f"{where}.") from None
 
 
 def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
@@ -339,7 +339,9 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
     try:
         return Chain(parts=parts)
     except InputError as error:
-        raise InputError(f"{where}.{error}") from None
+        raise InputError(
+            f"{where}.{error}", key=f"{where}.{error.key}", value=error.value, expected=error.expected
+        ) from None
 
 
 def _switched(data: dict[str, Any], where: str) -> Switched:
@@ -367,8 +369,10 @@ def _switched(data: dict[str, Any], where: str) -> Switched:
     try:
         return Switched.model_validate(fields)
     except ValidationError as error:
-        fault = sentence(error, Switched, f"{where}.")
-        raise InputError(fault if fault.startswith(where) else f"{where}.{fault}") from None
+        fault = invalid(error, Switched, f"{where}.")
+        if str(fault).startswith(where):
+            raise fault from None
+        raise InputError(f"{where}.{fault}", key=f"{where}.{fault.key}", value=fault.value) from None
 
 
 def _samples(data: dict[str, Any], where: str) -> Waveform:

@@ -28,7 +28,7 @@ def read_number(value: float | str, si: str, name: str) -> float:
     if isinstance(value, str):
         from printhammer.units import parse
 
-        with located(name):
+        with located(name, key=name):
             return parse(value, si)
     try:
         number = math.nan if isinstance(value, bool) else float(value)

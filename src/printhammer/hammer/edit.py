@@ -81,7 +81,7 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
     if isinstance(value, Constant):
         return {"value": value.value, "unit": value.unit, "status": value.status, "source": value.source}
     if isinstance(value, str):
-        with located(key):
+        with located(key, key=key):
             number, unit = split(value, si_unit)
     else:
         try:

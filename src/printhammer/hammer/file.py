@@ -31,10 +31,10 @@ from printhammer.support.constants import (
     STATUSES,
     Constant,
     Quantity,
+    invalid,
     options,
     quantities,
     quantity,
-    sentence,
     shown,
 )
 
@@ -257,7 +257,7 @@ def _read(
     try:
         return model.model_validate(fields, strict=True, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(sentence(error, model, prefix, written)) from None
+        raise invalid(error, model, prefix, written) from None
 
 
 def _constant(key: str, written: Any, note: Quantity) -> Constant:
@@ -294,7 +294,7 @@ def _constant(key: str, written: Any, note: Quantity) -> Constant:
             said=": expected",
         )
     si_unit = si_unit_of(note, texts["unit"])
-    with located(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}"):
+    with located(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}", key=key):
         si = to_si(value, texts["unit"], si_unit)
     return Constant(
         key=key, value=value, **texts, si=si, meaning=note.meaning, symbol=note.symbol, si_unit=si_unit

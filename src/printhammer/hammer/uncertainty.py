@@ -118,7 +118,7 @@ def _texts(table: Mapping[str, Any], name: str) -> tuple[str, ...]:
 def _error(key: str, text: str, constant: Constant) -> float:
     from printhammer.units import parse
 
-    with located(f"{UNCERTAINTY}: the standard error of {key} = {text}"):
+    with located(f"{UNCERTAINTY}: the standard error of {key} = {text}", key=UNCERTAINTY):
         size = parse(text, constant.si_unit)
     if not 0.0 < size < float("inf"):
         raise InputError(

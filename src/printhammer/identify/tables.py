@@ -150,7 +150,7 @@ def _heading(
                 f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}",
                 file=where,
             )
-        with located(f"{where}: heading {cell.strip()!r}"):
+        with located(f"{where}: heading {cell.strip()!r}", file=where, key=cell.strip()):
             to_si(1.0, unit, numbers[name])
         units[name] = unit, numbers[name]
     return names, units

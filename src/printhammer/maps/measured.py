@@ -179,7 +179,7 @@ def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
         factor = to_si(1.0, unit, _SI[name])
         values = np.asarray(stored[name].values, dtype=np.float64) * factor
     except InputError as error:
-        raise InputError(f"{what}: {name}: {error}") from None
+        raise error.within(f"{what}: {name}", file=what, key=name) from None
     except (OSError, TypeError, ValueError):
         raise InputError(
             f"{what}: {name} is expected to hold numbers that can be read", file=what, key=name

@@ -58,7 +58,7 @@ class Cells:
             The unit is of another dimension, or a cell is no finite number, nor an allowed gap.
         """
         name = self.heading[index]
-        with located(f"{self.what}: column {name!r}"):
+        with located(f"{self.what}: column {name!r}", file=self.what, key=name):
             factor = to_si(1.0, unit, si)
         values = np.empty(len(self.rows))
         for k, row in enumerate(self.rows):
@@ -171,7 +171,10 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
             rate = parse(name, "Hz")
         except InputError as error:
             raise InputError(
-                f"{cells.what}: column {cells.heading[k]!r}: {error}; expected {_HEADINGS}"
+                f"{cells.what}: column {cells.heading[k]!r}: {error}; expected {_HEADINGS}",
+                file=cells.what,
+                key=cells.heading[k],
+                value=name,
             ) from None
         if rate in records:
             raise InputError(

@@ -68,7 +68,7 @@ def load_installed() -> None:
             entry.load()
         except Exception as error:
             where = f"the entry point {entry.name!r} = {entry.value!r} of {GROUP}"
-            raise InputError(f"{where} cannot be imported, {_sentence(error)}") from error
+            raise InputError(f"{where} cannot be imported, {_sentence(error)}", key=entry.name) from error
     for part in PARTS.values():
         check_functions(part, complete=True)
 

@@ -269,12 +269,12 @@ def _root(path: Path) -> dict[str, Any]:
         _ = root["attributes"][_ARRAYS]
     except (FileNotFoundError, NotADirectoryError):
         if path.exists():
-            raise InputError(other) from None
+            raise InputError(other, file=path) from None
         raise InputError(f"{path}: there is no such store", file=path) from None
     except OSError as error:
         raise InputError(f"{path}: the store cannot be read ({error.strerror or error})", file=path) from None
     except (ValueError, KeyError, TypeError):
-        raise InputError(other) from None
+        raise InputError(other, file=path) from None
     return root
 
 

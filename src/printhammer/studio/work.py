@@ -101,10 +101,10 @@ def try_out(
     motion = limited_run(state.changed, drive, end, most, tolerance)
     if motion.status == STEP_LIMIT:
         raise InputError(
-            f"{what} would take more than {most} steps for this hammer, expected fewer", key="steps"
+            f"{what} would take more than {most} steps for this hammer, expected fewer", key=what
         )
     if through and motion.status != "ok":
-        raise InputError(f"{what}: {motion.message}")
+        raise InputError(f"{what}: {motion.message}", key=what)
     return motion
 
 

@@ -244,12 +244,12 @@ def make_plan(spec: Spec) -> Plan:
 def _try(plan: Plan) -> None:
     """Refuse a sweep that cannot work: neither its first, middle nor last member can be made."""
     maker = Maker(plan.spec.base)
-    first: InputError | None = None
+    faults: list[InputError] = []
     for row in plan.rows([0, plan.members // 2, plan.members - 1]):
         try:
             maker.member(row)
         except InputError as error:
-            first = first or error
+            faults.append(error)
         else:
             return
-    raise InputError(f"{plan.spec.where}: {first}")
+    raise faults[0].within(plan.spec.where)

@@ -90,7 +90,7 @@ def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
     try:
         return _spec(tomllib.loads(text), text, where, folder)
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise error.within(where) from None
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where}: expected TOML ({' '.join(str(error).split())})", file=where) from None
 

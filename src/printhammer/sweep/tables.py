@@ -51,7 +51,7 @@ ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
 
 def read_quantity(written: Any, si: str, where: str) -> float:
     """Read one quantity into SI: "1.2 kHz" or { value = 1.2, unit = "kHz" }; a bare number if it is pure."""
-    with located(where):
+    with located(where, key=where):
         if isinstance(written, str):
             return parse(written, si)
         if isinstance(written, Mapping):
@@ -70,7 +70,7 @@ def read_quantities(written: Any, si: str, where: str) -> list[float]:
     """Read several quantities into SI: a list of what `read_quantity` takes, or values with one unit."""
     values: Iterable[Any] = written if isinstance(written, list) else ()
     if isinstance(written, Mapping):
-        with located(where):
+        with located(where, key=where):
             column, unit = _columns(written, ("values", "unit"))
         values = [{"value": value, "unit": unit} for value in column] if isinstance(column, list) else ()
     numbers = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
@@ -166,7 +166,7 @@ def read_tables(document: dict[str, Any]) -> SpecTable:
     try:
         return SpecTable.model_validate(document)
     except ValidationError as error:
-        raise InputError(_sentence(error)) from None
+        raise _fault(error) from None
 
 
 def schema() -> dict[str, Any]:
@@ -179,19 +179,23 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _sentence(error: ValidationError) -> str:
-    """Tell the first fault: key, value and what was expected."""
+def _fault(error: ValidationError) -> InputError:
+    """Return the first fault as an error: key, value and what was expected."""
     fault = error.errors(include_url=False)[0]
     key, table = _place(fault["loc"])
     if fault["type"] == "missing":
         field = table.model_fields.get(str(fault["loc"][-1]))
-        return f"{key} is missing, expected {(field.description if field else None) or 'a value'}"
+        wanted = (field.description if field else None) or "a value"
+        return InputError(f"{key} is missing, expected {wanted}", key=key, expected=wanted)
     if fault["type"] == "extra_forbidden":
         known = ", ".join(table.model_fields)
-        return f"the key {shown(key, quotes=False)} is not known, expected one of {known}"
+        return InputError(
+            f"the key {shown(key, quotes=False)} is not known, expected one of {known}", key=key
+        )
     wanted = fault["msg"].removeprefix("Input should be ")
     wanted = {"bool_type": "true or false", "string_type": "text in quotes"}.get(fault["type"], wanted)
-    return f"{key} = {shown(fault['input'])}: expected {wanted}"
+    value = fault["input"]
+    return InputError.of(key, value, wanted, written=shown(value), said=": expected")
 
 
 def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:

@@ -118,7 +118,7 @@ class CurveTracer:
                 watch=self.watch(system),
             )
         except InputError as error:
-            raise InputError(f"{at}: {error}") from None
+            raise error.within(at) from None
         nodes = curve.nodes
         pieces = [(system, nodes)]
         stops = list(curve.stops)

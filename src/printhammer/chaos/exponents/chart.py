@@ -219,7 +219,7 @@ def finite_time(
     if not wanted or sorted(set(wanted)) != wanted:
         raise InputError.of("lengths", lengths, "numbers of firings, ascending")
     if not known.ok:
-        raise InputError(f"the run ended early ({known.status}), expected one that did not")
+        raise InputError(f"the run ended early ({known.status}), expected one that did not", key="train")
     growth = known.factors[:, 0]
     if len(growth) < FEWEST * wanted[-1]:
         raise InputError(

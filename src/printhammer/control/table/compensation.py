@@ -442,4 +442,4 @@ def load_table(path: str | Path) -> CompensationTable:
     try:
         return CompensationTable(**read_table(text, target.suffix.lower()))
     except InputError as error:
-        raise InputError(f"{target}: {error}") from None
+        raise error.within(target) from None

@@ -248,7 +248,7 @@ def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str
     for key, value in sheet.driver.items():
         status, source = sheet.origin(f"driver.{key}")
         if key in known and isinstance(value, str):
-            with located(f"driver.{key}"):
+            with located(f"driver.{key}", key=f"driver.{key}"):
                 number, unit = split(value, known[key].si)
             table[key] = {"value": plain(number), "unit": unit, "status": status, "source": source}
         elif key != "shape":

@@ -212,7 +212,7 @@ def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
             written=shown(written),
             said=": expected",
         )
-    with located(key):
+    with located(key, key=key):
         value, unit = split(written if isinstance(written, str) else repr(written), si)
         size = to_si(value, unit, si)
     if size < 0.0 or (size == 0.0 and not zero):

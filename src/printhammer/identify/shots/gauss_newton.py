@@ -177,7 +177,7 @@ class GaussNewton:
         """Return the rows of data and priors over their standard errors, shape (m, p), at some values."""
         chains = self.shooting.chains(values, states, derivatives=True)
         if chains is None:
-            raise InputError(_NO_MOTION)
+            raise InputError(_NO_MOTION, key="motion")
         parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
         return self._weighted(values, parts, near=False).design
 
@@ -204,7 +204,7 @@ class GaussNewton:
         passed: list[tuple[float, float]] = []
         for _ in range(_MOST_STEPS):
             if chains is None:
-                raise InputError(_NO_MOTION)
+                raise InputError(_NO_MOTION, key="motion")
             parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
             here = self._weighted(values, parts, near=near, noise=noise)
             step = np.zeros(len(values))
@@ -236,10 +236,11 @@ class GaussNewton:
                 length *= 0.5
                 if length < _SHORTEST:
                     raise InputError(
-                        "the fit does not converge, expected constants nearer to the truth to begin with"
+                        "the fit does not converge, expected constants nearer to the truth to begin with",
+                        key="fit",
                     )
             values, states, chains = new, moved, trial
-        raise InputError(f"the fit has not converged after {_MOST_STEPS} steps")
+        raise InputError(f"the fit has not converged after {_MOST_STEPS} steps", key="fit")
 
     def _weighted(
         self,

@@ -250,7 +250,12 @@ def _check(table: Readings, alone: Readings | None, zero: float, position: float
     low = int(np.argmin(x))
     if x[low] <= zero:
         where = f"{table.path}: line {table.lines[low]}: displacement {x[low]:.6g} m"
-        raise InputError(f"{where}, expected more than {zero:g} m, where equation (3) ends")
+        raise InputError(
+            f"{where}, expected more than {zero:g} m, where equation (3) ends",
+            file=table.path,
+            key="displacement",
+            value=x[low],
+        )
     levels = clusters(current)
     if levels == 1:
         raise InputError(
@@ -268,7 +273,7 @@ def _check(table: Readings, alone: Readings | None, zero: float, position: float
         )
     near = x <= max(x.min(), position or 0.0) + 0.02 * np.ptp(x)
     if force[near].max() <= 0.0:
-        raise InputError(_never(table, float(x[near].max()), float(force[near].max())))
+        raise InputError(_never(table, float(x[near].max()), float(force[near].max())), file=table.path)
     return levels
 
 
@@ -289,7 +294,7 @@ def _releases(
     currents = np.unique(table.values["current"])
     best = float(law.at(p, np.full(len(currents), place), currents).max())
     if best <= 0.0:
-        raise InputError(_never(table, place, best))
+        raise InputError(_never(table, place, best), file=table.path)
 
 
 def _names(with_spring: bool, with_zero: bool) -> list[tuple[str, str, bool]]:

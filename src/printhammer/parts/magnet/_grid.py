@@ -135,7 +135,7 @@ def _heading(
                 file=what,
                 key=cell.strip(),
             )
-        with located(f"{what}: column {cell.strip()!r}"):
+        with located(f"{what}: column {cell.strip()!r}", file=what, key=cell.strip()):
             to_si(1.0, unit, columns[name])
         units[name] = unit
     if len(units) != len(columns) or len(cells) != len(columns):

@@ -102,7 +102,7 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     for place, column in enumerate(columns):
         if column.quantity:
             values = np.array([_number(row[place], f"{where}: row {line + k}") for k, row in enumerate(rows)])
-            with located(f"{where}: {column.name or column.quantity}"):
+            with located(f"{where}: {column.name or column.quantity}", file=where, key=column.name):
                 curves[column.quantity] = values * _factor(column.unit, QUANTITIES[column.quantity])
     times = curves.pop("time")
     if len(times) < 2 or (np.diff(times) <= 0.0).any():

@@ -161,14 +161,22 @@ def dropped_hammer(text: str) -> Hammer:
     # The time to read a key of many dots grows with the square of their number.
     if any(part.count(".") > bounds.MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
         most = bounds.MOST_DOTS
-        raise InputError(f"dropped file: expected a TOML file, without keys of more than {most} dots")
+        raise InputError(
+            f"dropped file: expected a TOML file, without keys of more than {most} dots", file="dropped file"
+        )
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"dropped file: expected a TOML file ({' '.join(str(error).split())})") from None
+        raise InputError(
+            f"dropped file: expected a TOML file ({' '.join(str(error).split())})", file="dropped file"
+        ) from None
     for name, section in document.items():
         if isinstance(section, Mapping) and "file" in section:
-            raise InputError(f"dropped file: {name}.file names another file, which the studio does not read")
+            raise InputError(
+                f"dropped file: {name}.file names another file, which the studio does not read",
+                file="dropped file",
+                key=f"{name}.file",
+            )
     hammer = Hammer.from_toml(text, name="dropped file")
     hammer.check()
     return hammer
