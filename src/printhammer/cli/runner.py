@@ -386,6 +386,8 @@ def firing_of(
         return {"drive": drive}
     if not isinstance(drive, PulseTrain) or drive.period is None:
         raise InputError(
-            f"{file}: expected a force without end, [sine], or pulses at a constant rate, [train]", file=file
+            f"{file}: expected a force without end, [sine], or pulses at a constant rate, [train]",
+            file=file,
+            key="drive",
         )
     return {"waveform": drive.waveform, "period": drive.period, "overlap": drive.overlap}

@@ -276,7 +276,9 @@ def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_F
             return fired, LONGEST * fired.time
         span *= 2.0
     raise InputError(
-        f"{hammer.path}: expected a hammer whose own pulse reaches what it strikes", file=hammer.path
+        f"{hammer.path}: expected a hammer whose own pulse reaches what it strikes",
+        file=hammer.path,
+        key="waveform",
     )
 
 

@@ -197,6 +197,7 @@ class ImpactEstimator:
         raise InputError(
             f"{self.hammer.path}: a single pulse makes no dot, expected a hammer that prints",
             file=self.hammer.path,
+            key="waveform",
         )
 
     def _without_pack(self, sampling: Sampling, fine: FloatArray) -> FloatArray:

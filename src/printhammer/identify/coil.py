@@ -84,7 +84,11 @@ def probe_current(
         hammer, state = hammer.replace("mass", _LOCKED), (locked, 0.0)
     run = simulate(hammer, PulseTrain(waveform), duration=float(fine[-1]), state=state, points=2)
     if not run.ok:
-        raise InputError(f"{hammer.path}: the current did not reach its end: {run.message}", file=hammer.path)
+        raise InputError(
+            f"{hammer.path}: the current did not reach its end: {run.message}",
+            file=hammer.path,
+            key="current",
+        )
     current = lowpass_lines(fine, run.driven_at(fine), tau)[::each]
     shown[t >= 0.0] = current[len(knots) - len(after) :]
     return shown
@@ -251,7 +255,9 @@ def _read(path: str | Path, hammer: Hammer, locked: float | None, bandwidth: flo
         )
     if not t[-1] > 0.0:
         raise InputError(
-            f"{table.path}: no time after 0 s, expected a record from switching on", file=table.path
+            f"{table.path}: no time after 0 s, expected a record from switching on",
+            file=table.path,
+            key="time",
         )
     if locked is None and "locked" in table.comments:
         locked = read_number(table.comments["locked"], "m", f"{table.path}: the comment 'locked'")
@@ -280,6 +286,7 @@ def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, Floa
         raise InputError(
             f"{trace.table.path}: there is no current or no voltage, expected a record of both",
             file=trace.table.path,
+            key="current",
         )
     resistance = trace.waveform.peak / float(current[top])
     rise = float(t[int(np.argmax(current > 0.5 * current[top]))])

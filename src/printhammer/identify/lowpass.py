@@ -35,7 +35,7 @@ def bandwidth_of(table: Readings) -> float | None:
     where = f"{table.path}: the comment 'bandwidth'"
     value = read_number(text, "Hz", where)
     if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{where}: {text}, expected a positive number", file=where)
+        raise InputError(f"{where}: {text}, expected a positive number", file=where, key="bandwidth")
     return value
 
 

@@ -387,5 +387,9 @@ def _agrees(hammer: Hammer, key: str, text: str) -> None:
     if not math.isclose(value, known.si, rel_tol=1e-9, abs_tol=0.0):
         written = f"{key} = {known.value!r} {known.unit}"
         raise InputError(
-            f"{hammer.path}: {written}, expected {text}, which the fit took as known", file=hammer.path
+            f"{hammer.path}: {written}, expected {text}, which the fit took as known",
+            file=hammer.path,
+            key=key,
+            value=known.value,
+            expected=text,
         )

@@ -78,7 +78,7 @@ def read_table(
     may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
     wanted = f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
     if not lines:
-        raise InputError(f"{source}: the file has no heading, expected {wanted}", file=source)
+        raise InputError(f"{source}: the file has no heading, expected {wanted}", file=source, key="heading")
     names, units = _heading(source, lines[0], {**columns, **optional}, text, wanted)
     missing = [name for name in columns if name not in names]
     if missing:
@@ -88,13 +88,17 @@ def read_table(
             key=missing[0],
         )
     if len(lines) < 2:
-        raise InputError(f"{source}: the table has no rows, expected them below the heading", file=source)
+        raise InputError(
+            f"{source}: the table has no rows, expected them below the heading", file=source, key="rows"
+        )
     values: dict[str, FloatArray] = {name: np.empty(len(lines) - 1) for name in units}
     words: dict[str, list[str]] = {name: [] for name in names if name in text}
     for row, (number, cells) in enumerate(lines[1:]):
         if len(cells) != len(names):
             raise InputError(
-                f"{source}: line {number} has {len(cells)} cells, expected {len(names)}", file=source
+                f"{source}: line {number} has {len(cells)} cells, expected {len(names)}",
+                file=source,
+                key=f"line {number}",
             )
         for name, cell in zip(names, cells, strict=True):
             where = f"{source}: line {number}, column {name!r}"
@@ -141,7 +145,9 @@ def _heading(
         if name in text:
             if "[" in cell:
                 raise InputError(
-                    f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit", file=where
+                    f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit",
+                    file=where,
+                    key=cell.strip(),
                 )
             continue
         if not unit:
@@ -149,6 +155,7 @@ def _heading(
             raise InputError(
                 f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}",
                 file=where,
+                key=cell.strip(),
             )
         with located(f"{where}: heading {cell.strip()!r}", file=where, key=cell.strip()):
             to_si(1.0, unit, numbers[name])

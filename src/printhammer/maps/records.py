@@ -131,7 +131,9 @@ def checked(
         )
     known = int(np.isfinite(x).sum())
     if known < 2:
-        raise InputError(f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2", file=what)
+        raise InputError(
+            f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2", file=what, key="rate"
+        )
     return RateRecord(rate, at, x)
 
 
@@ -203,11 +205,15 @@ def _cells(path: Path) -> Cells:
     rows = read_sheet(path, "the measured map").rows
     if len(rows) < 2:
         raise InputError(
-            f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples", file=what
+            f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples", file=what, key="rows"
         )
     heading = [cell.strip() for cell in rows[0][1]]
     for line, row in rows[1:]:
         if len(row) != len(heading):
-            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}", file=what)
+            raise InputError(
+                f"{what}: line {line} has {len(row)} cells, expected {len(heading)}",
+                file=what,
+                key=f"line {line}",
+            )
     lines = np.array([line for line, _row in rows[1:]], dtype=np.int64)
     return Cells(what, heading, lines, [row for _line, row in rows[1:]])

@@ -51,6 +51,7 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
             f"{where}: the {part.role} law {part.law!r} has no force, expected the function"
             f" {' or '.join(forces)}",
             file=where,
+            key="force",
         )
 
 

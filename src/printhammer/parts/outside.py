@@ -45,7 +45,9 @@ def load_parts(path: str | Path) -> list[type[Part]]:
     known = find_spec(name)
     if known is None or known.origin is None or Path(known.origin).resolve() != source:
         raise InputError(
-            f"{path}: a module of the name {name!r} is there already, expected another name", file=path
+            f"{path}: a module of the name {name!r} is there already, expected another name",
+            file=path,
+            key="module",
         )
     try:
         import_module(name)
@@ -54,7 +56,9 @@ def load_parts(path: str | Path) -> list[type[Part]]:
         raise InputError(f"{path}: cannot be imported, {_sentence(error)}", file=path) from error
     parts = [part for part in PARTS.values() if part.__module__ == name]
     if not parts:
-        raise InputError(f"{path}: registers no part, expected a class marked with @register", file=path)
+        raise InputError(
+            f"{path}: registers no part, expected a class marked with @register", file=path, key="part"
+        )
     for part in parts:
         check_functions(part, complete=True)
     return parts

@@ -342,7 +342,9 @@ def _read_json(source: Path) -> xr.Dataset:
     content = json.loads(source.read_text("utf-8"))
     columns = content.pop(_COLUMNS, None) if isinstance(content, dict) else None
     if not isinstance(columns, dict):
-        raise InputError(f"{source}: expected a result of printhammer, with {_COLUMNS}", file=source)
+        raise InputError(
+            f"{source}: expected a result of printhammer, with {_COLUMNS}", file=source, key="columns"
+        )
     data: dict[bool, dict[str, Any]] = {True: {}, False: {}}
     for name, entry in columns.items():
         dims, values = entry.pop("dims"), np.array(entry.pop("values"), dtype=entry.pop("dtype"))
@@ -373,7 +375,9 @@ def _read_csv(source: Path) -> pd.DataFrame:
     sheet = read_sheet(source, "the result", gaps=True)
     lengths = {len(cells) for _line, cells in sheet.rows}
     if len(lengths) != 1:
-        raise InputError(f"{source}: expected a heading, and rows with as many cells", file=source)
+        raise InputError(
+            f"{source}: expected a heading, and rows with as many cells", file=source, key="rows"
+        )
     (_line, heads), *rows = sheet.rows
     table = pd.DataFrame({head: _typed([cells[k] for _line, cells in rows]) for k, head in enumerate(heads)})
     attributes = {key: _number(_decoded(value)) for key, value in sheet.comments.items()}

@@ -157,6 +157,7 @@ class Store:
                     f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)},"
                     f" expected {asked}, or another place for the results",
                     file=self.path,
+                    key=name,
                 )
         self._handle = _locked(self.path, self.path)
 

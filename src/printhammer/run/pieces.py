@@ -112,6 +112,7 @@ def simulate_pieces(
         raise InputError(
             f"{hammers[0].path}: a voltage drives the coil, expected a current or a force where paper varies",
             file=hammers[0].path,
+            key="waveform",
         )
     fronts = [np.inf if hammer.front is None else hammer.front for hammer in hammers]
     ends = [*times[1:].tolist(), duration]

@@ -54,7 +54,9 @@ class SchemeProblem(Problem):
             raise InputError.of("step_scale", scale, "a positive number")
         if hammer.damping is not None:
             raise InputError(
-                f"{hammer.path}: the schemes of 1983 expect a hammer without [damping]", file=hammer.path
+                f"{hammer.path}: the schemes of 1983 expect a hammer without [damping]",
+                file=hammer.path,
+                key="damping",
             )
         if drive.quantity == "voltage":
             raise InputError(

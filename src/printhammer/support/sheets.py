@@ -53,7 +53,9 @@ def sheet_of(text: str, where: str, *, gaps: bool = False, delimiter: str = ",")
                 rows.append((reader.line_num, row))  # noqa: PERF401
     except csv.Error as error:
         raise InputError(
-            f"{where}: line {reader.line_num}: expected comma-separated values ({error})", file=where
+            f"{where}: line {reader.line_num}: expected comma-separated values ({error})",
+            file=where,
+            key=f"line {reader.line_num}",
         ) from None
     return Sheet(where, rows, comments)
 

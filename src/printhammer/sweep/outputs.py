@@ -160,7 +160,9 @@ def read_outputs(table: OutputsTable, firings: int) -> Outputs:
         end = read_quantity(table.displacement.end, "s", f"{where}.end")
         if not 0.0 <= start < end or table.displacement.count < 2:
             raise InputError(
-                f"{where}: expected at least 2 times from 0 s on, the end after the start", file=where
+                f"{where}: expected at least 2 times from 0 s on, the end after the start",
+                file=where,
+                key=where,
             )
         times = np.linspace(start, end, table.displacement.count)
         arrays.append(DISPLACEMENT)

@@ -228,7 +228,9 @@ def make_plan(spec: Spec) -> Plan:
     members = math.prod(shape)
     if members > _MOST_MEMBERS:
         raise InputError(
-            f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}", file=spec.where
+            f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}",
+            file=spec.where,
+            key="members",
         )
     whole = Plan(spec, shape, dims, Blocks.of(shape, members))
     most = spec.chunk

@@ -60,6 +60,7 @@ def run_chunk(
         raise InputError(
             f"{base.hammer.path}: a table that it names has changed since the sweep began",
             file=base.hammer.path,
+            key="table",
         )
     results = outputs.empty(len(rows))
     results["status"][:] = NO_HAMMER

@@ -152,7 +152,9 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
     needed = ("event_kind", "event_value", "event_x", "event_v", "event_phase", "firings")
     if any(name not in dataset for name in needed) or "parameter" not in notes:
         raise InputError(
-            f"{opened.path}: expected a branch or branches with their events, or a curve", file=opened.path
+            f"{opened.path}: expected a branch or branches with their events, or a curve",
+            file=opened.path,
+            key="branch",
         )
     if "branch" in dataset["event_kind"].dims:
         # Of several branches the first is meant, which is the one that was asked for.

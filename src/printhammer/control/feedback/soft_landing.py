@@ -136,6 +136,7 @@ def launch(plant: Plant, forces: ForceMap) -> Launch:
             f"{plant.hammer.path}: no push of {driver.current:g} A from rest touches the pack at {wanted:.3g}"
             " m/s, expected a stronger driver",
             file=plant.hammer.path,
+            key="current",
         )
     order = np.argsort(speed[struck])
     width, time = (

@@ -56,6 +56,7 @@ def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
             f"{hammer.path}: the hammer is not at rest {1e3 * _LONGEST:g} ms after a single pulse, expected"
             " one that settles on its backstop",
             file=hammer.path,
+            key="hammer",
         )
     return Single(known, float(dot.t_out), float(motion.t[place]))
 

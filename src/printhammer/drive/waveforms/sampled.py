@@ -47,7 +47,9 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
         t = np.asarray(times, dtype=np.float64)
         y = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{what}: the samples are expected to be numbers", file=what) from None
+        raise InputError(
+            f"{what}: the samples are expected to be numbers", file=what, key="samples"
+        ) from None
     if t.ndim != 1 or t.shape != y.shape:
         raise InputError(
             f"{what}: {t.size} times and {y.size} values, expected one value for each time",
@@ -98,13 +100,17 @@ def read_csv(path: Path) -> Samples:
     rows = read_sheet(path, "the sampled waveform").rows
     if not rows:
         raise InputError(
-            f"{what}: the file is empty, expected the heading {_HEADINGS} and at least 2 samples", file=what
+            f"{what}: the file is empty, expected the heading {_HEADINGS} and at least 2 samples",
+            file=what,
+            key="samples",
         )
     time_unit, name, unit = _heading(rows[0][1], what)
     columns: tuple[list[float], list[float]] = ([], [])
     for line, row in rows[1:]:
         if len(row) != 2:
-            raise InputError(f"{what}: line {line} has {len(row)} cells, expected 2", file=what)
+            raise InputError(
+                f"{what}: line {line} has {len(row)} cells, expected 2", file=what, key=f"line {line}"
+            )
         for cell, column in zip(row, columns, strict=True):
             column.append(finite(cell, f"{what}: line {line}"))
     return checked(
@@ -127,6 +133,7 @@ def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
             raise InputError(
                 f"{what}: heading {cell.strip()!r} is expected to carry its unit, such as 'time [us]'",
                 file=what,
+                key=cell.strip(),
             )
     names = tuple(name.lower() for name in names)
     for quantity in _UNITS:

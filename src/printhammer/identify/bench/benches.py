@@ -221,7 +221,9 @@ def motion(
     fine = np.arange(last * each + 1) / (rate * each)
     shot = simulate(hammer, PulseTrain(hammer.waveform), duration=max(float(fine[-1]), length), times=fine)
     if not shot.ok:
-        raise InputError(f"{hammer.path}: the shot did not reach its end: {shot.message}", file=hammer.path)
+        raise InputError(
+            f"{hammer.path}: the shot did not reach its end: {shot.message}", file=hammer.path, key="waveform"
+        )
     tau = time_constant(sensor.bandwidth)
     shown = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
     after = t >= 0.0
@@ -367,12 +369,16 @@ def _rebound(bare: Hammer, speed: float) -> float:
         run = simulate(bare, idle, duration=duration, state=(bare.origin + _RUN_UP, -speed), points=2)
         if not run.ok:
             raise InputError(
-                f"{bare.path}: the rebound at {speed:.6g} m/s did not end: {run.message}", file=bare.path
+                f"{bare.path}: the rebound at {speed:.6g} m/s did not end: {run.message}",
+                file=bare.path,
+                key="speeds",
             )
         left = run.contacts[0].v_out if run.contacts else None
         if left is not None:
             return float(left)
         duration *= 2.0
     raise InputError(
-        f"{bare.path}: the armature does not come back from the backstop at {speed:.6g} m/s", file=bare.path
+        f"{bare.path}: the armature does not come back from the backstop at {speed:.6g} m/s",
+        file=bare.path,
+        key="speeds",
     )

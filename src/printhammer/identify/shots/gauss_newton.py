@@ -61,7 +61,9 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
     if blind:
         raise InputError(
-            f"{where}: nothing in the records depends on {blind[0]}, expected it not to be free", file=where
+            f"{where}: nothing in the records depends on {blind[0]}, expected it not to be free",
+            file=where,
+            key="free",
         )
     values, vectors = singular(design / sizes)
     if values[0] * _DEGENERATE > values[-1]:
@@ -73,6 +75,7 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
         f"{where}: a motion cannot tell apart {listed}: changed together they leave the records as"
         " they are, expected at least one of them to be held",
         file=where,
+        key="free",
     )
 
 

@@ -191,6 +191,7 @@ def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
                 f"{path}: the constants of {hammer.path} were fitted to this record already, expected"
                 " another record, or the hammer from before that fit",
                 file=path,
+                key="record",
             )
     return prints
 
@@ -205,6 +206,7 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
                     f"{shot.name}: neither the record has a column 'current [A]' nor {hammer.path} a"
                     " waveform, expected one of them",
                     file=shot.name,
+                    key="current",
                 )
             pulses.append(None)
         else:

@@ -96,10 +96,13 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
         raise InputError(
             f"{name}: line {table.lines[bad[0] + 1]}: time {t[bad[0] + 1]:.9g} s, expected ascending times",
             file=name,
+            key="time",
         )
     if len(t) < 4 * FEWEST:
         raise InputError(
-            f"{name}: {len(t)} samples, expected the record of a whole shot, {4 * FEWEST} at least", file=name
+            f"{name}: {len(t)} samples, expected the record of a whole shot, {4 * FEWEST} at least",
+            file=name,
+            key="samples",
         )
     noise = noise_of_record(x)
     touches, smooth, clear = find_touches(t, x, noise, hammer)
@@ -175,6 +178,7 @@ def _check(
             f"{name}: the record begins at {_us(t[0])} with the armature {_um(start)} off the backstop,"
             " expected a record from the firing at rest on",
             file=name,
+            key="start",
         )
     if hammer.front is None:
         return
@@ -184,11 +188,13 @@ def _check(
             f"{name}: the record misses the impact: its largest displacement is {_um(float(smooth.max()))},"
             f" expected a record that goes beyond the front of the pack at {_um(hammer.front)}",
             file=name,
+            key="displacement",
         )
     if packs[0].last == len(t) - 1:
         raise InputError(
             f"{name}: the record ends at {_us(t[-1])} inside the pack, expected a record of the whole impact",
             file=name,
+            key="end",
         )
     if packs[0].count < FEWEST:
         spacing = float(np.median(np.diff(t)))
@@ -196,6 +202,7 @@ def _check(
             f"{name}: {packs[0].count} samples in the pack, one every {_us(spacing)}, expected at least"
             f" {FEWEST} in a contact",
             file=name,
+            key="pack",
         )
 
 

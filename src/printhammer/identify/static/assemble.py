@@ -147,6 +147,7 @@ def solved(data: Data, law: Law, start: FloatArray, *, robust: bool) -> Solution
             f"{files}: no constants of the law come near the data, line {data.lines[error.row]} lies farthest"
             f" off, expected rows in the order of the measurement, and none too far from the others",
             file=files,
+            key=f"line {data.lines[error.row]}",
         ) from None
 
 
@@ -286,7 +287,13 @@ def enough(data: Data, needed: int, what: str) -> None:
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
         raise InputError(
-            f"{where}: {len(data.values)} rows, too few for {what}, expected {needed} or more", file=where
+            f"{where}: {len(data.values)} rows, too few for {what}, expected {needed} or more",
+            file=where,
+            key="rows",
         )
     if not np.any(data.values):
-        raise InputError(f"{where}: every {data.axes[1][0]} is 0, expected measured values", file=where)
+        raise InputError(
+            f"{where}: every {data.axes[1][0]} is 0, expected measured values",
+            file=where,
+            key=data.axes[1][0],
+        )

@@ -201,12 +201,14 @@ def fit_backstop(
             f"{table.path}: impact speeds from {speed.min():.4g} to {speed.max():.4g} m/s, expected a span of"
             f" {_SPAN:g} times or more, or the restitution law cannot be tested",
             file=table.path,
+            key="impact speed",
         )
     middle = float(np.median(back / speed))
     if middle >= 1.0:
         raise InputError(
             f"{table.path}: rebounds are {middle:.3g} times as fast as impacts, expected them slower",
             file=table.path,
+            key="rebound speed",
         )
     law = RestitutionLaw(speed)
     start = np.array([damping_from_restitution(1.0, middle, float(np.median(speed)))])

@@ -119,6 +119,7 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
             f"{table.path}: at 0 A the force falls toward the magnet by no inverse root, expected a pull,"
             " negative forces near the magnet and less of it farther away",
             file=table.path,
+            key="force",
         )
     am = math.sqrt(square)
     strongest = float(current[np.argmax(np.abs(current))])
@@ -130,6 +131,7 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
             f"{table.path}: the pull grows with the current, expected currents counted positive where they"
             " weaken it",
             file=table.path,
+            key="current",
         )
     return np.array([c, am, bm, k])
 
@@ -270,10 +272,13 @@ def _check(table: Readings, alone: Readings | None, zero: float, position: float
             f"{table.path}: {places} different displacements, expected {needed} or more, or the pull cannot"
             " be told from the spring",
             file=table.path,
+            key="displacement",
         )
     near = x <= max(x.min(), position or 0.0) + 0.02 * np.ptp(x)
     if force[near].max() <= 0.0:
-        raise InputError(_never(table, float(x[near].max()), float(force[near].max())), file=table.path)
+        raise InputError(
+            _never(table, float(x[near].max()), float(force[near].max())), file=table.path, key="force"
+        )
     return levels
 
 
@@ -294,7 +299,7 @@ def _releases(
     currents = np.unique(table.values["current"])
     best = float(law.at(p, np.full(len(currents), place), currents).max())
     if best <= 0.0:
-        raise InputError(_never(table, place, best), file=table.path)
+        raise InputError(_never(table, place, best), file=table.path, key="force")
 
 
 def _names(with_spring: bool, with_zero: bool) -> list[tuple[str, str, bool]]:

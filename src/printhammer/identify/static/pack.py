@@ -99,6 +99,7 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 f" {from_si(float(depth[rows[0]]), 'm', 'um'):.4g} to"
                 f" {from_si(float(depth[rows[-1]]), 'm', 'um'):.4g} um, expected one that grows",
                 file=table.path,
+                key="indentation",
             )
         order = rows[np.argsort(depth[rows], kind="stable")]
         # Running medians, of as many values as there are enough for, pass single outliers over.
@@ -119,6 +120,7 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 f"{table.path}: the force of the loading branch falls from {high} to {low}, expected one that"
                 " grows",
                 file=table.path,
+                key="force",
             )
 
 
@@ -225,6 +227,7 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
         raise InputError(
             f"{table.path}: no rows of unloading, expected some, or their exponent cannot be found",
             file=table.path,
+            key="rows",
         )
     solution = solved(data, law, _start(law, table), robust=robust)
     _check_turns(law, table, solution)
@@ -253,6 +256,7 @@ def _start(law: PackLaw, table: Readings) -> FloatArray:
             f"{table.path}: {len(rows)} rows of loading inside the pack, expected {_LOADING_ROWS} or more, or"
             " the stiffness cannot be found",
             file=table.path,
+            key="rows",
         )
     deep = rows[np.argsort(law.log_r[rows], kind="stable")[len(rows) // 2 :]]
     stiffness = float(np.median(force[deep] * np.exp(-LOADING * law.log_r[deep])))
@@ -261,6 +265,7 @@ def _start(law: PackLaw, table: Readings) -> FloatArray:
             f"{table.path}: the forces of loading are not positive, expected magnitudes, whatever their"
             " direction",
             file=table.path,
+            key="force",
         )
     turns = [law.log_r[law.inside & (cycles.cycle == turn)].max() for turn in law.turns]
     return np.array([stiffness, *turns, *([LOADING, UNLOADING] if law.free else [])])
@@ -275,6 +280,7 @@ def _check_turns(law: PackLaw, table: Readings, solution: Solution) -> None:
                 f"{table.path}: lines {table.lines[rows[0]]} to {table.lines[rows[-1]]} are a load cycle"
                 " whose loading and unloading do not meet, expected rows in the order of the measurement",
                 file=table.path,
+                key="rows",
             )
 
 

@@ -67,6 +67,7 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
         raise InputError(
             f"{table.path}: {len(np.unique(x))} different displacements, expected 3 or more for a line",
             file=table.path,
+            key="displacement",
         )
     law = SpringLaw(x - position)
     solution = solved(data, law, start_of(table.path, x - position, force), robust=robust)
@@ -96,11 +97,13 @@ def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
             f"{path}: the spring force rises by {slope:.3g} N/m with the displacement, expected a force"
             " toward the paper that falls",
             file=path,
+            key="force",
         )
     if not height > 0.0:
         raise InputError(
             f"{path}: the spring force at the backstop is {height:.3g} N, expected a positive force, toward"
             " the paper",
             file=path,
+            key="force",
         )
     return np.array([height, -height / slope])

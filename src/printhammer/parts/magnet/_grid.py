@@ -52,17 +52,22 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str)
                 f"{what}: the point {x!r} m, {current!r} A, {value!r} {UNITS[quantity]} is expected to be"
                 " finite",
                 file=what,
+                key="point",
             )
         if (x, current) in points:
             raise InputError(
-                f"{what}: the point {x:.9g} m, {current:.9g} A is given twice, expected once", file=what
+                f"{what}: the point {x:.9g} m, {current:.9g} A is given twice, expected once",
+                file=what,
+                key="point",
             )
         points[x, current] = value
     xs = sorted({x for x, _ in points})
     currents = sorted({current for _, current in points})
     for name, values in (("displacements", xs), ("currents", currents)):
         if len(values) < 2:
-            raise InputError(f"{what}: {len(values)} different {name}, expected at least 2", file=what)
+            raise InputError(
+                f"{what}: {len(values)} different {name}, expected at least 2", file=what, key=name
+            )
     for x in xs:
         for current in currents:
             if (x, current) not in points:
@@ -70,6 +75,7 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str)
                     f"{what}: the point {x:.9g} m, {current:.9g} A is missing, expected a complete grid of "
                     f"{len(xs)} displacements and {len(currents)} currents",
                     file=what,
+                    key="point",
                 )
     if not currents[0] <= 0.0 <= currents[-1]:
         span = f"{currents[0]:.9g} to {currents[-1]:.9g} A"
@@ -102,13 +108,16 @@ def read_csv(path: Path, quantity: str) -> Grid:
         raise InputError(
             f"{what}: the file is empty, expected the heading {heading!r} and a grid of {quantity}s",
             file=what,
+            key="heading",
         )
     order, units = _heading(lines[0][1], what, columns, heading)
     rows = []
     for number, cells in lines[1:]:
         if len(cells) != len(order):
             raise InputError(
-                f"{what}: line {number} has {len(cells)} cells, expected {len(order)}", file=what
+                f"{what}: line {number} has {len(cells)} cells, expected {len(order)}",
+                file=what,
+                key=f"line {number}",
             )
         row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
         with located(f"{what}: line {number}"):
@@ -140,7 +149,7 @@ def _heading(
         units[name] = unit
     if len(units) != len(columns) or len(cells) != len(columns):
         listed = ",".join(cell.strip() for cell in cells)
-        raise InputError(f"{what}: the heading is {listed!r}, expected {heading!r}", file=what)
+        raise InputError(f"{what}: the heading is {listed!r}, expected {heading!r}", file=what, key="heading")
     return list(units), units
 
 
@@ -219,6 +228,7 @@ class GridMagnet(MagnetPart):
                 f"{what}: expected {len(x)} rows of {len(current)} {cls.quantity}s, one for each x and"
                 " current",
                 file=what,
+                key="rows",
             )
         rows = [
             (float(a), float(b), float(value))

@@ -194,6 +194,7 @@ class LinkageTableMagnet(GridMagnet):
                         f"{where}: at {x:.9g} m the linkage goes from {row[k]:.9g} to {row[k + 1]:.9g} Wb"
                         f" between {table.current[k]:.9g} and {table.current[k + 1]:.9g} A, {ending}",
                         file=where,
+                        key="linkage",
                     )
         # Least slope of the spline in each cell of the currents, at five places in each cell along x.
         places = np.linspace(0.0, 1.0, 5) * np.diff(table.x)[:, None]
@@ -211,6 +212,7 @@ class LinkageTableMagnet(GridMagnet):
                     f"{where}: at {table.x[i] + places[i, k]:.9g} m the spline through the linkages falls"
                     f" about {current:.9g} A, {ending}",
                     file=where,
+                    key="linkage",
                 )
 
     @cached_property

@@ -57,7 +57,9 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     motion = simulate(hammer, PulseTrain(pulse), duration=wait_of(pulse), points=2, tolerance=tolerance)
     if not motion.ok:
         raise InputError(
-            f"{hammer.path}: the run of a single pulse ends early: {motion.message}", file=hammer.path
+            f"{hammer.path}: the run of a single pulse ends early: {motion.message}",
+            file=hammer.path,
+            key="pulse",
         )
     dot = motion.dots[0]
     values = (dot.peak_force, dot.flight_time, dot.impact_speed, dot.indentation)
@@ -65,7 +67,9 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     known = [value for value in (*values, *energies) if value is not None]
     if len(known) < len(values) + len(energies) or not known[0] > 0.0:
         raise InputError(
-            f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints", file=hammer.path
+            f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints",
+            file=hammer.path,
+            key="pulse",
         )
     return Nominal(*known)
 

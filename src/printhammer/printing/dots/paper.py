@@ -105,7 +105,9 @@ class Paper(Declared):
         for key, value in spread.items():
             if value and key not in hammer.constants:
                 raise InputError(
-                    f"{hammer.path}: paper that varies, expected a hammer with {key}", file=hammer.path
+                    f"{hammer.path}: paper that varies, expected a hammer with {key}",
+                    file=hammer.path,
+                    key=key,
                 )
         if not any(spread.values()):
             return (hammer,) * slots

@@ -128,7 +128,9 @@ def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
         down = max(0, *(math.ceil(box[3]) for box in boxes))
         if up + down <= wires:
             return font, up
-    raise InputError(f"{path}: {wires} wires are too few for this font, expected more", file=path)
+    raise InputError(
+        f"{path}: {wires} wires are too few for this font, expected more", file=path, key="wires"
+    )
 
 
 @lru_cache(maxsize=16)

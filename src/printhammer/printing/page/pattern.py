@@ -132,6 +132,7 @@ def _bitmap(path: Path, wires: int) -> BoolArray:
                 raise InputError(
                     f"{path}: {image.width} x {image.height} pixels, expected at most {_MOST_PIXELS}",
                     file=path,
+                    key="pixels",
                 )
             pixels = np.asarray(image.convert("LA"))
     except (OSError, ValueError, SyntaxError) as error:

@@ -78,6 +78,7 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
             raise InputError(
                 f"{hammer.path}: perturbation of current or magnet, expected a magnet of law 'inverse-root'",
                 file=hammer.path,
+                key="magnet",
             )
         changes["magnet.Bm"] = magnet.Bm * (1.0 + by.current)
         changes["magnet.Am"] = magnet.Am * (1.0 + by.magnet)
@@ -86,6 +87,7 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
             raise InputError(
                 f"{hammer.path}: perturbation of travel or forms, expected a hammer with a pack",
                 file=hammer.path,
+                key="travel",
             )
         front = pack.front + by.travel
         if by.forms:
@@ -93,6 +95,7 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
                 raise InputError(
                     f"{hammer.path}: perturbation of forms, expected a pack of the law 'power'",
                     file=hammer.path,
+                    key="forms",
                 )
             front -= by.forms * pack.thickness
             changes["pack.thickness"] = pack.thickness * (1.0 + by.forms)
@@ -109,6 +112,7 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
                 f"{hammer.path}: perturbation of damping, expected a backstop with damping or"
                 " relaxation time",
                 file=hammer.path,
+                key="damping",
             )
     return hammer.replace(changes, source=f"perturbed: {by.name}") if changes else hammer
 
@@ -216,6 +220,7 @@ class Variability(Declared):
                     f"{hammer.path}: variability of {name} = {value:g}, expected 0 for a hammer without any"
                     f" of {every}",
                     file=hammer.path,
+                    key=name,
                 )
             spread |= {key: value if name == "travel" else value * abs(known[key].si) for key in there}
         return spread
@@ -241,6 +246,7 @@ class Variability(Declared):
             f"{hammer.path}: {len(drawn)} of {_TRIES * count} hammers drawn with {self.text} rest at the"
             " backstop, expected a smaller variability",
             file=hammer.path,
+            key="variability",
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:

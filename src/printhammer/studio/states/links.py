@@ -115,13 +115,19 @@ def read_file(text: str, where: str, shelf: Shelf) -> Told:
         It is no state file.
     """
     if len(text) > LARGEST_MESSAGE:
-        raise InputError(f"{where}: {len(text)} characters, expected at most {LARGEST_MESSAGE}", file=where)
+        raise InputError(
+            f"{where}: {len(text)} characters, expected at most {LARGEST_MESSAGE}",
+            file=where,
+            key="characters",
+        )
     try:
         content = json.loads(text)
     except (ValueError, RecursionError):
         content = None
     if not isinstance(content, dict) or content.get("kind") != _KIND:
-        raise InputError(f"{where}: expected a state file of the studio, as its export saves it", file=where)
+        raise InputError(
+            f"{where}: expected a state file of the studio, as its export saves it", file=where, key="state"
+        )
     if content.get("format") != FORMAT:
         raise InputError.of(
             "format",

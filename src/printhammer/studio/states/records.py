@@ -78,7 +78,9 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     if told is not None:
         if len(told) != len(columns):
             raise InputError(
-                f"{where}: {len(columns)} columns, expected as many answers, not {len(told)}", file=where
+                f"{where}: {len(columns)} columns, expected as many answers, not {len(told)}",
+                file=where,
+                key="columns",
             )
         columns = [
             column._replace(quantity=what, unit=unit)
@@ -91,12 +93,15 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     for quantity in QUANTITIES:
         if known.count(quantity) > 1:
             raise InputError(
-                f"{where}: {known.count(quantity)} columns of {quantity}, expected one", file=where
+                f"{where}: {known.count(quantity)} columns of {quantity}, expected one",
+                file=where,
+                key=quantity,
             )
     if "time" not in known or not set(known) - {"time", ""}:
         raise InputError(
             f"{where}: expected a column of time and one of displacement, current, force or voltage",
             file=where,
+            key="time",
         )
     curves = {}
     for place, column in enumerate(columns):
@@ -106,7 +111,7 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
                 curves[column.quantity] = values * _factor(column.unit, QUANTITIES[column.quantity])
     times = curves.pop("time")
     if len(times) < 2 or (np.diff(times) <= 0.0).any():
-        raise InputError(f"{where}: expected at least 2 samples at increasing times", file=where)
+        raise InputError(f"{where}: expected at least 2 samples at increasing times", file=where, key="time")
     keep = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_SAMPLES)).astype(int))
     # Oscilloscopes count time from their trigger.
     record = Record(times[keep] - min(times[0], 0.0), {name: values[keep] for name, values in curves.items()})
@@ -119,13 +124,15 @@ def _checked(record: Record, where: str) -> Record:
         last, peak = float(record.times[-1]), float(np.abs(record.curves[name]).max())
         if last > LONGEST_TIME:
             raise InputError(
-                f"{where}: a {name} of {last:g} s, expected at most {LONGEST_TIME:g} s", file=where
+                f"{where}: a {name} of {last:g} s, expected at most {LONGEST_TIME:g} s", file=where, key=name
             )
         most = LARGEST_VOLTAGE if name == "voltage" else LARGEST_CURRENT
         if peak > most:
             unit = QUANTITIES[name]
             raise InputError(
-                f"{where}: a {name} of {peak:g} {unit}, expected at most {most:g} {unit}", file=where
+                f"{where}: a {name} of {peak:g} {unit}, expected at most {most:g} {unit}",
+                file=where,
+                key=name,
             )
     return record
 
@@ -133,7 +140,9 @@ def _checked(record: Record, where: str) -> Record:
 def _table(text: str, where: str) -> tuple[list[Column], list[list[str]], int]:
     """Return the columns of a table, its rows of numbers, and the number of the first of these."""
     if not text.strip():
-        raise InputError(f"{where}: the file is empty, expected the heading {EXPECTED}", file=where)
+        raise InputError(
+            f"{where}: the file is empty, expected the heading {EXPECTED}", file=where, key="heading"
+        )
     delimiter = _delimiter(text)
     rows = [_bare(cells) for _line, cells in sheet_of(text, where, delimiter=delimiter).rows]
     begin = next(
@@ -141,16 +150,22 @@ def _table(text: str, where: str) -> tuple[list[Column], list[list[str]], int]:
     )
     if begin is None:
         raise InputError(
-            f"{where}: expected columns of numbers below a heading such as {EXPECTED}", file=where
+            f"{where}: expected columns of numbers below a heading such as {EXPECTED}",
+            file=where,
+            key="heading",
         )
     width = len(rows[begin])
     if width > MOST_COLUMNS:
-        raise InputError(f"{where}: {width} columns, expected at most {MOST_COLUMNS}", file=where)
+        raise InputError(
+            f"{where}: {width} columns, expected at most {MOST_COLUMNS}", file=where, key="columns"
+        )
     numbers = rows[begin:]
     for k, row in enumerate(numbers):
         if len(row) != width:
             raise InputError(
-                f"{where}: row {begin + k + 1} has {len(row)} cells, expected {width} numbers", file=where
+                f"{where}: row {begin + k + 1} has {len(row)} cells, expected {width} numbers",
+                file=where,
+                key=f"row {begin + k + 1}",
             )
     if delimiter != "," and any(_WHOLE.fullmatch(cell) for row in numbers[:50] for cell in row):
         numbers = [[cell.replace(",", ".") for cell in row] for row in numbers]

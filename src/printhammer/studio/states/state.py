@@ -162,7 +162,9 @@ def dropped_hammer(text: str) -> Hammer:
     if any(part.count(".") > bounds.MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
         most = bounds.MOST_DOTS
         raise InputError(
-            f"dropped file: expected a TOML file, without keys of more than {most} dots", file="dropped file"
+            f"dropped file: expected a TOML file, without keys of more than {most} dots",
+            file="dropped file",
+            key="dots",
         )
     try:
         document = tomllib.loads(text)
