@@ -27,7 +27,7 @@ SILENT = (
     "support/constants",
     "support/files",
     "support/sheets",
-        "support/threads",
+    "support/threads",
     "units",
 )
 

@@ -175,7 +175,7 @@ def _factor(unit: str, si_unit: str) -> Fraction:
         known = (name for name in DIMENSIONS if _measure(name)[1] == dimension)
         same = next(known, None)
         is_what = f"is {DIMENSIONS[same]}" if same else "is of another dimension"
-        raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}", key="unit", value=unit)
+        raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}", value=unit)
     return size / si_size
 
 
@@ -191,7 +191,7 @@ def _measure(unit: str) -> tuple[Fraction, UnitsContainer]:
         try:
             full = registry.get_name("percent" if name == "%" else name)
         except UndefinedUnitError:
-            raise InputError(_UNKNOWN.format(unit), key="unit", value=unit) from None
+            raise InputError(_UNKNOWN.format(unit), value=unit) from None
         base = Fraction(str(registry.get_root_units(full)[0]))
         size *= _power(base, power)
         dimension *= registry.get_dimensionality(full) ** power
@@ -207,7 +207,7 @@ def _factors(unit: str) -> Iterator[tuple[str, Fraction]]:
         position, sign = match.end(), -1 if match["operator"] == "/" else 1
         if position == len(text) and not match["operator"]:
             return
-    raise InputError(_UNKNOWN.format(unit), key="unit", value=unit)
+    raise InputError(_UNKNOWN.format(unit), value=unit)
 
 
 def _power(base: Fraction, exponent: Fraction) -> Fraction:

@@ -112,8 +112,10 @@ def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
 
 def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
     """Return the error that says that a constant is not known, with the nearest name or all of them."""
+    file, _, key = where.rpartition(": ")
     return InputError(
         f"{where or 'constant'} = {shown(name)} is not known, expected {nearest(name, known)}",
-        key=where or "constant",
+        file=file or None,
+        key=key or "constant",
         value=name,
     )

@@ -260,7 +260,11 @@ def _read(path: str | Path, hammer: Hammer, locked: float | None, bandwidth: flo
             key="time",
         )
     if locked is None and "locked" in table.comments:
-        locked = read_number(table.comments["locked"], "m", f"{table.path}: the comment 'locked'")
+        text = table.comments["locked"]
+        try:
+            locked = read_number(text, "m", f"{table.path}: the comment 'locked'")
+        except InputError as error:
+            raise InputError(str(error), file=table.path, key="locked", value=text) from None
     width = bandwidth_of(table) if bandwidth is None else bandwidth
     if "voltage" in table.values:
         from printhammer.drive.waveforms.sampled import Sampled

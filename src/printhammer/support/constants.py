@@ -162,22 +162,27 @@ def invalid(
     """
     fault = error.errors(include_url=False)[0]
     cause = fault.get("ctx", {}).get("error")
-    if isinstance(cause, InputError):
-        return cause
     name = ".".join(str(step) for step in fault["loc"])
+    file, _, section = prefix.rpartition(": ")
+    if isinstance(cause, InputError):
+        if cause.file is None and cause.key is None:
+            cause.key = section + name or None
+        return cause
     if not name:
         place, said = prefix.rstrip("."), fault["msg"].removeprefix("Value error, ")
-        return InputError(f"{place}: {said}".removeprefix(": "), key=place or None)
-    key, kind, note = prefix + name, fault["type"], quantities(model).get(name)
+        return InputError(
+            f"{place}: {said}".removeprefix(": "), file=file or None, key=section.rstrip(".") or None
+        )
+    key, kind, note = section + name, fault["type"], quantities(model).get(name)
     wanted = expected(note) if note else fault["msg"].removeprefix("Input should be ")
     if kind == "bool_type":
         wanted = "true or false"
     if kind == "missing":
         ending = f", expected {note.meaning} ({note.si})" if note else ""
-        return InputError(f"{key} is missing{ending}", key=key)
+        return InputError(f"{prefix}{name} is missing{ending}", file=file or None, key=key)
     value = fault["input"]
     text = (written or {}).get(name) or shown(value)
     if kind == "extra_forbidden":
-        known = ", ".join(model.model_fields)
-        return InputError(f"{key} = {text} is not known, expected one of {known}", key=key, value=value)
-    return InputError.of(key, value, wanted, written=text, said=": expected")
+        message = f"{prefix}{name} = {text} is not known, expected one of {', '.join(model.model_fields)}"
+        return InputError(message, file=file or None, key=key, value=value)
+    return InputError.of(key, value, wanted, file=file or None, written=text, said=": expected")

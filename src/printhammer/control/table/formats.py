@@ -129,7 +129,7 @@ def _of_json(text: str) -> tuple[Head, Rows]:
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"expected JSON ({' '.join(str(error).split())})") from None
+        raise InputError(f"expected JSON ({' '.join(str(error).split())})", key="table") from None
     if not isinstance(data, dict) or not isinstance(data.get("columns"), dict):
         columns = data.get("columns") if isinstance(data, dict) else data
         raise InputError.of("columns", columns, "the arrays of a table", written=shown(columns))

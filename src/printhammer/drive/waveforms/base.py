@@ -89,7 +89,11 @@ class Waveform(BaseModel):
                 result.setdefault("quantity", QUANTITY_UNITS[unit])
                 break
             else:
-                result[name] = parse(text, note.si)
+                try:
+                    result[name] = parse(text, note.si)
+                except InputError as error:
+                    error.key = name
+                    raise
         return result
 
     @abstractmethod
