@@ -18,6 +18,15 @@ class InputError(PrinthammerError, ValueError):
     line prints it and ends with status 2. The attributes hold the same for programs; None where the message
     has no such part.
 
+    Parameters
+    ----------
+    message : str
+        The fault, with file, key and value.
+    file, key, value : optional
+        The attributes.
+    expected : str, optional
+        What was expected; it ends the message.
+
     Attributes
     ----------
     file : str or None
@@ -37,11 +46,12 @@ class InputError(PrinthammerError, ValueError):
         file: object = None,
         key: str | None = None,
         value: object = None,
-        expected: str | None = None,
+        expected: object = None,
     ) -> None:
-        super().__init__(message)
+        super().__init__(message if expected is None else f"{message}, expected {expected}")
         self.file = None if file is None else str(file)
-        self.key, self.value, self.expected = key, value, expected
+        self.key, self.value = key, value
+        self.expected = None if expected is None else str(expected)
 
     @classmethod
     def of(
@@ -71,8 +81,9 @@ class InputError(PrinthammerError, ValueError):
         where = "" if file is None else f"{file}: "
         text = repr(value) if written is None else written
         text += unit and f" {unit}"
-        message = f"{where}{key} = {text}{said} {expected}"
-        return cls(message, file=file, key=key, value=value, expected=str(expected))
+        error = cls(f"{where}{key} = {text}{said} {expected}", file=file, key=key, value=value)
+        error.expected = str(expected)
+        return error
 
     def within(self, where: object, *, file: object = None, key: str | None = None) -> InputError:
         """Return the error with words before its message, and its place in its fields.
@@ -87,13 +98,10 @@ class InputError(PrinthammerError, ValueError):
         file = where if file is None and key is None else file
         files = [str(part) for part in (file, self.file) if part is not None]
         keys = [part for part in (key, self.key) if part is not None]
-        return InputError(
-            f"{where}: {self}",
-            file=": ".join(files) or None,
-            key=".".join(keys) or None,
-            value=self.value,
-            expected=self.expected,
-        )
+        place, key = ": ".join(files) or None, ".".join(keys) or None
+        error = InputError(f"{where}: {self}", file=place, key=key, value=self.value)
+        error.expected = self.expected
+        return error
 
 
 @contextmanager

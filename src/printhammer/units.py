@@ -136,15 +136,15 @@ def split(text: str, si_unit: str) -> tuple[float, str]:
     value = float(match[1]) if match else math.nan
     if match is None or not math.isfinite(value):
         raise InputError(
-            f"{text!r} is not a finite number with a unit, expected {describe(si_unit)}", value=text
+            f"{text!r} is not a finite number with a unit", value=text, expected=f"{describe(si_unit)}"
         )
     unit = match[2].strip()
     if re.match(r",\s*\d", unit):
         raise InputError(
-            f"{text!r} has a comma, expected a number with a decimal point, such as '1.2 kHz'", value=text
+            f"{text!r} has a comma", value=text, expected="a number with a decimal point, such as '1.2 kHz'"
         )
     if not unit and si_unit != "1":
-        raise InputError(f"{text!r} has no unit, expected {describe(si_unit)}", value=text)
+        raise InputError(f"{text!r} has no unit", value=text, expected=f"{describe(si_unit)}")
     return value, unit or "1"
 
 
@@ -175,7 +175,7 @@ def _factor(unit: str, si_unit: str) -> Fraction:
         known = (name for name in DIMENSIONS if _measure(name)[1] == dimension)
         same = next(known, None)
         is_what = f"is {DIMENSIONS[same]}" if same else "is of another dimension"
-        raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}", value=unit)
+        raise InputError(f"the unit {unit!r} {is_what}", value=unit, expected=f"{describe(si_unit)}")
     return size / si_size
 
 

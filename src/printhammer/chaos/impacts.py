@@ -195,9 +195,10 @@ def _counts(
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
     if not 1 <= limit <= room:
         raise InputError(
-            f"firings = {limit} after a transient of {skipped}, expected at most {MOST_PULSES - 1} together",
+            f"firings = {limit} after a transient of {skipped}",
             key="firings",
             value=limit,
+            expected=f"at most {MOST_PULSES - 1} together",
         )
     return wanted, skipped, limit
 
@@ -368,7 +369,7 @@ def impact_train(
     if isinstance(touches, Regime | Hammer):
         touches = section(touches, **firing)
     elif firing:
-        raise InputError(f"times are given, expected no {' or '.join(firing)} beside them", key="times")
+        raise InputError("times are given", key="times", expected=f"no {' or '.join(firing)} beside them")
     source = touches if isinstance(touches, Section) else None
     times = _times(touches.t if isinstance(touches, Section) else touches, source)
     intervals = np.diff(times)
@@ -433,7 +434,9 @@ def _times(touches: npt.ArrayLike, source: Section | None) -> FloatArray:
     times = read_array(touches, "touches", "times, s")
     if times.ndim != 1 or times.size <= _FEWEST:
         why = f" ({source.remark})" if source is not None and source.remark else ""
-        raise InputError(f"touches: {times.size} times, expected at least {_FEWEST + 1}{why}", key="touches")
+        raise InputError(
+            f"touches: {times.size} times", key="touches", expected=f"at least {_FEWEST + 1}{why}"
+        )
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
         raise InputError("touches: expected finite, ascending times, s", key="touches")
     return times

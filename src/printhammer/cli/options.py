@@ -330,7 +330,7 @@ def refuse(options: Mapping[str, object], expected: str) -> None:
     """Make sure that none of some options is given; else InputError, which tells what is expected."""
     for name, value in options.items():
         if value is not None:
-            raise InputError(f"--{name} is given, expected {expected}", key=f"--{name}")
+            raise InputError(f"--{name} is given", key=f"--{name}", expected=expected)
 
 
 _TRAIN: Final = "Train (one of --period and --rate)"

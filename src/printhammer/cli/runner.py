@@ -315,9 +315,10 @@ def load_hammer(name: str, *, fired: bool) -> Hammer:
         warn(f"{hammer.path}: {warning}")
     if fired and hammer.waveform is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] to fire, expected one",
+            f"{hammer.path}: the hammer has no [waveform] to fire",
             file=hammer.path,
             key="waveform",
+            expected="one",
         )
     return hammer
 
@@ -368,9 +369,10 @@ def firing_of(
     if file is None:
         if hammer.waveform is None:
             raise InputError(
-                f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE",
+                f"{hammer.path}: the hammer has no [waveform] to fire",
                 file=hammer.path,
                 key="waveform",
+                expected="one, or --drive FILE",
             )
         if timed:
             opt.need_one(train, f"{example}, or --drive FILE")

@@ -177,9 +177,10 @@ class AxisTables:
         size = self.size(tick)
         if budget is not None and size > budget:
             raise InputError(
-                f"budget = {budget} bytes: the tables take {size}, expected a larger budget or fewer",
+                f"budget = {budget} bytes: the tables take {size}",
                 key="budget",
                 value=budget,
+                expected="a larger budget or fewer",
             )
         scale = NANOSECOND if AXES[self.axis].unit == "m" else _MILLIONTH
         head = {name: getattr(first, name) for name in HEAD}

@@ -230,7 +230,7 @@ def dead_time(
     warm = warm if warm.size else np.array([20.0, 60.0, 100.0])
     if rails.size * warm.size > MOST:
         raise InputError(
-            f"{rails.size} rails and {warm.size} temperatures, expected at most {MOST} pairs", key="rails"
+            f"{rails.size} rails and {warm.size} temperatures", key="rails", expected=f"at most {MOST} pairs"
         )
     reference, reach = _reference(hammer, waveform, tolerance)
     wanted = reference.speed if blow is None else read_positive(blow, "m/s", "blow")

@@ -195,12 +195,13 @@ def thermal_duty(
     if (body_resistance is None) != (body_capacity is None):
         missing = "body_capacity" if body_capacity is None else "body_resistance"
         raise InputError(
-            f"{missing} is missing, expected body_resistance and body_capacity, or neither", key=missing
+            f"{missing} is missing", key=missing, expected="body_resistance and body_capacity, or neither"
         )
     if body_capacity is not None and thermal_capacity is None:
         raise InputError(
-            "thermal_capacity is missing, expected that of the winding beside body_capacity",
+            "thermal_capacity is missing",
             key="thermal_capacity",
+            expected="that of the winding beside body_capacity",
         )
     coil = ThermalCoil(
         read_positive(thermal_resistance, "K/W", "thermal_resistance"),
@@ -211,7 +212,7 @@ def thermal_duty(
     largest = read_temperature(limit, "limit")
     ambients = np.array([read_temperature(each, "ambient") for each in ambient])
     if not ambients.size:
-        raise InputError("ambient is empty, expected one temperature or more", key="ambient")
+        raise InputError("ambient is empty", key="ambient", expected="one temperature or more")
     at_limit = one_dot.at(largest)
     rate = np.maximum(largest - ambients, 0.0) / (at_limit * coil.whole)
     bursts = np.array([_rate(each) for each in burst or [rate.max()] if each != 0.0])
@@ -313,9 +314,10 @@ def heat_of(hammer: Hammer) -> DotHeat:
     waveform: Any = hammer.waveform
     if hammer.coil_resistance is None:
         raise InputError(
-            f"{hammer.path}: coil.resistance is missing, expected it for the heat of a dot",
+            f"{hammer.path}: coil.resistance is missing",
             file=hammer.path,
             key="coil.resistance",
+            expected="it for the heat of a dot",
         )
     if waveform is None or waveform.quantity == "force":
         raise InputError(
@@ -342,7 +344,8 @@ def _copper_loss(hammer: Hammer, drive: PulseTrain) -> float:
             return motion.energy.copper_loss
         span *= 2.0
     raise InputError(
-        f"{hammer.path}: the current lasts for ever, expected one that ends for the heat of a dot",
+        f"{hammer.path}: the current lasts for ever",
         file=hammer.path,
         key="waveform",
+        expected="one that ends for the heat of a dot",
     )

@@ -80,16 +80,17 @@ class ImpactEstimator:
         self.hammer, self.pulse = hammer, pulse_of(hammer, pulse)
         if self.pulse.quantity != "voltage":
             raise InputError(
-                f"{hammer.path}: the waveform is a {self.pulse.quantity}, expected the voltage of a driver"
-                " on a coil, whose current and voltage an impact changes",
+                f"{hammer.path}: the waveform is a {self.pulse.quantity}",
                 file=hammer.path,
                 key="waveform",
+                expected="the voltage of a driver on a coil, whose current and voltage an impact changes",
             )
         if hammer.front is None:
             raise InputError(
-                f"{hammer.path}: the hammer has no pack, expected one that it strikes",
+                f"{hammer.path}: the hammer has no pack",
                 file=hammer.path,
                 key="pack",
+                expected="one that it strikes",
             )
         self.step = 1.0 / sampling.sampling_rate
         self.flight, self.contact = self._dot()
@@ -98,18 +99,21 @@ class ImpactEstimator:
         self._before, self._size = before, before + after + 1
         if self._size < _LEAST:
             raise InputError(
-                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self._size} samples fall on the contact of"
-                f" {1e6 * self.contact:.3g} us, expected {_LEAST} at least",
+                (
+                    f"sampling_rate = {sampling.sampling_rate:g} Hz: {self._size} samples fall on the"
+                    f" contact of {1e6 * self.contact:.3g} us"
+                ),
                 key="sampling_rate",
                 value=sampling.sampling_rate,
+                expected=f"{_LEAST} at least",
             )
         self.count = math.ceil((1.0 + REACH) * self.flight / self.step) + after + 2
         if self.count > _MOST:
             raise InputError(
-                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self.count} samples a dot, expected at most"
-                f" {_MOST}",
+                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self.count} samples a dot",
                 key="sampling_rate",
                 value=sampling.sampling_rate,
+                expected=f"at most {_MOST}",
             )
         fine = np.asarray(self.step / PHASES * np.arange(PHASES * self.count), np.float64)
         run = simulate(hammer, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
@@ -195,9 +199,10 @@ class ImpactEstimator:
                 return float(dot.flight_time), float(dot.contact_time)
             span *= 2.0
         raise InputError(
-            f"{self.hammer.path}: a single pulse makes no dot, expected a hammer that prints",
+            f"{self.hammer.path}: a single pulse makes no dot",
             file=self.hammer.path,
             key="waveform",
+            expected="a hammer that prints",
         )
 
     def _without_pack(self, sampling: Sampling, fine: FloatArray) -> FloatArray:
@@ -214,25 +219,39 @@ class ImpactEstimator:
             return
         if sampling.signal == "voltage" and not self.clearness > 0.0:
             raise InputError(
-                f"{self.hammer.path}: the voltage shows no impact, since the supply or a diode holds it, or"
-                " the magnet is not permanent, expected signal = 'current'",
+                (
+                    f"{self.hammer.path}: the voltage shows no impact, since the supply or a diode holds"
+                    " it, or the magnet is not permanent"
+                ),
                 file=self.hammer.path,
                 key="signal",
+                expected="signal = 'current'",
             )
         if sampling.signal == "current" and abs(now) < _FLOWING * largest:
             raise InputError(
-                f"{self.hammer.path}: the current shows no impact, since {1e3 * now:.3g} mA of"
-                f" {1e3 * largest:.3g} mA are left of it by then, expected a pulse that lasts until the"
-                " impact, a slower decay, or signal = 'voltage' if the magnet is permanent",
+                (
+                    f"{self.hammer.path}: the current shows no impact, since {1e3 * now:.3g} mA of"
+                    f" {1e3 * largest:.3g}"
+                    " mA are left of it by then"
+                ),
                 file=self.hammer.path,
                 key="signal",
+                expected=(
+                    "a pulse that lasts until the impact, a slower decay, or signal = 'voltage' if the"
+                    " magnet is permanent"
+                ),
             )
         raise InputError(
-            f"{self.hammer.path}: the impact changes the {sampling.signal} by {self.clearness:.2g} standard"
-            f" deviations, expected less noise than {sampling.noise:g} {sampling.unit}, more bits than"
-            f" {sampling.bits}, or faster sampling",
+            (
+                f"{self.hammer.path}: the impact changes the {sampling.signal} by {self.clearness:.2g}"
+                " standard deviations"
+            ),
             file=self.hammer.path,
             key="signal",
+            expected=(
+                f"less noise than {sampling.noise:g} {sampling.unit}, more bits than {sampling.bits},"
+                " or faster sampling"
+            ),
         )
 
 

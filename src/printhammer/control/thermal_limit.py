@@ -71,9 +71,9 @@ def thermal_limit(
     rails = np.array([read_number(each, "V", "voltage") for each in voltage or [0.0] * len(cold)])
     if not cold.size == rates.size == rails.size:
         raise InputError(
-            f"{cold.size} ambient temperatures, {rates.size} rates and {rails.size} voltages, expected as"
-            " many of each",
+            f"{cold.size} ambient temperatures, {rates.size} rates and {rails.size} voltages",
             key="rates",
+            expected="as many of each",
         )
     _kinds, group = np.unique(rails, return_inverse=True)
     if not any(np.unique(cold[group == each]).size > 1 for each in group):

@@ -152,7 +152,7 @@ class Sensitivities(Result):
                 raise InputError.of(name, number, "a relative spread, 0 or more", file="spreads")
             if self.values[place] == 0.0:
                 raise InputError(
-                    f"spreads: {name} is zero, expected a constant with a relative spread", key="spreads"
+                    f"spreads: {name} is zero", key="spreads", expected="a constant with a relative spread"
                 )
         return Spread(
             sensitivities=self,

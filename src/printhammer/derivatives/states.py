@@ -193,9 +193,10 @@ def problem_between(
     """Return the run of a map from `start` to `end`, s, its arguments checked as `tangent_map` says."""
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(
-            f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative",
+            f"start = {start!r} s and end = {end!r} s",
             key="start",
             value=start,
+            expected="ascending times, not negative",
         )
     return _problem(hammer, drive, state, tolerance)
 
@@ -313,15 +314,16 @@ def _strobes(
     """Return the drive, the times of the firings 1 to `last`, and the time between them."""
     if not 1 <= first < last:
         raise InputError(
-            f"first = {first!r} and last = {last!r}, expected numbers of firings, ascending",
+            f"first = {first!r} and last = {last!r}",
             key="first",
             value=first,
+            expected="numbers of firings, ascending",
         )
     drive = waveform_or_drive
     if not isinstance(drive, Drive):
         if period is None:
             raise InputError(
-                "period is missing, expected the time between the firings of the waveform", key="period"
+                "period is missing", key="period", expected="the time between the firings of the waveform"
             )
         drive = PulseTrain(drive, period=period, pulses=last)
     spacing = drive.period if period is None else period

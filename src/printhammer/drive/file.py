@@ -127,8 +127,9 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
     if len(kinds) != 1:
         several = " and ".join(f"[{kind}]" for kind in kinds) or "none"
         raise InputError(
-            f"{several} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}",
+            f"{several} given",
             key="drive",
+            expected=f"one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}",
         )
     kind = kinds[0]
     arguments = _arguments(_table(data[kind], kind), kind)
@@ -152,7 +153,7 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
     if kind == "times":
         _required(arguments, ("at",), kind)
     elif "rate" not in arguments and "period" not in arguments:
-        raise InputError(f"{kind}.rate is missing, expected a rate or a period", key=f"{kind}.rate")
+        raise InputError(f"{kind}.rate is missing", key=f"{kind}.rate", expected="a rate or a period")
     elif kind == "burst":
         _required(arguments, ("pulses",), kind)
     if "waveform" in data:
@@ -182,9 +183,10 @@ def _known(table: Mapping[str, Any], keys: set[str], name: str) -> None:
             where = where if where.isprintable() else shown(where)
             known = ", ".join(sorted(keys))
             raise InputError(
-                f"{where} = {shown(table[key])} is not known, expected one of {known}",
+                f"{where} = {shown(table[key])} is not known",
                 key=where,
                 value=table[key],
+                expected=f"one of {known}",
             )
 
 
@@ -230,9 +232,10 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
             )
     else:
         raise InputError(
-            f"{where} = {shown(value)} has no unit, expected a string such as '1 {units[0]}'",
+            f"{where} = {shown(value)} has no unit",
             key=where,
             value=value,
+            expected=f"a string such as '1 {units[0]}'",
         )
     for si in units[1:]:
         with suppress(InputError):
@@ -277,8 +280,9 @@ def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]
                 or "a table [waveforms.NAME] for each name"
             )
             raise InputError(
-                f"sequence.waveforms: {shown(name)} is no waveform of the file, expected {known}",
+                f"sequence.waveforms: {shown(name)} is no waveform of the file",
                 key="sequence.waveforms",
+                expected=known,
             )
     return [made[name] for name in names]
 
@@ -339,9 +343,9 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
     try:
         return Chain(parts=parts)
     except InputError as error:
-        raise InputError(
-            f"{where}.{error}", key=f"{where}.{error.key}", value=error.value, expected=error.expected
-        ) from None
+        fault = InputError(f"{where}.{error}", key=f"{where}.{error.key}", value=error.value)
+        fault.expected = error.expected
+        raise fault from None
 
 
 def _switched(data: dict[str, Any], where: str) -> Switched:

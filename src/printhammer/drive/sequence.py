@@ -218,13 +218,14 @@ def _checked(waveforms: Any) -> list[Waveform]:
             raise InputError.of(f"waveforms[{number}]", waveform, "a waveform", said=" is expected to be")
         if not math.isfinite(waveform.support):
             raise InputError(
-                f"waveforms[{number}] is a {waveform.shape}, expected a waveform that ends",
+                f"waveforms[{number}] is a {waveform.shape}",
                 key=f"waveforms[{number}]",
+                expected="a waveform that ends",
             )
         if waveform.quantity != fired[0].quantity:
             raise InputError(
-                f"waveforms[{number}] is a {waveform.quantity}, expected a {fired[0].quantity} like"
-                " the first",
+                f"waveforms[{number}] is a {waveform.quantity}",
                 key=f"waveforms[{number}]",
+                expected=f"a {fired[0].quantity} like the first",
             )
     return fired

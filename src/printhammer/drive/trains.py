@@ -102,7 +102,7 @@ class PulseTrain(_Pulsed):
         ways = [name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None]
         if len(ways) > 1:
             raise InputError(
-                f"{ways[0]} and {ways[1]} are given, expected one of rate, period and at", key=ways[1]
+                f"{ways[0]} and {ways[1]} are given", key=ways[1], expected="one of rate, period and at"
             )
         first = read_start(start)
         self._spacing: tuple[str, float] | None = None

@@ -48,7 +48,7 @@ def plot(fit: Fit) -> Figure:
     """
     if not len(fit.data):
         raise InputError(
-            "the constants were computed without a table, expected a fit to data to draw", key="table"
+            "the constants were computed without a table", key="table", expected="a fit to data to draw"
         )
     figure = new_figure(5.6, 7.6)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.35, 1.0))

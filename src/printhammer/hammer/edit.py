@@ -61,7 +61,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         tables = [name for name in SELECTORS if isinstance(document.get(name), Mapping)]
         known = [*document, *(f"{table}.{entry}" for table in tables for entry in document[table])]
         expected = nearest(key, known, "one such as 'pack.stiffness'")
-        raise InputError(f"the key {shown(key)} is not known, expected {expected}", key=key)
+        raise InputError(f"the key {shown(key)} is not known", key=key, expected=expected)
     if note is None or value is None:
         return key, value
     # A bare number is in the unit of what it replaces, where the constant may have several.

@@ -79,8 +79,9 @@ def rest_state(hammer: HammerLike) -> float:
             if rest is None:
                 because = f"at zero current the backstop is crushed down to {force.low:.6g} m"
                 raise InputError(
-                    f"{_named(hammer)} has no rest state: {because}, expected it to hold the armature",
+                    f"{_named(hammer)} has no rest state: {because}",
                     key="rest, value=state",
+                    expected="it to hold the armature",
                 )
             return rest
         if pressing == 0.0 and hammer.magnet is not None:
@@ -89,8 +90,9 @@ def rest_state(hammer: HammerLike) -> float:
         if hammer.magnet is not None:
             because = f"at the backstop the net force at zero current is {pressing:.6g} N"
             raise InputError(
-                f"{_named(hammer)} has no rest state: {because}, expected a negative force",
+                f"{_named(hammer)} has no rest state: {because}",
                 key="rest, value=state",
+                expected="a negative force",
             )
     stable = [
         root.x
@@ -285,7 +287,7 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
     low, high = max(low, force.limits[0]), min(high, force.limits[1])
     if not low < high:
         raise InputError(
-            f"the range {low:g} to {high:g} m is empty, expected the lower end first", key="range"
+            f"the range {low:g} to {high:g} m is empty", key="range", expected="the lower end first"
         )
     crossings = roots(lambda x: force.total(x, current), _grid(force, low, high))
     if within is not None:

@@ -144,7 +144,7 @@ def _build(
 ) -> Contents:
     _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS, UNCERTAINTY), "")
     if "format" not in document:
-        raise InputError(f"format is missing, expected format = {FORMAT}", key="format")
+        raise InputError("format is missing", key="format", expected=f"format = {FORMAT}")
     version = document["format"]
     if not isinstance(version, int) or isinstance(version, bool) or version != FORMAT:
         raise InputError.of("format", version, FORMAT, written=shown(version), said=": expected")
@@ -156,7 +156,7 @@ def _build(
                 name, texts[name], "text in quotes", written=shown(texts[name]), said=": expected"
             )
     if not texts["name"].strip():
-        raise InputError("name is missing, expected a short name of the hammer", key="name")
+        raise InputError("name is missing", key="name", expected="a short name of the hammer")
     constants: dict[str, Constant] = {}
     top = {key: document[key] for key in quantities(Body) if key in document}
     body = _read(Body, top, "", constants, folder, before, known)
@@ -197,8 +197,9 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
     kind = table.get(selector, UNSAID.get(section))
     if kind is None:
         raise InputError(
-            f"{section}.{selector} is missing, expected one of {', '.join(known)}",
+            f"{section}.{selector} is missing",
             key=f"{section}.{selector}",
+            expected=f"one of {', '.join(known)}",
         )
     if not isinstance(kind, str) or kind not in known:
         raise InputError.of(
@@ -217,8 +218,9 @@ def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
     for key in table:
         if key not in known:
             raise InputError(
-                f"the key {shown(prefix + key, quotes=False)} is not known, expected {nearest(key, known)}",
+                f"the key {shown(prefix + key, quotes=False)} is not known",
                 key=prefix + key,
+                expected=f"{nearest(key, known)}",
             )
 
 
@@ -277,7 +279,7 @@ def _constant(key: str, written: Any, note: Quantity) -> Constant:
         if name not in written:
             what = f"the constant {key} = {shown(value)}" if name != "value" else f"the constant {key}"
             raise InputError(
-                f"{what} has no {name}, expected {describe(note.si)} with {_WANTED[name]}", key=what
+                f"{what} has no {name}", key=what, expected=f"{describe(note.si)} with {_WANTED[name]}"
             )
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
         raise InputError.of(key, value, "a finite number", written=shown(value), said=": expected")

@@ -63,7 +63,7 @@ def load(name_or_path: str | Path) -> Hammer:
         raise InputError(f"{path}: expected a TOML file in UTF-8", file=path) from None
     except FileNotFoundError:
         raise InputError(
-            f"{path}: there is no such file, expected a path or {nearest(str(path), shipped())}", file=path
+            f"{path}: there is no such file", file=path, expected=f"a path or {nearest(str(path), shipped())}"
         ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error

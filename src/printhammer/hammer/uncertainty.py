@@ -86,21 +86,24 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
     unknown = [name for name in table if name not in ENTRIES]
     if unknown:
         raise InputError(
-            f"the key {UNCERTAINTY}.{unknown[0]} is not known, expected one of {', '.join(ENTRIES)}",
+            f"the key {UNCERTAINTY}.{unknown[0]} is not known",
             key=f"{UNCERTAINTY}.{unknown[0]}",
+            expected=f"one of {', '.join(ENTRIES)}",
         )
     keys, errors, records = (_texts(table, name) for name in ("constants", "standard_errors", "records"))
     for row, key in enumerate(keys):
         if key not in constants or key in keys[:row]:
             why = "the hammer has no such constant" if key not in constants else "it is there twice"
             raise InputError(
-                f"{UNCERTAINTY}.constants: {key!r}, {why}, expected each constant of the hammer at most once",
+                f"{UNCERTAINTY}.constants: {key!r}, {why}",
                 key=f"{UNCERTAINTY}.constants",
+                expected="each constant of the hammer at most once",
             )
     if len(errors) != len(keys):
         raise InputError(
-            f"{UNCERTAINTY}.standard_errors has {len(errors)} entries, expected {len(keys)}, one a constant",
+            f"{UNCERTAINTY}.standard_errors has {len(errors)} entries",
             key=f"{UNCERTAINTY}.standard_errors",
+            expected=f"{len(keys)}, one a constant",
         )
     sizes = np.array([_error(key, text, constants[key]) for key, text in zip(keys, errors, strict=True)])
     return Uncertainty(keys, _correlation(table, len(keys)) * np.outer(sizes, sizes), records)
@@ -122,7 +125,7 @@ def _error(key: str, text: str, constant: Constant) -> float:
         size = parse(text, constant.si_unit)
     if not 0.0 < size < float("inf"):
         raise InputError(
-            f"{UNCERTAINTY}: the standard error of {key} is {text}, expected more than 0", key=UNCERTAINTY
+            f"{UNCERTAINTY}: the standard error of {key} is {text}", key=UNCERTAINTY, expected="more than 0"
         )
     return size
 

@@ -48,9 +48,10 @@ def check_driver(hammer: Hammer) -> None:
     """Refuse a hammer whose waveform is no voltage."""
     if hammer.waveform is None or hammer.waveform.unit != "V":
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] that is a voltage, expected the driver of its coil",
+            f"{hammer.path}: the hammer has no [waveform] that is a voltage",
             file=hammer.path,
             key="waveform",
+            expected="the driver of its coil",
         )
 
 
@@ -76,7 +77,7 @@ def probe_current(
     count = each * (len(knots) - 1)
     if count > _MOST:
         raise InputError(
-            f"a record of {after[-1]:.6g} s is too long for the probe, expected a shorter one", key="record"
+            f"a record of {after[-1]:.6g} s is too long for the probe", key="record", expected="a shorter one"
         )
     fine = np.interp(np.arange(count + 1) / each, np.arange(len(knots)), knots)
     state = None
@@ -155,7 +156,7 @@ def fit_coil(
     """
     names = list(dict.fromkeys(FREE if free is None else free))
     if not names:
-        raise InputError("no constants to find, expected one or more, such as coil.inductance", key="free")
+        raise InputError("no constants to find", key="free", expected="one or more, such as coil.inductance")
     place = None if locked is None else read_number(locked, "m", "locked")
     traces = [_read(path, hammer, place, bandwidth) for path in paths]
     hammer, start = _start(hammer, names, traces[0])
@@ -249,15 +250,17 @@ def _read(path: str | Path, hammer: Hammer, locked: float | None, bandwidth: flo
     if len(bad):
         line, value = table.lines[bad[0] + 1], t[bad[0] + 1]
         raise InputError(
-            f"{table.path}: line {line}: time {value:.9g} s, expected ascending times",
+            f"{table.path}: line {line}: time {value:.9g} s",
             file=table.path,
             key="time",
+            expected="ascending times",
         )
     if not t[-1] > 0.0:
         raise InputError(
-            f"{table.path}: no time after 0 s, expected a record from switching on",
+            f"{table.path}: no time after 0 s",
             file=table.path,
             key="time",
+            expected="a record from switching on",
         )
     if locked is None and "locked" in table.comments:
         text = table.comments["locked"]
@@ -288,9 +291,10 @@ def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, Floa
     top = int(np.argmax(current))
     if not (current[top] > 0.0 and trace.waveform.peak > 0.0):
         raise InputError(
-            f"{trace.table.path}: there is no current or no voltage, expected a record of both",
+            f"{trace.table.path}: there is no current or no voltage",
             file=trace.table.path,
             key="current",
+            expected="a record of both",
         )
     resistance = trace.waveform.peak / float(current[top])
     rise = float(t[int(np.argmax(current > 0.5 * current[top]))])
@@ -303,9 +307,10 @@ def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, Floa
         _unit(hammer, name)
         if not _stated(hammer, name):
             raise InputError(
-                f"{hammer.path}: {name} is not more than 0, expected a value with which the fit begins",
+                f"{hammer.path}: {name} is not more than 0",
                 file=hammer.path,
                 key=name,
+                expected="a value with which the fit begins",
             )
     return hammer, np.array([hammer.constants[name].si for name in names])
 

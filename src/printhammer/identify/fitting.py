@@ -65,7 +65,7 @@ def fit(
 
         if hammer is None:
             raise InputError(
-                "the hammer is missing, expected one with the constants known already", key="hammer"
+                "the hammer is missing", key="hammer", expected="one with the constants known already"
             )
         if kind == "coil":
             return fit_coil(many, hammer, **options)
@@ -73,7 +73,7 @@ def fit(
     if kind == "magnet" and len(many) == 2 and options.get("spring") is None:
         many, options["spring"] = _magnet_and_spring(many)
     if len(many) != 1:
-        raise InputError(f"{len(many)} tables, expected one of the kind {kind!r}", key="tables")
+        raise InputError(f"{len(many)} tables", key="tables", expected=f"one of the kind {kind!r}")
     if kind == "solenoid":
         from printhammer.identify.static.solenoid import fit_solenoid
 
@@ -148,8 +148,9 @@ def _fitted(kind: str, table: Any, options: dict[str, Any]) -> Fit:
 
         if options["position"] is None:
             raise InputError(
-                "the position of the backstop is missing, expected it, or a hammer that has one",
+                "the position of the backstop is missing",
                 key="position",
+                expected="it, or a hammer that has one",
             )
         return fit_spring(table, **options)
     if kind == "pack":
@@ -157,7 +158,9 @@ def _fitted(kind: str, table: Any, options: dict[str, Any]) -> Fit:
 
         if options["thickness"] is None:
             raise InputError(
-                "the thickness of the pack is missing, expected it, or a hammer that has one", key="thickness"
+                "the thickness of the pack is missing",
+                key="thickness",
+                expected="it, or a hammer that has one",
             )
         return fit_pack(table, **options)
     from printhammer.identify.static.backstop import fit_backstop

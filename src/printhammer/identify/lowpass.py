@@ -39,7 +39,7 @@ def bandwidth_of(table: Readings) -> float | None:
         raise InputError(str(error), file=table.path, key="bandwidth", value=text) from None
     if not (np.isfinite(value) and value > 0.0):
         raise InputError(
-            f"{where}: {text}, expected a positive number", file=table.path, key="bandwidth", value=text
+            f"{where}: {text}", file=table.path, key="bandwidth", value=text, expected="a positive number"
         )
     return value
 

@@ -71,34 +71,36 @@ def read_table(
     """
     source = Path(path)
     if not source.exists():
-        raise InputError(f"{source}: there is no such file, expected a table of measurements", file=source)
+        raise InputError(f"{source}: there is no such file", file=source, expected="a table of measurements")
     sheet = read_sheet(source, "the table")
     lines = sheet.rows
     must = ",".join(f"{name} [{si}]" for name, si in columns.items())
     may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
     wanted = f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
     if not lines:
-        raise InputError(f"{source}: the file has no heading, expected {wanted}", file=source, key="heading")
+        raise InputError(f"{source}: the file has no heading", file=source, key="heading", expected=wanted)
     names, units = _heading(source, lines[0], {**columns, **optional}, text, wanted)
     missing = [name for name in columns if name not in names]
     if missing:
         raise InputError(
-            f"{source}: line {lines[0][0]}: the column {missing[0]!r} is missing, expected {wanted}",
+            f"{source}: line {lines[0][0]}: the column {missing[0]!r} is missing",
             file=source,
             key=missing[0],
+            expected=wanted,
         )
     if len(lines) < 2:
         raise InputError(
-            f"{source}: the table has no rows, expected them below the heading", file=source, key="rows"
+            f"{source}: the table has no rows", file=source, key="rows", expected="them below the heading"
         )
     values: dict[str, FloatArray] = {name: np.empty(len(lines) - 1) for name in units}
     words: dict[str, list[str]] = {name: [] for name in names if name in text}
     for row, (number, cells) in enumerate(lines[1:]):
         if len(cells) != len(names):
             raise InputError(
-                f"{source}: line {number} has {len(cells)} cells, expected {len(names)}",
+                f"{source}: line {number} has {len(cells)} cells",
                 file=source,
                 key=f"line {number}",
+                expected=f"{len(names)}",
             )
         for name, cell in zip(names, cells, strict=True):
             where = f"{source}: line {number}, column {name!r}"
@@ -106,9 +108,10 @@ def read_table(
                 word = cell.strip().lower()
                 if word not in text[name]:
                     raise InputError(
-                        f"{where}: {cell.strip()!r}, expected {' or '.join(text[name])}",
+                        f"{where}: {cell.strip()!r}",
                         file=where,
                         value=cell,
+                        expected=f"{' or '.join(text[name])}",
                     )
                 words[name].append(word)
             else:
@@ -133,13 +136,14 @@ def _heading(
         name = " ".join(name.lower().split())
         if name not in numbers and name not in text:
             raise InputError(
-                f"{where}: the column {cell.strip()!r} is not known, expected {wanted}",
+                f"{where}: the column {cell.strip()!r} is not known",
                 file=where,
                 key=cell.strip(),
+                expected=wanted,
             )
         if name in names:
             raise InputError(
-                f"{where}: the column {name!r} is given twice, expected it once", file=where, key=name
+                f"{where}: the column {name!r} is given twice", file=where, key=name, expected="it once"
             )
         names.append(name)
         if name in text:
@@ -180,9 +184,9 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
     tiny = float(np.finfo(np.float64).tiny)
     if abs(value) > LARGEST or (number != 0.0 and abs(value) < tiny):
         raise InputError(
-            f"{where}: {cell.strip()} {unit}, expected a measured value, 0 or one of a magnitude from"
-            f" {tiny:.2g} to {LARGEST:g} {si}",
+            f"{where}: {cell.strip()} {unit}",
             file=where,
             value=cell,
+            expected=f"a measured value, 0 or one of a magnitude from {tiny:.2g} to {LARGEST:g} {si}",
         )
     return value

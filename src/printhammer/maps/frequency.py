@@ -99,8 +99,9 @@ def frequency_map(
     moments = _times(times, (count - 1) / float(grid[0]) + TAIL)
     if grid.size * moments.size > MOST_CELLS:
         raise InputError(
-            f"{grid.size} rates x {moments.size} times, expected at most {MOST_CELLS} displacements in a map",
+            f"{grid.size} rates x {moments.size} times",
             key="rates",
+            expected=f"at most {MOST_CELLS} displacements in a map",
         )
     drives = PulseTrains.at_rates(fired, grid, count, overlap)
     ends = np.maximum(moments[-1], (count - 1) / grid + TAIL)
@@ -174,16 +175,16 @@ def _rates(rates: npt.ArrayLike | None) -> FloatArray:
         raise InputError("rates: expected numbers, Hz", key="rates") from None
     if grid.ndim != 1 or grid.size == 0:
         raise InputError(
-            f"rates: an array of shape {grid.shape}, expected a list of at least one rate, Hz", key="rates"
+            f"rates: an array of shape {grid.shape}", key="rates", expected="a list of at least one rate, Hz"
         )
     odd = grid[~(np.isfinite(grid) & (grid > 0.0))]
     if odd.size:
-        raise InputError(f"rates: {odd[0]:.9g} Hz, expected finite numbers greater than 0 Hz", key="rates")
+        raise InputError(f"rates: {odd[0]:.9g} Hz", key="rates", expected="finite numbers greater than 0 Hz")
     falling = np.flatnonzero(np.diff(grid) <= 0.0)
     if falling.size:
         before, after = grid[falling[0] : falling[0] + 2]
         raise InputError(
-            f"rates: {after:.9g} Hz follows {before:.9g} Hz, expected ascending rates", key="rates"
+            f"rates: {after:.9g} Hz follows {before:.9g} Hz", key="rates", expected="ascending rates"
         )
     return grid
 

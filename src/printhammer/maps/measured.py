@@ -110,10 +110,10 @@ def _stored_records(path: Path) -> list[RateRecord]:
     over = dimensions["displacement"]
     if len(over) != 2 or "rate" not in over or dimensions["rate"] != ("rate",):
         raise InputError(
-            f"{what}: displacement lies over {', '.join(over) or 'nothing'}, expected rate and one more"
-            " dimension",
+            f"{what}: displacement lies over {', '.join(over) or 'nothing'}",
             file=what,
             key="displacement",
+            expected="rate and one more dimension",
         )
     if over[0] != "rate":
         x, over = x.T, over[::-1]
@@ -123,10 +123,10 @@ def _stored_records(path: Path) -> list[RateRecord]:
         times = times.T
     elif dimensions["time"] != over:
         raise InputError(
-            f"{what}: time lies over {', '.join(dimensions['time']) or 'nothing'}, expected {over[1]}, or"
-            f" rate and {over[1]}",
+            f"{what}: time lies over {', '.join(dimensions['time']) or 'nothing'}",
             file=what,
             key="time",
+            expected=f"{over[1]}, or rate and {over[1]}",
         )
     records: dict[float, RateRecord] = {}
     for row, rate in enumerate(rates):
@@ -134,10 +134,10 @@ def _stored_records(path: Path) -> list[RateRecord]:
         where = f"row {row + 1}"
         if not known.any() or float(rate) in records:
             raise InputError(
-                f"{what}: {where}: rate {rate:.9g} Hz has no times or is given twice, expected one record for"
-                " each rate",
+                f"{what}: {where}: rate {rate:.9g} Hz has no times or is given twice",
                 file=what,
                 key=where,
+                expected="one record for each rate",
             )
         places = [f"{where}, sample {k + 1}" for k in np.flatnonzero(known)]
         records[float(rate)] = checked(what, float(rate), times[row][known], x[row][known], places)

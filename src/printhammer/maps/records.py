@@ -124,15 +124,15 @@ def checked(
     if twice.size:
         first, second = (places[order[twice[0] + k]] for k in (0, 1))
         raise InputError(
-            f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz is given before, in {first},"
-            " expected one displacement for each time",
+            f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz is given before, in {first}",
             file=what,
             key="time",
+            expected="one displacement for each time",
         )
     known = int(np.isfinite(x).sum())
     if known < 2:
         raise InputError(
-            f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2", file=what, key="rate"
+            f"{what}: {known} displacements at {rate:.9g} Hz", file=what, key="rate", expected="at least 2"
         )
     return RateRecord(rate, at, x)
 
@@ -154,9 +154,10 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
     columns = [k for k, (name, _unit) in enumerate(names) if name == "time"]
     if len(columns) != 1 or len(names) < 2:
         raise InputError(
-            f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}",
+            f"{cells.what}: columns {', '.join(map(repr, cells.heading))}",
             file=cells.what,
             key="columns",
+            expected=_HEADINGS,
         )
     times = cells.column(columns[0], "s", names[columns[0]][1])
     records: dict[float, RateRecord] = {}
@@ -165,9 +166,10 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
             continue
         if name in _SI:
             raise InputError(
-                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}",
+                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}",
                 file=cells.what,
                 key="columns",
+                expected=_HEADINGS,
             )
         try:
             rate = parse(name, "Hz")
@@ -205,15 +207,19 @@ def _cells(path: Path) -> Cells:
     rows = read_sheet(path, "the measured map").rows
     if len(rows) < 2:
         raise InputError(
-            f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples", file=what, key="rows"
+            f"{what}: {len(rows)} rows",
+            file=what,
+            key="rows",
+            expected=f"the heading {_HEADINGS}, and samples",
         )
     heading = [cell.strip() for cell in rows[0][1]]
     for line, row in rows[1:]:
         if len(row) != len(heading):
             raise InputError(
-                f"{what}: line {line} has {len(row)} cells, expected {len(heading)}",
+                f"{what}: line {line} has {len(row)} cells",
                 file=what,
                 key=f"line {line}",
+                expected=f"{len(heading)}",
             )
     lines = np.array([line for line, _row in rows[1:]], dtype=np.int64)
     return Cells(what, heading, lines, [row for _line, row in rows[1:]])

@@ -34,7 +34,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
     source = Path(path).resolve()
     name = source.stem
     if not source.is_file():
-        raise InputError(f"{path}: no such file, expected a Python file that registers a part", file=path)
+        raise InputError(f"{path}: no such file", file=path, expected="a Python file that registers a part")
     if source.suffix != ".py" or not name.isidentifier():
         raise InputError(
             f"{path}: expected a Python file whose name can be imported, such as my_spring.py", file=path
@@ -45,9 +45,10 @@ def load_parts(path: str | Path) -> list[type[Part]]:
     known = find_spec(name)
     if known is None or known.origin is None or Path(known.origin).resolve() != source:
         raise InputError(
-            f"{path}: a module of the name {name!r} is there already, expected another name",
+            f"{path}: a module of the name {name!r} is there already",
             file=path,
             key="module",
+            expected="another name",
         )
     try:
         import_module(name)
@@ -57,7 +58,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
     parts = [part for part in PARTS.values() if part.__module__ == name]
     if not parts:
         raise InputError(
-            f"{path}: registers no part, expected a class marked with @register", file=path, key="part"
+            f"{path}: registers no part", file=path, key="part", expected="a class marked with @register"
         )
     for part in parts:
         check_functions(part, complete=True)

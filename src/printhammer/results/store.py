@@ -154,10 +154,10 @@ class Store:
         for name, asked in self._layout.identity.items():
             if there.get(name) != asked:
                 raise InputError(
-                    f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)},"
-                    f" expected {asked}, or another place for the results",
+                    f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)}",
                     file=self.path,
                     key=name,
+                    expected=f"{asked}, or another place for the results",
                 )
         self._handle = _locked(self.path, self.path)
 

@@ -206,7 +206,7 @@ class Ensemble:
         self.size = max(counts.values()) if min(counts.values()) > 0 else 0
         for name, count in counts.items():
             if count not in (1, self.size):
-                raise InputError(f"{name}: {count} are given, expected 1 or {self.size}", key=name)
+                raise InputError(f"{name}: {count} are given", key=name, expected=f"1 or {self.size}")
         wrong = ~(np.isfinite(moments) & (moments > 0.0))
         if wrong.any():
             raise InputError.of("ends", float(moments[wrong][0]), "positive numbers", unit="s")
@@ -230,10 +230,12 @@ class Ensemble:
             max(places, default=0) > 1 and any(drive.quantity != "voltage" for drive in fired)
         ):
             raise InputError(
-                f"states: an array of shape {rows.shape}, expected rows of displacement and velocity, or of"
-                " these with branch and memory; under a voltage then with the current, or with currents and"
-                " the voltage of the capacitor",
+                f"states: an array of shape {rows.shape}",
                 key="states",
+                expected=(
+                    "rows of displacement and velocity, or of these with branch and memory; under a"
+                    " voltage then with the current, or with currents and the voltage of the capacitor"
+                ),
             )
         full[:, [1, 2, *(3 + place for place in places)]] = rows
         hammers, hammer_of = self._own_hammers
@@ -359,9 +361,9 @@ class Ensemble:
             x = np.empty((self.size, grid.size), np.float32)
         elif x.shape != (self.size, grid.size) or x.dtype != np.float32 or not x.flags.c_contiguous:
             raise InputError(
-                f"x: an array of shape {x.shape} and type {x.dtype}, expected {(self.size, grid.size)} and"
-                " float32, without gaps",
+                f"x: an array of shape {x.shape} and type {x.dtype}",
                 key="x",
+                expected=f"{(self.size, grid.size)} and float32, without gaps",
             )
         moments = self._moments(strobes)
         jobs = [Job(group, bool(dots), moments, grid, x) for group in self.groups]
@@ -432,7 +434,7 @@ class Ensemble:
         if not isinstance(strobes, Sequence | np.ndarray):
             raise InputError.of("strobes", strobes, '"firings" or an array for each member')
         if len(strobes) != self.size:
-            raise InputError(f"strobes: {len(strobes)} arrays, expected {self.size}", key="strobes")
+            raise InputError(f"strobes: {len(strobes)} arrays", key="strobes", expected=f"{self.size}")
         return Ragged.of([_ascending(moment, "strobes") for moment in strobes])
 
 
@@ -443,9 +445,10 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
         in_lanes = engine != "plain" and job.group.fits_lanes()
         if engine == "lanes" and not in_lanes:
             raise InputError(
-                'engine = "lanes", expected "plain" or "auto": the parts do not allow lanes',
+                'engine = "lanes"',
                 key="engine",
                 value="lanes",
+                expected='"plain" or "auto": the parts do not allow lanes',
             )
         job.prepare(in_lanes)
         if in_lanes:
@@ -461,7 +464,7 @@ def _each(values: npt.ArrayLike, name: str) -> FloatArray:
     values_of = read_array(values, name)
     if values_of.ndim > 1:
         raise InputError(
-            f"{name}: an array of shape {values_of.shape}, expected one number for each member", key=name
+            f"{name}: an array of shape {values_of.shape}", key=name, expected="one number for each member"
         )
     return np.atleast_1d(values_of)
 

@@ -194,10 +194,10 @@ class Motion(Result, fields=False):
         inside = (times >= self.start) & (times <= self.end)
         if not inside.all():
             raise InputError(
-                f"t = {times[~inside][0]:.9g} s lies outside the motion, expected a time from"
-                f" {self.start:.9g} s to {self.end:.9g} s",
+                f"t = {times[~inside][0]:.9g} s lies outside the motion",
                 key="t",
                 value=times[~inside][0],
+                expected=f"a time from {self.start:.9g} s to {self.end:.9g} s",
             )
         order = np.argsort(times, kind="stable")
         table = np.empty((times.size, self._problem.columns))

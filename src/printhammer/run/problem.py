@@ -142,9 +142,10 @@ def constants_of(hammer: Hammer) -> FloatArray:
         room = layout.ROOM.get(role, len(constants))
         if len(constants) > room:
             raise InputError(
-                f"{hammer.path}: {role} has {len(constants)} packed constants, expected at most {room}",
+                f"{hammer.path}: {role} has {len(constants)} packed constants",
                 file=hammer.path,
                 key=role,
+                expected=f"at most {room}",
             )
         array[layout.PLACES[role] : layout.PLACES[role] + len(constants)] = constants
     return array

@@ -166,14 +166,14 @@ class Regime(Declared):
             named_beside = [name for name, value in zip(named, values, strict=True) if value is not None]
             if named_beside:
                 raise InputError(
-                    f"a regime is given, expected no {' or '.join(named_beside)} beside it", key="regime"
+                    "a regime is given", key="regime", expected=f"no {' or '.join(named_beside)} beside it"
                 )
             return hammer if phase is None else replace(hammer, phase=part)
         overlap = "add" if overlap is None else overlap
         if drive is not None:
             if period is not None or rate is not None or waveform is not None:
                 raise InputError(
-                    "drive is given, expected no period, rate or waveform beside it", key="drive"
+                    "drive is given", key="drive", expected="no period, rate or waveform beside it"
                 )
             if drive.period is None or math.isfinite(drive.waveform.support):
                 raise InputError.of("drive", drive, "an endless force with a period")
@@ -365,7 +365,7 @@ def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
     fired = hammer.waveform if waveform is None else waveform
     if fired is None:
         raise InputError(
-            f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]", key="waveform"
+            f"the hammer {hammer.name!r} has no waveform to fire", key="waveform", expected="a [waveform]"
         )
     return fired
 
@@ -407,7 +407,9 @@ def regimes_of(
     elif drives is None:
         if periods is None:
             raise InputError(
-                "periods are missing, expected the times between the firings of each train, s", key="periods"
+                "periods are missing",
+                key="periods",
+                expected="the times between the firings of each train, s",
             )
         fired = [(period, None) for period in (periods if np.ndim(periods) else [periods])]  # type: ignore[union-attr]
         if not fired:
@@ -415,7 +417,7 @@ def regimes_of(
     count = max(len(many), len(fired)) if many and fired else 0
     for name, number in (("hammers", len(many)), ("periods" if drives is None else "drives", len(fired))):
         if number not in (1, count):
-            raise InputError(f"{name}: {number} are given, expected 1 or {count}", key=name)
+            raise InputError(f"{name}: {number} are given", key=name, expected=f"1 or {count}")
     return [
         Regime.of(
             many[i % len(many)],

@@ -60,7 +60,7 @@ class SchemeProblem(Problem):
             )
         if drive.quantity == "voltage":
             raise InputError(
-                "the drive is a voltage, expected a current or a force for the schemes of 1983", key="drive"
+                "the drive is a voltage", key="drive", expected="a current or a force for the schemes of 1983"
             )
         super().__init__(hammer, drive, state, 0.0, tolerance)
         self._scheme: schemes_1983.Scheme = scheme

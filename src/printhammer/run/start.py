@@ -103,16 +103,20 @@ def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -
         check_branch(hammer, (*numbers[:2], *beyond[:2]))
     if len(numbers) in (3, 5, 7) and quantity != "voltage":
         raise InputError(
-            f"state = {numbers!r} under a drive by {quantity}: the current belongs to the state under a"
-            " voltage only, expected displacement in m and velocity in m/s",
+            (
+                f"state = {numbers!r} under a drive by {quantity}: the current belongs to the state"
+                " under a voltage only"
+            ),
             key="state",
             value=numbers,
+            expected="displacement in m and velocity in m/s",
         )
     if beyond.turn and not getattr(hammer.coil, "turn_resistance", None):
         raise InputError(
-            f"state = {numbers!r}: the coil has no shorted turn, expected no current in it",
+            f"state = {numbers!r}: the coil has no shorted turn",
             key="state",
             value=numbers,
+            expected="no current in it",
         )
     return beyond
 
@@ -147,18 +151,22 @@ def check_branch(hammer: Hammer, state: Sequence[float]) -> None:
     if branch not in _BRANCHES or hammer.front is None:
         known = ", ".join(f"{code} ({name})" for code, name in _BRANCHES.items())
         raise InputError(
-            f"state with branch = {branch:g}, expected a pack and one of {known}", key="branch", value=branch
+            f"state with branch = {branch:g}",
+            key="branch",
+            value=branch,
+            expected=f"a pack and one of {known}",
         )
     if not x > hammer.front:
         raise InputError(
-            f"state with x = {x:.9g} m on a branch in the pack, expected more than its front,"
-            f" {hammer.front:.9g} m",
+            f"state with x = {x:.9g} m on a branch in the pack",
             key="x",
             value=x,
+            expected=f"more than its front, {hammer.front:.9g} m",
         )
     if branch != LOADING and not memory >= x:
         raise InputError(
-            f"state with memory = {memory:.9g} m, expected a displacement not less than x = {x:.9g} m",
+            f"state with memory = {memory:.9g} m",
             key="memory",
             value=memory,
+            expected=f"a displacement not less than x = {x:.9g} m",
         )

@@ -35,7 +35,7 @@ def supply_of(drive: Drive) -> Supply:
     supplies = {waveform.supply() for waveform in waveforms_of(drive)}
     if len(supplies) > 1:
         raise InputError(
-            "the waveforms of the drive are on different supplies, expected one supply", key="waveforms"
+            "the waveforms of the drive are on different supplies", key="waveforms", expected="one supply"
         )
     return supplies.pop()
 
@@ -51,17 +51,17 @@ def winding_of(hammer: Hammer) -> Winding:
     coil = hammer.coil
     if not isinstance(coil, Winding) or coil.resistance is None:
         raise InputError(
-            f"{hammer.path}: coil.resistance is missing, expected the resistance of the coil that the voltage"
-            " drives",
+            f"{hammer.path}: coil.resistance is missing",
             file=hammer.path,
             key="coil.resistance",
+            expected="the resistance of the coil that the voltage drives",
         )
     if coil.back_emf and hammer.magnet is not None and not hammer.magnet.has_linkage:
         raise InputError(
-            f"{hammer.path}: the magnet law {hammer.magnet.law!r} links no flux, expected one that does or"
-            " coil.back_emf = false",
+            f"{hammer.path}: the magnet law {hammer.magnet.law!r} links no flux",
             file=hammer.path,
             key="magnet",
+            expected="one that does or coil.back_emf = false",
         )
     return coil
 

@@ -101,7 +101,7 @@ def try_out(
     motion = limited_run(state.changed, drive, end, most, tolerance)
     if motion.status == STEP_LIMIT:
         raise InputError(
-            f"{what} would take more than {most} steps for this hammer, expected fewer", key=what
+            f"{what} would take more than {most} steps for this hammer", key=what, expected="fewer"
         )
     if through and motion.status != "ok":
         raise InputError(f"{what}: {motion.message}", key=what)

@@ -88,11 +88,11 @@ def read_axis(
     for value in values:
         if not _inside(value, note):
             raise InputError(
-                f"{here}: {value!r} {note.si} is out of bounds, expected {expected(note)}", key=here
+                f"{here}: {value!r} {note.si} is out of bounds", key=here, expected=f"{expected(note)}"
             )
     if target == "drive" and field in COUNTS:
         if not grid:
-            raise InputError(f"{here}: a count cannot be drawn, expected an axis of a grid", key=here)
+            raise InputError(f"{here}: a count cannot be drawn", key=here, expected="an axis of a grid")
         if not all(value.is_integer() for value in values):
             raise InputError(f"{here}: expected whole numbers", key=here)
     name = table.key.removeprefix("drive.").replace(".", "_").replace(" ", "_")
@@ -130,9 +130,10 @@ def _resolved(
     known += [name for name in hammer.constants if fired or not name.startswith("waveform.")]
     hint = nearest(key, known, "one such as 'pack.stiffness', 'drive.rate' or 'state.x'")
     raise InputError(
-        f"{where}.key = {shown(key)} names no constant of {hammer.name} or its drive, expected {hint}",
+        f"{where}.key = {shown(key)} names no constant of {hammer.name} or its drive",
         key=f"{where}.key",
         value=key,
+        expected=hint,
     )
 
 
@@ -160,7 +161,7 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
                 f"{here}: values are given, a Latin hypercube is expected to have low and high", key=here
             )
         if any(value is not None for value in (*ends, table.count)) or geometric:
-            raise InputError(f"{here}: values are given, expected no range beside them", key=here)
+            raise InputError(f"{here}: values are given", key=here, expected="no range beside them")
         values = read_quantities(table.values, si, f"{here}.values")
         if len(set(values)) < len(values):
             raise InputError(f"{here}.values: expected different values", key=f"{here}.values")
@@ -168,7 +169,7 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
     for name, value in (("low", table.low), ("high", table.high), ("count", table.count if grid else 1)):
         if value is None:
             raise InputError(
-                f"{here}.{name} is missing, expected values, or low, high and count", key=f"{here}.{name}"
+                f"{here}.{name} is missing", key=f"{here}.{name}", expected="values, or low, high and count"
             )
     if not grid and table.count is not None:
         raise InputError(
@@ -180,7 +181,7 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
     )
     if low == high or not math.isfinite(high - low):
         raise InputError(
-            f"{here}: the range from {low!r} to {high!r} {si} is empty, expected two ends", key=here
+            f"{here}: the range from {low!r} to {high!r} {si} is empty", key=here, expected="two ends"
         )
     if geometric and not (low > 0.0 and high > 0.0):
         raise InputError(f"{here}: a geometric range is expected to lie above 0 {si}", key=here)

@@ -170,8 +170,9 @@ def read_outputs(table: OutputsTable, firings: int) -> Outputs:
     arrays += _chosen(table.scalars, scalars, "scalars")
     if len(arrays) == len(ALWAYS):
         raise InputError(
-            "outputs: nothing is asked for, expected dots, strobes, final, displacement or scalars",
+            "outputs: nothing is asked for",
             key="outputs",
+            expected="dots, strobes, final, displacement or scalars",
         )
     return Outputs(tuple(arrays), firings, times)
 
@@ -183,7 +184,7 @@ def _chosen(names: Sequence[str] | str, known: Mapping[str, Output], where: str)
         if name not in known:
             hint = nearest(name, known, f'some of {", ".join(known)}, or "all"')
             raise InputError(
-                f"outputs.{where}: {shown(name)} is not known, expected {hint}", key=f"outputs.{where}"
+                f"outputs.{where}: {shown(name)} is not known", key=f"outputs.{where}", expected=hint
             )
     if len(set(names)) < len(names):
         raise InputError(f"outputs.{where}: expected different names", key=f"outputs.{where}")

@@ -121,7 +121,9 @@ def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
             )
         if axis.key in table.constants:
             raise InputError(
-                f"constants: {axis.key!r} is replaced by an axis, expected one or the other", key="constants"
+                f"constants: {axis.key!r} is replaced by an axis",
+                key="constants",
+                expected="one or the other",
             )
     x, v = table.state.x, table.state.v
     duration = None if table.duration is None else read_quantity(table.duration, "s", "duration")
@@ -182,9 +184,9 @@ def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
     for axis in base.axes:
         if kinds == ["sequence"] and axis.key.startswith("waveform."):
             raise InputError(
-                f"the axis {axis.key!r} changes what [drive.sequence] does not fire, expected one of its"
-                " waveforms, such as 'waveforms.NAME.amplitude'",
+                f"the axis {axis.key!r} changes what [drive.sequence] does not fire",
                 key=axis.key,
+                expected="one of its waveforms, such as 'waveforms.NAME.amplitude'",
             )
         if axis.target == "drive" and axis.field in timing:
             raise InputError(
@@ -195,8 +197,9 @@ def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
             at = timing.get("at")
             if not isinstance(at, list) or int(axis.field) >= len(at):
                 raise InputError(
-                    f"the axis {axis.key!r} names no firing, expected drive.times.at with as many",
+                    f"the axis {axis.key!r} names no firing",
                     key=axis.key,
+                    expected="drive.times.at with as many",
                 )
     if base.duration is None and kinds == ["sine"]:
         raise InputError("duration is missing, and the drive does not end", key="duration")

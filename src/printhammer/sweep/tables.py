@@ -60,9 +60,10 @@ def read_quantity(written: Any, si: str, where: str) -> float:
         if si == "1":
             return to_si(written, "1", "1")
     raise InputError(
-        f"{where} = {shown(written)} has no unit, expected {describe(si)} as text such as '1 {si}'",
+        f"{where} = {shown(written)} has no unit",
         key=where,
         value=written,
+        expected=f"{describe(si)} as text such as '1 {si}'",
     )
 
 
@@ -186,11 +187,11 @@ def _fault(error: ValidationError) -> InputError:
     if fault["type"] == "missing":
         field = table.model_fields.get(str(fault["loc"][-1]))
         wanted = (field.description if field else None) or "a value"
-        return InputError(f"{key} is missing, expected {wanted}", key=key, expected=wanted)
+        return InputError(f"{key} is missing", key=key, expected=wanted)
     if fault["type"] == "extra_forbidden":
         known = ", ".join(table.model_fields)
         return InputError(
-            f"the key {shown(key, quotes=False)} is not known, expected one of {known}", key=key
+            f"the key {shown(key, quotes=False)} is not known", key=key, expected=f"one of {known}"
         )
     wanted = fault["msg"].removeprefix("Input should be ")
     wanted = {"bool_type": "true or false", "string_type": "text in quotes"}.get(fault["type"], wanted)

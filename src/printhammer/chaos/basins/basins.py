@@ -85,7 +85,7 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
     """
     plane = np.asarray(labels)
     if plane.ndim != 2 or not plane.size or plane.dtype.kind not in "iu":
-        raise InputError(f"labels: shape {plane.shape}, expected a plane of whole numbers", key="labels")
+        raise InputError(f"labels: shape {plane.shape}", key="labels", expected="a plane of whole numbers")
     side = read_count(box, "box")
     if side > min(plane.shape):
         raise InputError.of("box", box, f"at most {min(plane.shape)} cells")
@@ -366,4 +366,4 @@ def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
 def check_cells(across: int, up: int) -> None:
     """Refuse a plane of more than `MOST_CELLS` cells."""
     if across * up > MOST_CELLS:
-        raise InputError(f"{across} x {up} cells, expected at most {MOST_CELLS}", key="cells")
+        raise InputError(f"{across} x {up} cells", key="cells", expected=f"at most {MOST_CELLS}")

@@ -131,7 +131,7 @@ def bifurcation(
     ways = ("up", "down") if direction == "both" else (direction,)
     if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
         raise InputError(
-            f"{len(grid)} values, expected at most {MOST_STATES} states in a diagram", key="values"
+            f"{len(grid)} values", key="values", expected=f"at most {MOST_STATES} states in a diagram"
         )
     begin = FROM_REST
     if state is not None:
@@ -213,5 +213,5 @@ def _ascending(values: npt.ArrayLike | None, name: str) -> FloatArray:
     falling = np.flatnonzero(np.diff(grid) <= 0.0)
     if falling.size:
         before, after = grid[falling[0] : falling[0] + 2].tolist()
-        raise InputError(f"{name}: {after:.9g} follows {before:.9g}, expected ascending values", key=name)
+        raise InputError(f"{name}: {after:.9g} follows {before:.9g}", key=name, expected="ascending values")
     return grid

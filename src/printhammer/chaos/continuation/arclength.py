@@ -85,9 +85,9 @@ class Steps(Declared):
     def __post_init__(self) -> None:
         if not 0.0 < self.smallest <= self.first <= self.largest < math.inf:
             raise InputError(
-                f"steps of {self.smallest:g}, {self.first:g} and {self.largest:g},"
-                " expected the smallest, the first and the largest, ascending",
+                f"steps of {self.smallest:g}, {self.first:g} and {self.largest:g}",
                 key="steps",
+                expected="the smallest, the first and the largest, ascending",
             )
         if self.most < 1:
             raise InputError.of("most", self.most, "a number of steps from 1 on", written=str(self.most))

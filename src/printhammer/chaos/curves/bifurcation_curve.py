@@ -300,10 +300,10 @@ def bifurcation_curve(
     for name, (low, high), at in ((start.first, own, start.value), (second, ends, value)):
         if not low <= at <= high:
             raise InputError(
-                f"{name} = {at:.9g} {start.regime.quantity(name).si} at the start, expected one within the"
-                f" bounds {low:.9g} to {high:.9g}",
+                f"{name} = {at:.9g} {start.regime.quantity(name).si} at the start",
                 key=name,
                 value=at,
+                expected=f"one within the bounds {low:.9g} to {high:.9g}",
             )
     plane = Plane(start.regime, (start.first, second), (own, ends), start.firings, start.tolerance)
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)

@@ -161,11 +161,11 @@ def stability_chart(
     if isinstance(branch, Branch):
         if first is not None or firing:
             raise InputError(
-                "a branch is given, expected no first constant and no firing beside it", key="first"
+                "a branch is given", key="first", expected="no first constant and no firing beside it"
             )
     elif first is None:
         raise InputError(
-            "first is missing, expected the first constant with its least and largest value", key="first"
+            "first is missing", key="first", expected="the first constant with its least and largest value"
         )
     else:
         branch = continuation(branch, first[0], first[1:], threads=threads, **firing)

@@ -67,7 +67,7 @@ def start_of(
     """
     if isinstance(source, Branch):
         if regime is not None:
-            raise InputError("a branch is given, expected no regime beside it", key="regime")
+            raise InputError("a branch is given", key="regime", expected="no regime beside it")
         return _of_branch(source, event)
     opened = source if isinstance(source, Reopened) else reopen(source)
     if regime is None:
@@ -119,9 +119,10 @@ def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, 
         if kinds[event] not in KINDS or not located[event]:
             why = "" if located[event] else " that was not located"
             raise InputError(
-                f"event = {event} is a {kinds[event]}{why}, expected a located one of {_LIST}",
+                f"event = {event} is a {kinds[event]}{why}",
                 key="event",
                 value=event,
+                expected=f"a located one of {_LIST}",
             )
         return int(event)
     if event is not None and event not in KINDS:

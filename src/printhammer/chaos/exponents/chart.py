@@ -219,13 +219,13 @@ def finite_time(
     if not wanted or sorted(set(wanted)) != wanted:
         raise InputError.of("lengths", lengths, "numbers of firings, ascending")
     if not known.ok:
-        raise InputError(f"the run ended early ({known.status}), expected one that did not", key="train")
+        raise InputError(f"the run ended early ({known.status})", key="train", expected="one that did not")
     growth = known.factors[:, 0]
     if len(growth) < FEWEST * wanted[-1]:
         raise InputError(
-            f"lengths: of {len(growth)} firings there are fewer than {FEWEST} stretches of {wanted[-1]},"
-            f" expected at most {len(growth) // FEWEST}",
+            f"lengths: of {len(growth)} firings there are fewer than {FEWEST} stretches of {wanted[-1]}",
             key="lengths",
+            expected=f"at most {len(growth) // FEWEST}",
         )
     values = tuple(growth[: len(growth) // n * n].reshape(-1, n).mean(axis=1) for n in wanted)
     return FiniteTime(

@@ -116,7 +116,7 @@ def correlation_dimension(
     rows, units = rows_of(points_of(states, {}), scales, MOST)
     apart, tolerance = read_count(theiler, "theiler"), read_positive(flat, "1", "flat")
     if len(rows) < FEWEST:
-        raise InputError(f"states: {len(rows)} are given, expected {FEWEST} to {MOST}", key="states")
+        raise InputError(f"states: {len(rows)} are given", key="states", expected=f"{FEWEST} to {MOST}")
     if apart > len(rows) // 4:
         raise InputError.of(
             "theiler", apart, f"at most a quarter of the number of states, {len(rows)}", written=str(apart)
@@ -124,7 +124,9 @@ def correlation_dimension(
     scaled = rows / units
     width = float(np.ptp(scaled, axis=0).max())
     if width == 0.0:
-        raise InputError("states: all are equal, expected an attractor of more than one state", key="states")
+        raise InputError(
+            "states: all are equal", key="states", expected="an attractor of more than one state"
+        )
     count = math.ceil(_PER_OCTAVE * math.log2(2.0 * len(rows)) * 2.0)
     radius = width * 2.0 ** (-np.arange(count)[::-1] / _PER_OCTAVE)
     sums, pairs = correlation_sums(scaled, radius, apart)

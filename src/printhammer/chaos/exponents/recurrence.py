@@ -132,7 +132,7 @@ def recurrence(
     if apart >= count:
         raise InputError.of("theiler", apart, f"less than the number of states, {count}", written=str(apart))
     if threshold is not None and rate is not None:
-        raise InputError("threshold and rate are given, expected one of them", key="threshold")
+        raise InputError("threshold and rate are given", key="threshold", expected="one of them")
     scaled = rows / units
     distances = _distances(scaled)
     if threshold is None:
@@ -204,20 +204,20 @@ def rows_of(
         units = states.window.half_widths[[0, 1, 0]]
         if not np.isfinite(rows).all():
             raise InputError(
-                f"states: the run ended early ({states.status}), expected one that did not", key="states"
+                f"states: the run ended early ({states.status})", key="states", expected="one that did not"
             )
     else:
         rows = read_array(states, "states", "numbers, a row for each state")
         rows = rows[:, np.newaxis] if rows.ndim == 1 else rows
         if rows.ndim != 2:
             raise InputError(
-                f"states: an array of shape {rows.shape}, expected a row for each state", key="states"
+                f"states: an array of shape {rows.shape}", key="states", expected="a row for each state"
             )
         units = np.ones(rows.shape[1])
     if not 2 <= len(rows) <= most:
-        raise InputError(f"states: {len(rows)} are given, expected 2 to {most}", key="states")
+        raise InputError(f"states: {len(rows)} are given", key="states", expected=f"2 to {most}")
     if not np.isfinite(rows).all():
-        raise InputError("states: not all are finite, expected finite numbers", key="states")
+        raise InputError("states: not all are finite", key="states", expected="finite numbers")
     if scales is not None:
         units = np.asarray(scales, dtype=np.float64)
     if units.shape != (rows.shape[1],) or not (np.isfinite(units) & (units > 0.0)).all():

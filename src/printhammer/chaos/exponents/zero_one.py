@@ -187,7 +187,7 @@ def zero_one(
         numbers = _numbers(points)
         least = 1e-12 * float(np.abs(numbers).max(initial=0.0))
     if numbers.size < FEWEST:
-        raise InputError(f"series: {numbers.size} numbers, expected at least {FEWEST}", key="series")
+        raise InputError(f"series: {numbers.size} numbers", key="series", expected=f"at least {FEWEST}")
     if resolution is not None:
         if not (math.isfinite(resolution) and resolution >= 0.0):
             raise InputError.of("resolution", resolution, "a number, not negative")
@@ -337,11 +337,11 @@ def _numbers(series: npt.ArrayLike) -> FloatArray:
     numbers = read_array(series, "series")
     if numbers.ndim != 1:
         raise InputError(
-            f"series: an array of shape {numbers.shape}, expected one number after the other", key="series"
+            f"series: an array of shape {numbers.shape}", key="series", expected="one number after the other"
         )
     wrong = np.flatnonzero(~np.isfinite(numbers))
     if wrong.size:
         raise InputError(
-            f"series: number {wrong[0] + 1} is {numbers[wrong[0]]}, expected finite numbers", key="series"
+            f"series: number {wrong[0] + 1} is {numbers[wrong[0]]}", key="series", expected="finite numbers"
         )
     return numbers

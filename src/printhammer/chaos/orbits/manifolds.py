@@ -129,7 +129,7 @@ def manifolds(
     """
     if not orbit.ok or orbit.kind != SADDLE:
         raise InputError(
-            f"the orbit is a {orbit.name}, expected a saddle, which has both manifolds", key="orbit"
+            f"the orbit is a {orbit.name}", key="orbit", expected="a saddle, which has both manifolds"
         )
     unknown = [kind for kind in kinds if kind not in KINDS]
     if unknown or not kinds:

@@ -126,9 +126,10 @@ class LeastWork(Result, rows="node"):
         """Times, s, and currents, A, of the nodes, between which the current runs in straight lines."""
         if self.shape != "free":
             raise InputError(
-                f"shape = {self.shape!r}: the current has no nodes, expected a free one",
+                f"shape = {self.shape!r}: the current has no nodes",
                 key="shape",
                 value=self.shape,
+                expected="a free one",
             )
         times, values = [0.0], [0.0]
         for at, waveform in zip(self.drive.times.tolist(), self.drive.waveforms, strict=True):
@@ -365,25 +366,28 @@ def least_work(
     for role in ("magnet", "spring", "backstop", "pack"):
         if getattr(hammer, role) is None:
             raise InputError(
-                f"{hammer.path}: the hammer has no {role}, expected one with all parts",
+                f"{hammer.path}: the hammer has no {role}",
                 file=hammer.path,
                 key=role,
+                expected="one with all parts",
             )
     waveform = pulse_of(hammer)
     if waveform.quantity != "current":
         raise InputError(
-            f"{hammer.path}: the waveform is a {waveform.quantity}, expected a current, which is sought",
+            f"{hammer.path}: the waveform is a {waveform.quantity}",
             file=hammer.path,
             key="waveform",
+            expected="a current, which is sought",
         )
     steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
     if shape == "pulses":
         steepest = math.inf
     elif slew is None and not math.isfinite(steepest):
         raise InputError(
-            f"{hammer.path}: the waveform jumps, expected slew, the steepest slope of the current",
+            f"{hammer.path}: the waveform jumps",
             file=hammer.path,
             key="waveform",
+            expected="slew, the steepest slope of the current",
         )
     elif not (math.isfinite(steepest) and steepest > 0.0):
         raise InputError.of(

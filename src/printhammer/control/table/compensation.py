@@ -113,7 +113,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         for name in (*COLUMNS, "deviation"):
             if np.shape(getattr(self, name)) != shape:
                 raise InputError(
-                    f"{name}: an array of shape {np.shape(getattr(self, name))}, expected {shape}", key=name
+                    f"{name}: an array of shape {np.shape(getattr(self, name))}", key=name, expected=shape
                 )
         for row, rate in enumerate(rates.tolist()):
             for history in histories(self.gaps, self.reach):
@@ -151,11 +151,14 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         begun = history[0] / rate - values["advance"]
         if history[0] and begun < over - _NEAR:
             raise InputError(
-                f"{where}: advance = {values['advance']!r} s fires {begun:.6g} s after the slot of the dot"
-                f" before, expected a firing after its pulses have ended, at {over:.6g} s",
+                (
+                    f"{where}: advance = {values['advance']!r} s fires {begun:.6g} s after the slot of the"
+                    " dot before"
+                ),
                 file=where,
                 key="advance",
                 value=values["advance"],
+                expected=f"a firing after its pulses have ended, at {over:.6g} s",
             )
 
     @property
@@ -232,10 +235,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         if self.serial and serial not in (self.serial, ANY_UNIT):
             unit = "no serial" if serial is None else f"serial = {serial!r}"
             raise InputError(
-                f"{unit} is given: the table was learned on unit {self.serial!r}, expected this serial, or"
-                f" {ANY_UNIT!r} to drive another unit with it",
+                f"{unit} is given: the table was learned on unit {self.serial!r}",
                 key="unit",
                 value=unit,
+                expected=f"this serial, or {ANY_UNIT!r} to drive another unit with it",
             )
         self.check_hammer(hammer)
         return TableStrategy(self, hammer)
@@ -245,9 +248,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
-                f" {self.fingerprint[:12]}, expected {hammer.fingerprint[:12]}",
+                f" {self.fingerprint[:12]}",
                 file=hammer.path,
                 key="hammer",
+                expected=f"{hammer.fingerprint[:12]}",
             )
 
     def drive(self, hammer: Hammer, slots: Sequence[int], rate: float | str) -> Drive:
@@ -319,10 +323,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         unit, size = checked_tick(tick), self.size(tick)
         if budget is not None and size > budget:
             raise InputError(
-                f"budget = {budget} bytes: the table takes {size}, expected a larger budget, a longer tick, a"
-                " shorter history, a shorter reach, or fewer rates",
+                f"budget = {budget} bytes: the table takes {size}",
                 key="budget",
                 value=budget,
+                expected="a larger budget, a longer tick, a shorter history, a shorter reach, or fewer rates",
             )
         return header_text(self._head, self.rates, self._times, unit)
 
@@ -406,9 +410,10 @@ class TableStrategy:
             largest = float(getattr(table, name).max())
             if largest > widest * (1.0 + ROUNDING):
                 raise InputError(
-                    f"the table for {table.hammer!r} has a {name} of {largest:.9g} s, expected at most"
-                    f" {widest:.9g} s, so that the current is at most {table.largest_current:g} A",
+                    f"the table for {table.hammer!r} has a {name} of {largest:.9g} s",
                     key=name,
+                    expected=f"at most {widest:.9g} s, so that the current is at most"
+                    f" {table.largest_current:g} A",
                 )
 
     def __call__(self, _hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:

@@ -152,15 +152,17 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     width = getattr(pulse, "width", None)
     if not isinstance(width, float):
         raise InputError(
-            f"{hammer.path}: a {pulse.shape} has no width, expected a pulse that has one",
+            f"{hammer.path}: a {pulse.shape} has no width",
             file=hammer.path,
             key="waveform",
+            expected="a pulse that has one",
         )
     if pulse.quantity == "force" or (pulse.quantity == "voltage" and not pulse.replaces):
         raise InputError(
-            f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current, or a driver of the coil",
+            f"{hammer.path}: the waveform is a {pulse.quantity}",
             file=hammer.path,
             key="waveform",
+            expected="a current, or a driver of the coil",
         )
 
     def peak_of(other: Waveform) -> float:
@@ -169,9 +171,10 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     peak = peak_of(pulse)
     if peak > largest * (1.0 + ROUNDING):
         raise InputError(
-            f"{hammer.path}: the waveform peaks at {peak:.4g} A, expected at most {largest:g} A",
+            f"{hammer.path}: the waveform peaks at {peak:.4g} A",
             file=hammer.path,
             key="waveform",
+            expected=f"at most {largest:g} A",
         )
     bound = max(peak, largest * (1.0 - MARGIN))
     halvings = _HALVINGS if pulse.quantity == "current" else _FEWER
@@ -297,9 +300,10 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
     own: Any = pulse_of(hammer)
     if own.quantity != "current":
         raise InputError(
-            f"{hammer.path}: the waveform is a {own.quantity}, expected a current, or driver = 'own'",
+            f"{hammer.path}: the waveform is a {own.quantity}",
             file=hammer.path,
             key="waveform",
+            expected="a current, or driver = 'own'",
         )
     edge = max(float(getattr(own, "decay", _EDGE)), _LEAST_EDGE)
     force = nominal(hammer, tolerance=DISPLAY_TOLERANCE).force
@@ -317,10 +321,10 @@ def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: fl
         hard = [dot is not None and dot.force >= force for dot in dots]
         if hard[0] or not any(hard):
             raise InputError(
-                f"{hammer.path}: no width of the pulse makes a dot of {force:.4g} N, expected another"
-                " largest_current, or a hammer nearer to its design",
+                f"{hammer.path}: no width of the pulse makes a dot of {force:.4g} N",
                 file=hammer.path,
                 key="width",
+                expected="another largest_current, or a hammer nearer to its design",
             )
         first = hard.index(True)
         low, high = widths[first - 1], widths[first]

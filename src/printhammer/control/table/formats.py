@@ -78,7 +78,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
     lines = text.splitlines()
     if not lines or lines[0].strip() != _FIRST:
         first = shown(lines[0] if lines else "")
-        raise InputError(f"first line = {first}, expected {_FIRST!r}", key="first, value=line")
+        raise InputError(f"first line = {first}", key="first, value=line", expected=f"{_FIRST!r}")
     head: Head = {}
     for line in lines[1:]:
         if not line.startswith("#") or _ATTRIBUTE.match(line):
@@ -87,7 +87,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
         if not mark:
             raise InputError(f"{shown(line)}: expected '# key = value'", key="line", value=line)
         if key.strip() in head:
-            raise InputError(f"{key.strip()} is given twice, expected once", key=key.strip())
+            raise InputError(f"{key.strip()} is given twice", key=key.strip(), expected="once")
         try:
             head[key.strip()] = json.loads(value)
         except ValueError:
@@ -111,7 +111,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
     rows = []
     for number, cells in enumerate(table[1:], 1):
         if len(cells) != len(wanted):
-            raise InputError(f"row {number}: {len(cells)} cells, expected {len(wanted)}", key="row")
+            raise InputError(f"row {number}: {len(cells)} cells", key="row", expected=f"{len(wanted)}")
         row: dict[str, Any] = {"gaps": cells[1 : 1 + gaps]}
         for name, cell in zip(("rate", *COLUMNS, DEVIATION), (cells[0], *cells[1 + gaps :]), strict=True):
             try:
@@ -190,7 +190,7 @@ def _check_keys(entry: Mapping[str, Any], wanted: Sequence[str], where: str) -> 
     for key in entry:
         if key not in wanted:
             raise InputError(
-                f"{where}{shown(key)} is not known, expected one of {', '.join(wanted)}", key=key
+                f"{where}{shown(key)} is not known", key=key, expected=f"one of {', '.join(wanted)}"
             )
     for key in wanted:
         if key not in entry:
@@ -205,7 +205,7 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
             raise InputError.of("rate", row["rate"], "a positive number", file=f"row {number}", unit="Hz")
     rates = np.unique([float(row["rate"]) for row in rows])
     if not rates.size:
-        raise InputError("the table has no rows, expected one for each history", key="rows")
+        raise InputError("the table has no rows", key="rows", expected="one for each history")
     shape = rates.size, entries_of(gaps, reach)
     arrays = {name: np.full(shape, np.nan) for name in (*COLUMNS, DEVIATION)}
     filled = np.zeros(shape, np.bool_)
@@ -223,9 +223,9 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
         lacking = ~filled[:, number_of(history, reach)]
         if lacking.any():
             raise InputError(
-                f"the history {history_text(history)} at {rates[lacking][0]:g} Hz is missing, expected a row"
-                " for it",
+                f"the history {history_text(history)} at {rates[lacking][0]:g} Hz is missing",
                 key="history",
+                expected="a row for it",
             )
     shared = shared_numbers(gaps, reach)
     arguments = {**head, "largest_current": float(head["largest_current"])}

@@ -200,7 +200,7 @@ def tune(
     pulse, widest = print_pulse(driven, largest)
     single = single_of(driven, pulse, tolerance)
     if rate is not None and rates is not None:
-        raise InputError("rate and rates are given, expected one of them", key="rates")
+        raise InputError("rate and rates are given", key="rates", expected="one of them")
     asked = [rate] if rate is not None else rates
     grid = _all_rates(single) if asked is None else _given_rates(asked)
     nodes = len(spaced(_periods(grid, far, single), SPACING))
@@ -235,10 +235,10 @@ def tune(
     if lost.size:
         speed = float(grid[lost[0]])
         raise InputError(
-            f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before,"
-            " expected a lower rate",
+            (f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before"),
             key="rate",
             value=speed,
+            expected="a lower rate",
         )
     return draft.table().fired_by(driver, hammer)
 
@@ -338,6 +338,6 @@ def _usable(draft: Draft) -> int:
     bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
         raise InputError(
-            "the table does not keep to the limits at any rate, expected a hammer that prints", key="rates"
+            "the table does not keep to the limits at any rate", key="rates", expected="a hammer that prints"
         )
     return int(bad[0]) if bad.size else draft.rates.size

@@ -94,21 +94,24 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
             )
         if waveform.quantity != pairs[0][1].quantity:
             raise InputError(
-                f"parts[{number}] is a {waveform.quantity}, expected a {pairs[0][1].quantity} like the first",
+                f"parts[{number}] is a {waveform.quantity}",
                 key=f"parts[{number}]",
+                expected=f"a {pairs[0][1].quantity} like the first",
             )
         if not math.isfinite(waveform.support):
             raise InputError(
-                f"parts[{number}] is a {waveform.shape}, expected a waveform that ends",
+                f"parts[{number}] is a {waveform.shape}",
                 key=f"parts[{number}]",
+                expected="a waveform that ends",
             )
         offset = _offset(begin, number)
         if not (_over(*checked[-1], offset) if checked else offset >= 0.0):
             sooner = f"parts[{number - 1}] is over" if checked else "the firing"
             raise InputError(
-                f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}",
+                f"parts[{number}] begins at {offset:.9g} s",
                 key=f"parts[{number}]",
                 value=offset,
+                expected=f"a time not before {sooner}",
             )
         checked.append((offset, waveform))
     return tuple(checked)

@@ -52,12 +52,13 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
         ) from None
     if t.ndim != 1 or t.shape != y.shape:
         raise InputError(
-            f"{what}: {t.size} times and {y.size} values, expected one value for each time",
+            f"{what}: {t.size} times and {y.size} values",
             file=what,
             key="time",
+            expected="one value for each time",
         )
     if len(t) < 2:
-        raise InputError(f"{what}: {len(t)} samples, expected at least 2", file=what, key="time")
+        raise InputError(f"{what}: {len(t)} samples", file=what, key="time", expected="at least 2")
     for name, column in (("time", t), ("value", y)):
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):
@@ -100,16 +101,17 @@ def read_csv(path: Path) -> Samples:
     rows = read_sheet(path, "the sampled waveform").rows
     if not rows:
         raise InputError(
-            f"{what}: the file is empty, expected the heading {_HEADINGS} and at least 2 samples",
+            f"{what}: the file is empty",
             file=what,
             key="samples",
+            expected=f"the heading {_HEADINGS} and at least 2 samples",
         )
     time_unit, name, unit = _heading(rows[0][1], what)
     columns: tuple[list[float], list[float]] = ([], [])
     for line, row in rows[1:]:
         if len(row) != 2:
             raise InputError(
-                f"{what}: line {line} has {len(row)} cells, expected 2", file=what, key=f"line {line}"
+                f"{what}: line {line} has {len(row)} cells", file=what, key=f"line {line}", expected="2"
             )
         for cell, column in zip(row, columns, strict=True):
             column.append(finite(cell, f"{what}: line {line}"))
@@ -125,7 +127,7 @@ def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
     """Return the unit of time, what is driven, and its unit."""
     if len(cells) != 2:
         raise InputError(
-            f"{what}: {len(cells)} columns, expected the 2 columns {_HEADINGS}", file=what, key="columns"
+            f"{what}: {len(cells)} columns", file=what, key="columns", expected=f"the 2 columns {_HEADINGS}"
         )
     names, units = zip(*map(split_heading, cells), strict=True)
     for cell, unit in zip(cells, units, strict=True):
@@ -140,7 +142,7 @@ def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
         if names == ("time", quantity):
             return units[0], quantity, units[1]
     raise InputError(
-        f"{what}: columns {names[0]!r} and {names[1]!r}, expected {_HEADINGS}", file=what, key="columns"
+        f"{what}: columns {names[0]!r} and {names[1]!r}", file=what, key="columns", expected=_HEADINGS
     )
 
 

@@ -71,7 +71,7 @@ def _dot(table: Sensitivities, dot: int | None, quantities: Sequence[str]) -> in
         return 0
     if dot is None:
         if not struck:
-            raise InputError("all dots are lost, expected one that struck", key="dot")
+            raise InputError("all dots are lost", key="dot", expected="one that struck")
         return struck[0]
     if not 0 <= dot < len(table.dots):
         raise InputError.of("dot", dot, f"a number from 0 to {len(table.dots) - 1}", written=str(dot))
@@ -86,7 +86,9 @@ def _sensitivities(table: Sensitivities, name: str, dot: int) -> FloatArray:
     if name in table.run_quantities:
         return np.asarray(table.run_logarithmic[table.run_quantities.index(name)])
     known = ", ".join((*table.quantities, *table.run_quantities))
-    raise InputError(f"quantity = {name!r} is not known, expected one of {known}", key="quantity", value=name)
+    raise InputError(
+        f"quantity = {name!r} is not known", key="quantity", value=name, expected=f"one of {known}"
+    )
 
 
 def _panel(ax: Axes, table: Sensitivities, values: FloatArray, bars: int) -> None:

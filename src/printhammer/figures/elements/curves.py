@@ -27,7 +27,7 @@ def waveform_of(hammer: Hammer) -> Waveform:
     """Return the standard waveform of a hammer."""
     if hammer.waveform is None:
         raise InputError(
-            f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]", key="waveform"
+            f"the hammer {hammer.name!r} has no waveform to fire", key="waveform", expected="a [waveform]"
         )
     return hammer.waveform
 
@@ -110,8 +110,9 @@ def reach(hammer: Hammer) -> tuple[float, float]:
     near = hammer.origin if hammer.position is not None else max(low, min(0.0, end))
     if hammer.platen is None and hammer.pack is None and not math.isfinite(high):
         raise InputError(
-            f"the hammer {hammer.name!r} has neither platen nor pack, expected one to scale the figure",
+            f"the hammer {hammer.name!r} has neither platen nor pack",
             key="pack",
+            expected="one to scale the figure",
         )
     if hammer.pack is not None and hammer.front is not None:
         end = max(end, hammer.front + 0.2 * abs(hammer.front - near))

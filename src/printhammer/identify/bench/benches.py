@@ -92,9 +92,10 @@ def magnet(
     """Hold the armature at displacements, m, with currents, A, in the coil."""
     if hammer.magnet is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [magnet], expected one to measure its force",
+            f"{hammer.path}: the hammer has no [magnet]",
             file=hammer.path,
             key="magnet",
+            expected="one to measure its force",
         )
     places = _places(hammer, displacements)
     levels = _currents(hammer) if currents is None else _array(currents, "currents")
@@ -105,9 +106,10 @@ def magnet(
     if not np.isfinite(total).all():
         bad = float(x[~np.isfinite(total)][0])
         raise InputError(
-            f"{hammer.path}: the magnet has no force at {bad:.6g} m, expected its range to be kept",
+            f"{hammer.path}: the magnet has no force at {bad:.6g} m",
             file=hammer.path,
             key="magnet",
+            expected="its range to be kept",
         )
     return Bench(
         "static force of magnet and spring, armature held, pack absent; positive toward the paper",
@@ -125,9 +127,10 @@ def spring(
     """Hold the armature at displacements, m, with the magnet taken out."""
     if hammer.spring is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [spring], expected one to measure its force",
+            f"{hammer.path}: the hammer has no [spring]",
             file=hammer.path,
             key="spring",
+            expected="one to measure its force",
         )
     x = _places(hammer, displacements)
     force = StaticForce(hammer)
@@ -148,7 +151,7 @@ def pack(
     """Press the pack to largest indentations, m, each on fresh paper, and let it go."""
     if hammer.pack is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [pack], expected one to press", file=hammer.path, key="pack"
+            f"{hammer.path}: the hammer has no [pack]", file=hammer.path, key="pack", expected="one to press"
         )
     deepest = _peaks(hammer) if peaks is None else _array(peaks, "peaks")
     if points < 2 or not (deepest > 0.0).all():
@@ -186,9 +189,10 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
     """Throw the armature alone at the backstop with speeds, m/s."""
     if hammer.backstop is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [backstop], expected one to rebound from",
+            f"{hammer.path}: the hammer has no [backstop]",
             file=hammer.path,
             key="backstop",
+            expected="one to rebound from",
         )
     impacts = np.linspace(SPEEDS[0], SPEEDS[1], SPEEDS[2]) if speeds is None else _array(speeds, "speeds")
     if not (impacts > 0.0).all():
@@ -211,9 +215,10 @@ def motion(
 
     if hammer.waveform is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] to fire, expected one",
+            f"{hammer.path}: the hammer has no [waveform] to fire",
             file=hammer.path,
             key="waveform",
+            expected="one",
         )
     first, last, rate, length = _record(sensor, duration, before)
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
@@ -279,7 +284,7 @@ def _record(
 
     rate = sensor.sampling_rate
     if rate is None:
-        raise InputError("the sensor has no sampling rate, expected one for a record", key="sensor")
+        raise InputError("the sensor has no sampling rate", key="sensor", expected="one for a record")
     length = CYCLE if duration is None else read_positive(duration, "s", "duration")
     early = read_number(before, "s", "before")
     if early < 0.0:
@@ -292,7 +297,7 @@ def _record(
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
     if last * each - first > _MOST:
         raise InputError(
-            f"a record of {length:.6g} s at {rate:.6g} Hz is too long, expected a shorter one", key="length"
+            f"a record of {length:.6g} s at {rate:.6g} Hz is too long", key="length", expected="a shorter one"
         )
     return first, last, rate, length
 
@@ -313,9 +318,10 @@ def _places(hammer: Hammer, displacements: npt.ArrayLike | None) -> FloatArray:
     low, high = hammer.origin, StaticForce(hammer).end
     if not low < high or (hammer.platen is None and hammer.pack is None):
         raise InputError(
-            f"{hammer.path}: the hammer has no platen or pack, expected displacements to be given",
+            f"{hammer.path}: the hammer has no platen or pack",
             file=hammer.path,
             key="platen",
+            expected="displacements to be given",
         )
     return np.linspace(low, high, DISPLACEMENTS)
 
@@ -327,9 +333,10 @@ def _currents(hammer: Hammer) -> FloatArray:
         return np.linspace(0.0, typical_current(hammer, PulseTrain(hammer.waveform)), CURRENTS)
     if hammer.waveform is None or hammer.waveform.unit != "A":
         raise InputError(
-            f"{hammer.path}: the hammer has no current to fire, expected currents to be given",
+            f"{hammer.path}: the hammer has no current to fire",
             file=hammer.path,
             key="current",
+            expected="currents to be given",
         )
     return np.linspace(0.0, HIGHEST_CURRENT * hammer.waveform.peak, CURRENTS)
 
@@ -338,9 +345,10 @@ def _peaks(hammer: Hammer) -> FloatArray:
     thickness = getattr(hammer.pack, "thickness", None)
     if thickness is None:
         raise InputError(
-            f"{hammer.path}: the pack has no thickness, expected the largest indentations to be given",
+            f"{hammer.path}: the pack has no thickness",
             file=hammer.path,
             key="pack",
+            expected="the largest indentations to be given",
         )
     return float(thickness) * np.array(PEAKS)
 

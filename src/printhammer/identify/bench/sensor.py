@@ -48,7 +48,7 @@ class Amount:
             of = tail.strip() or FULL_SCALE
             if of not in (FULL_SCALE, READING):
                 raise InputError(
-                    f"{name}: {text!r}, expected nothing, {FULL_SCALE!r} or {READING!r} after %", key=name
+                    f"{name}: {text!r}", key=name, expected=f"nothing, {FULL_SCALE!r} or {READING!r} after %"
                 )
             size = read_number(f"{share.strip()} %", "1", name)
         else:
@@ -74,7 +74,7 @@ class Channel(Declared):
     def __post_init__(self) -> None:
         if self.resolution.of == READING:
             raise InputError(
-                f"a resolution {READING} is given, expected one in steps of the same size", key="resolution"
+                f"a resolution {READING} is given", key="resolution", expected="one in steps of the same size"
             )
 
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
@@ -185,8 +185,9 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
     for name in settings:
         if name not in (*PARTS, *_OTHERS):
             raise InputError(
-                f"the sensor setting {name!r} is not known, expected one of {', '.join((*PARTS, *_OTHERS))}",
+                f"the sensor setting {name!r} is not known",
                 key="sensor",
+                expected=f"one of {', '.join((*PARTS, *_OTHERS))}",
             )
     if settings.get("exact"):
         sensor = sensor.exact()
@@ -196,7 +197,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
             if name not in channels:
                 known = ", ".join(channels)
                 raise InputError(
-                    f"{role}: the quantity {name!r} is not measured, expected one of {known}", key=role
+                    f"{role}: the quantity {name!r} is not measured", key=role, expected=f"one of {known}"
                 )
             amount = Amount.read(written, units[name], f"{role} of {name}", signed=role == "offset")
             channels[name] = replace(channels[name], **{role: amount})
@@ -206,7 +207,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
             changes[name] = read(settings[name], name)
     if sensor.sampling_rate is None and any(changes.get(name) for name in ("sampling_rate", "bandwidth")):
         raise InputError(
-            "a sampling rate or bandwidth is given, expected it with a record of a motion only", key="rate"
+            "a sampling rate or bandwidth is given", key="rate", expected="it with a record of a motion only"
         )
     return replace(sensor, **changes)
 
@@ -242,13 +243,14 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
             if quantity not in quantities:
                 known = ", ".join(quantities)
                 raise InputError(
-                    f"{part} {text!r}: the quantity {quantity!r} is not known, expected one of {known}",
+                    f"{part} {text!r}: the quantity {quantity!r} is not known",
                     key=part,
                     value=text,
+                    expected=f"one of {known}",
                 )
             if quantity in amounts:
                 raise InputError(
-                    f"{part} {text!r}: {quantity} is given twice, expected it once", key=part, value=text
+                    f"{part} {text!r}: {quantity} is given twice", key=part, value=text, expected="it once"
                 )
             amounts[quantity] = amount.strip() if equals else text.strip()
     return amounts

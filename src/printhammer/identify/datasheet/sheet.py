@@ -141,14 +141,16 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
     for key in document:
         if key not in known:
             raise InputError(
-                f"the key {shown(key, quotes=False)} is not known, expected {nearest(key, known)}", key=key
+                f"the key {shown(key, quotes=False)} is not known", key=key, expected=f"{nearest(key, known)}"
             )
     for key in [key for key, needed in TEXTS.items() if needed] + [
         *(key for key, (_si, needed) in QUANTITIES.items() if needed),
         "force",
     ]:
         if key not in document:
-            raise InputError(f"{key} is missing, expected {_WANTED.get(key) or _quantity_text(key)}", key=key)
+            raise InputError(
+                f"{key} is missing", key=key, expected=f"{_WANTED.get(key) or _quantity_text(key)}"
+            )
     texts = {key: document[key] for key in TEXTS if key in document}
     for key, text in texts.items():
         if not isinstance(text, str) or not text.strip():
@@ -165,7 +167,9 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
         for key, value in table.items():
             if key not in units:
                 raise InputError(
-                    f"the key {name}.{key} is not known, expected {nearest(key, units)}", key=f"{name}.{key}"
+                    f"the key {name}.{key} is not known",
+                    key=f"{name}.{key}",
+                    expected=f"{nearest(key, units)}",
                 )
             entries[f"{name}.{key}"] = _entry(f"{name}.{key}", value, units[key])
     force = document["force"]
@@ -251,7 +255,7 @@ def _assumed(document: Mapping[str, Any]) -> frozenset[str]:
         if key not in known:
             expected = nearest(str(key), known)
             raise InputError(
-                f"assumed: {shown(key)} is no key of this sheet, expected {expected}", key="assumed"
+                f"assumed: {shown(key)} is no key of this sheet", key="assumed", expected=expected
             )
     return frozenset(assumed)
 
@@ -264,7 +268,7 @@ def _why(document: Mapping[str, Any]) -> dict[str, str]:
         raise InputError.of("why", why, "a table of keys and texts", written=shown(why), said=": expected")
     for key in why:
         if key not in _keys(document):
-            raise InputError(f"why.{key} is given, expected a key of this sheet", key=f"why.{key}")
+            raise InputError(f"why.{key} is given", key=f"why.{key}", expected="a key of this sheet")
     return dict(why)
 
 
@@ -272,7 +276,7 @@ def _check(sheet: DataSheet) -> None:
     """Refuse what does not fit together."""
     gaps = [gap.si for gap, _force in sheet.force]
     if len(set(gaps)) < len(gaps):
-        raise InputError("force: a gap is given twice, expected one force at each", key="force")
+        raise InputError("force: a gap is given twice", key="force", expected="one force at each")
     restitution = sheet.si("stop.restitution", 0.0)
     if restitution > 1.0:
         raise InputError.of(

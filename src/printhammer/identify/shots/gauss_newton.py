@@ -61,9 +61,10 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
     if blind:
         raise InputError(
-            f"{where}: nothing in the records depends on {blind[0]}, expected it not to be free",
+            f"{where}: nothing in the records depends on {blind[0]}",
             file=where,
             key="free",
+            expected="it not to be free",
         )
     values, vectors = singular(design / sizes)
     if values[0] * _DEGENERATE > values[-1]:
@@ -72,10 +73,13 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     tied = [name for name, part in zip(names, direction, strict=True) if part > _SHARE * direction.max()]
     listed = tied[0] if len(tied) == 1 else f"{', '.join(tied[:-1])} and {tied[-1]}"
     raise InputError(
-        f"{where}: a motion cannot tell apart {listed}: changed together they leave the records as"
-        " they are, expected at least one of them to be held",
+        (
+            f"{where}: a motion cannot tell apart {listed}: changed together they leave the"
+            " records as they are"
+        ),
         file=where,
         key="free",
+        expected="at least one of them to be held",
     )
 
 
@@ -239,8 +243,9 @@ class GaussNewton:
                 length *= 0.5
                 if length < _SHORTEST:
                     raise InputError(
-                        "the fit does not converge, expected constants nearer to the truth to begin with",
+                        "the fit does not converge",
                         key="fit",
+                        expected="constants nearer to the truth to begin with",
                     )
             values, states, chains = new, moved, trial
         raise InputError(f"the fit has not converged after {_MOST_STEPS} steps", key="fit")

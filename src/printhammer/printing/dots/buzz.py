@@ -264,7 +264,7 @@ class _Search:
         for name in ("pack", "backstop", "waveform"):
             if getattr(hammer, name) is None:
                 raise InputError(
-                    f"the hammer {hammer.name!r} has no {name}, expected one for buzz printing", key=name
+                    f"the hammer {hammer.name!r} has no {name}", key=name, expected="one for buzz printing"
                 )
         if not 1 <= fewest <= pulses:
             raise InputError.of(

@@ -83,7 +83,7 @@ def judge(
     shape = dots.fired.shape
     for name, values in (("wanted", wanted), ("slot_times", slot_times)):
         if np.shape(values) != shape:
-            raise InputError(f"{name}: an array of shape {np.shape(values)}, expected {shape}", key=name)
+            raise InputError(f"{name}: an array of shape {np.shape(values)}", key=name, expected=shape)
     asked = np.asarray(wanted, dtype=np.bool_)
     run = dots.fired.copy()
     if ok is not None:

@@ -50,9 +50,10 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     pulse = pulse_of(hammer, waveform)
     if hammer.front is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no pack, expected one that a dot is made on",
+            f"{hammer.path}: the hammer has no pack",
             file=hammer.path,
             key="pack",
+            expected="one that a dot is made on",
         )
     motion = simulate(hammer, PulseTrain(pulse), duration=wait_of(pulse), points=2, tolerance=tolerance)
     if not motion.ok:
@@ -67,9 +68,10 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     known = [value for value in (*values, *energies) if value is not None]
     if len(known) < len(values) + len(energies) or not known[0] > 0.0:
         raise InputError(
-            f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints",
+            f"{hammer.path}: a single pulse makes no dot",
             file=hammer.path,
             key="pulse",
+            expected="a hammer that prints",
         )
     return Nominal(*known)
 
@@ -106,8 +108,9 @@ def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] to fire, expected one",
+            f"{hammer.path}: the hammer has no [waveform] to fire",
             file=hammer.path,
             key="waveform",
+            expected="one",
         )
     return pulse

@@ -74,7 +74,7 @@ class Paper(Declared):
             for key in keys:
                 if key not in known:
                     odd = key if key.isprintable() else shown(key)
-                    raise InputError(f"{odd} is not known, expected {', '.join(known)}", key=odd)
+                    raise InputError(f"{odd} is not known", key=odd, expected=f"{', '.join(known)}")
             values: dict[str, Any] = {
                 key: read_number(value, _UNITS[key], key) if key in _UNITS else value
                 for key, value in keys.items()
@@ -105,9 +105,10 @@ class Paper(Declared):
         for key, value in spread.items():
             if value and key not in hammer.constants:
                 raise InputError(
-                    f"{hammer.path}: paper that varies, expected a hammer with {key}",
+                    f"{hammer.path}: paper that varies",
                     file=hammer.path,
                     key=key,
+                    expected=f"a hammer with {key}",
                 )
         if not any(spread.values()):
             return (hammer,) * slots

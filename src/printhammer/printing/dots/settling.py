@@ -79,9 +79,10 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
     """Fire a hammer once from rest, its own waveform or another, and watch it settle."""
     if hammer.position is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no backstop, expected one to settle on",
+            f"{hammer.path}: the hammer has no backstop",
             file=hammer.path,
             key="backstop",
+            expected="one to settle on",
         )
     rest = rest_state(hammer)
     motion = simulate(

@@ -50,7 +50,7 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
     """
     if not 1 <= order <= 16:
         raise InputError(
-            f"order = {order!r} of a de Bruijn cycle, expected 1 to 16", key="order", value=order
+            f"order = {order!r} of a de Bruijn cycle", key="order", value=order, expected="1 to 16"
         )
     cycle: list[int] = []
     word = [0]
@@ -144,12 +144,15 @@ def checked_drives(
     """
     drives = strategy(hammer, patterns, rate)
     if len(drives) != len(patterns):
-        raise InputError(f"the strategy gives {len(drives)} drives, expected {len(patterns)}", key="strategy")
+        raise InputError(
+            f"the strategy gives {len(drives)} drives", key="strategy", expected=f"{len(patterns)}"
+        )
     for slots, count in zip(patterns, firings_of(drives).counts.tolist(), strict=True):
         if count != len(slots):
             raise InputError(
-                f"the strategy gives {count} firings for the slots {slots}, expected {len(slots)}",
+                f"the strategy gives {count} firings for the slots {slots}",
                 key="strategy",
+                expected=f"{len(slots)}",
             )
     return drives
 

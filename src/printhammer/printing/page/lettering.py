@@ -129,7 +129,7 @@ def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
         if up + down <= wires:
             return font, up
     raise InputError(
-        f"{path}: {wires} wires are too few for this font, expected more", file=path, key="wires"
+        f"{path}: {wires} wires are too few for this font", file=path, key="wires", expected="more"
     )
 
 
@@ -182,7 +182,7 @@ def lettered(
         some = ", ".join(repr(mark) for mark in lacking[:_NAMED])
         more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
         raise InputError(
-            f"text: the font {name} has no {some}{more}, expected characters that it has", key="text"
+            f"text: the font {name} has no {some}{more}", key="text", expected="characters that it has"
         )
     dots = {mark: glyph(mark) for mark in set("".join(lines))}
     rows = [[dots[mark] for mark in line] for line in lines]

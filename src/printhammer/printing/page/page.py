@@ -254,11 +254,11 @@ def print_page(
         raise InputError(f"{what!r} is expected to be a pattern or a text", value=what, key="pattern")
     slot_rate = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
-        raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most", key="pattern")
+        raise InputError(f"{pattern.wanted} dots are wanted", key="pattern", expected=f"{_MOST_DOTS} at most")
     print_head = head_of(pattern.wires) if head is None else head
     if print_head.wires != pattern.wires:
         raise InputError(
-            f"head: {print_head.wires} wires, expected {pattern.wires} as the pattern has", key="head"
+            f"head: {print_head.wires} wires", key="head", expected=f"{pattern.wires} as the pattern has"
         )
     bounds = PRESETS["slots"] if limits is None else limits
     single = nominal(hammer, waveform, tolerance=tolerance)

@@ -76,7 +76,7 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArra
         if key not in _KEYS:
             odd = key if key.isprintable() else shown(key)
             raise InputError(
-                f"{source}: {odd} is not known, expected {', '.join(_KEYS)}", file=source, key=odd
+                f"{source}: {odd} is not known", file=source, key=odd, expected=f"{', '.join(_KEYS)}"
             )
     for key in _KEYS:
         if key not in data:
@@ -99,23 +99,26 @@ def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
     """Return the dots of rows of marks, print line by print line."""
     if len(rows) % wires:
         raise InputError(
-            f"{source}: rows has {len(rows)} rows, expected a multiple of wires = {wires}",
+            f"{source}: rows has {len(rows)} rows",
             file=source,
             key="rows",
+            expected=f"a multiple of wires = {wires}",
         )
     for number, row in enumerate(rows, 1):
         odd = [mark for mark in row if mark not in (_DOT, _EMPTY)]
         if odd:
             raise InputError(
-                f"{source}: rows: {odd[0]!r} in row {number}, expected '{_DOT}' and '{_EMPTY}'",
+                f"{source}: rows: {odd[0]!r} in row {number}",
                 file=source,
                 key="rows",
+                expected=f"'{_DOT}' and '{_EMPTY}'",
             )
         if len(row) != len(rows[0]):
             raise InputError(
-                f"{source}: rows: row {number} has {len(row)} slots, expected {len(rows[0])} as the first",
+                f"{source}: rows: row {number} has {len(row)} slots",
                 file=source,
                 key="rows",
+                expected=f"{len(rows[0])} as the first",
             )
     dots = np.array([[mark == _DOT for mark in row] for row in rows], np.bool_)
     return dots.reshape(-1, wires, len(rows[0]))
@@ -130,9 +133,10 @@ def _bitmap(path: Path, wires: int) -> BoolArray:
         with Image.open(path, formats=sorted(set(BITMAPS.values()))) as image:
             if image.width * image.height > _MOST_PIXELS:
                 raise InputError(
-                    f"{path}: {image.width} x {image.height} pixels, expected at most {_MOST_PIXELS}",
+                    f"{path}: {image.width} x {image.height} pixels",
                     file=path,
                     key="pixels",
+                    expected=f"at most {_MOST_PIXELS}",
                 )
             pixels = np.asarray(image.convert("LA"))
     except (OSError, ValueError, SyntaxError) as error:
@@ -206,12 +210,12 @@ class Pattern(Declared):
             dots = dots[np.newaxis]
         if dots.ndim != 3 or not 1 <= dots.shape[1] <= MOST_WIRES or dots.size > MOST_CELLS:
             raise InputError(
-                f"pattern {self.name!r}: an array of shape {np.shape(self.dots)}, expected print lines, up to"
-                f" {MOST_WIRES} wires and slots, {MOST_CELLS} cells at most",
+                f"pattern {self.name!r}: an array of shape {np.shape(self.dots)}",
                 key="dots",
+                expected=f"print lines, up to {MOST_WIRES} wires and slots, {MOST_CELLS} cells at most",
             )
         if not dots.any():
-            raise InputError(f"pattern {self.name!r}: no dot is wanted, expected at least one", key="dots")
+            raise InputError(f"pattern {self.name!r}: no dot is wanted", key="dots", expected="at least one")
         dots.flags.writeable = False
         object.__setattr__(self, "dots", dots)
 

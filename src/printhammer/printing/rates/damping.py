@@ -63,9 +63,10 @@ class Material(Declared):
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise InputError(
-                f"kind = {self.kind!r} of a material, expected one of {', '.join(KINDS)}",
+                f"kind = {self.kind!r} of a material",
                 key="kind",
                 value=self.kind,
+                expected=f"one of {', '.join(KINDS)}",
             )
 
 
@@ -253,16 +254,18 @@ def damping_study(
     bounds = Limits() if limits is None else limits
     if hammer.backstop is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no backstop, expected one of some material",
+            f"{hammer.path}: the hammer has no backstop",
             file=hammer.path,
             key="backstop",
+            expected="one of some material",
         )
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":
         raise InputError(
-            f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current",
+            f"{hammer.path}: the waveform is a {pulse.quantity}",
             file=hammer.path,
             key="waveform",
+            expected="a current",
         )
     single = nominal(hammer, tolerance=tolerance)
     tried = tuple(materials(hammer, single) if others is None else others)

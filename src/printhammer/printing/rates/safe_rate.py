@@ -255,7 +255,7 @@ def rate_grid(first: float | str, last: float | str, step: float | str) -> Float
     # The last rate belongs to the grid also where the division is rounded down.
     count = math.floor((high - low) / apart * (1.0 + 1e-12)) + 1
     if count > MOST_RATES:
-        raise InputError(f"{count} rates, expected at most {MOST_RATES}", key="rates")
+        raise InputError(f"{count} rates", key="rates", expected=f"at most {MOST_RATES}")
     return np.array([low + apart * number for number in range(count)])
 
 

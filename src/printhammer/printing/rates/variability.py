@@ -76,26 +76,29 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
     if by.current or by.magnet:
         if not isinstance(magnet, InverseRootMagnet):
             raise InputError(
-                f"{hammer.path}: perturbation of current or magnet, expected a magnet of law 'inverse-root'",
+                f"{hammer.path}: perturbation of current or magnet",
                 file=hammer.path,
                 key="magnet",
+                expected="a magnet of law 'inverse-root'",
             )
         changes["magnet.Bm"] = magnet.Bm * (1.0 + by.current)
         changes["magnet.Am"] = magnet.Am * (1.0 + by.magnet)
     if by.travel or by.forms:
         if pack is None:
             raise InputError(
-                f"{hammer.path}: perturbation of travel or forms, expected a hammer with a pack",
+                f"{hammer.path}: perturbation of travel or forms",
                 file=hammer.path,
                 key="travel",
+                expected="a hammer with a pack",
             )
         front = pack.front + by.travel
         if by.forms:
             if not isinstance(pack, PowerPack):
                 raise InputError(
-                    f"{hammer.path}: perturbation of forms, expected a pack of the law 'power'",
+                    f"{hammer.path}: perturbation of forms",
                     file=hammer.path,
                     key="forms",
+                    expected="a pack of the law 'power'",
                 )
             front -= by.forms * pack.thickness
             changes["pack.thickness"] = pack.thickness * (1.0 + by.forms)
@@ -109,10 +112,10 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
             changes["backstop.relaxation_time"] = backstop.relaxation_time * (1.0 + by.damping)
         else:
             raise InputError(
-                f"{hammer.path}: perturbation of damping, expected a backstop with damping or"
-                " relaxation time",
+                f"{hammer.path}: perturbation of damping",
                 file=hammer.path,
                 key="damping",
+                expected="a backstop with damping or relaxation time",
             )
     return hammer.replace(changes, source=f"perturbed: {by.name}") if changes else hammer
 
@@ -217,10 +220,10 @@ class Variability(Declared):
             if not there:
                 every = ", ".join(dict.fromkeys(key for group in CONSTANTS[name] for key in group))
                 raise InputError(
-                    f"{hammer.path}: variability of {name} = {value:g}, expected 0 for a hammer without any"
-                    f" of {every}",
+                    f"{hammer.path}: variability of {name} = {value:g}",
                     file=hammer.path,
                     key=name,
+                    expected=f"0 for a hammer without any of {every}",
                 )
             spread |= {key: value if name == "travel" else value * abs(known[key].si) for key in there}
         return spread
@@ -243,10 +246,13 @@ class Variability(Declared):
             if len(drawn) >= count:
                 return drawn[:count]
         raise InputError(
-            f"{hammer.path}: {len(drawn)} of {_TRIES * count} hammers drawn with {self.text} rest at the"
-            " backstop, expected a smaller variability",
+            (
+                f"{hammer.path}: {len(drawn)} of {_TRIES * count} hammers drawn with {self.text} rest"
+                " at the backstop"
+            ),
             file=hammer.path,
             key="variability",
+            expected="a smaller variability",
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:

@@ -61,7 +61,7 @@ def try_map(state: State, known: State | None) -> State:
     """
     if not state.low < state.high:
         raise InputError(
-            f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones", key="map"
+            f"map: rates from {state.low:g} Hz to {state.high:g} Hz", key="map", expected="ascending ones"
         )
     if known is not None and alike(state, known):
         return known

@@ -116,9 +116,10 @@ def read_file(text: str, where: str, shelf: Shelf) -> Told:
     """
     if len(text) > LARGEST_MESSAGE:
         raise InputError(
-            f"{where}: {len(text)} characters, expected at most {LARGEST_MESSAGE}",
+            f"{where}: {len(text)} characters",
             file=where,
             key="characters",
+            expected=f"at most {LARGEST_MESSAGE}",
         )
     try:
         content = json.loads(text)

@@ -78,9 +78,10 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     if told is not None:
         if len(told) != len(columns):
             raise InputError(
-                f"{where}: {len(columns)} columns, expected as many answers, not {len(told)}",
+                f"{where}: {len(columns)} columns",
                 file=where,
                 key="columns",
+                expected=f"as many answers, not {len(told)}",
             )
         columns = [
             column._replace(quantity=what, unit=unit)
@@ -93,9 +94,10 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     for quantity in QUANTITIES:
         if known.count(quantity) > 1:
             raise InputError(
-                f"{where}: {known.count(quantity)} columns of {quantity}, expected one",
+                f"{where}: {known.count(quantity)} columns of {quantity}",
                 file=where,
                 key=quantity,
+                expected="one",
             )
     if "time" not in known or not set(known) - {"time", ""}:
         raise InputError(
@@ -124,15 +126,19 @@ def _checked(record: Record, where: str) -> Record:
         last, peak = float(record.times[-1]), float(np.abs(record.curves[name]).max())
         if last > LONGEST_TIME:
             raise InputError(
-                f"{where}: a {name} of {last:g} s, expected at most {LONGEST_TIME:g} s", file=where, key=name
+                f"{where}: a {name} of {last:g} s",
+                file=where,
+                key=name,
+                expected=f"at most {LONGEST_TIME:g} s",
             )
         most = LARGEST_VOLTAGE if name == "voltage" else LARGEST_CURRENT
         if peak > most:
             unit = QUANTITIES[name]
             raise InputError(
-                f"{where}: a {name} of {peak:g} {unit}, expected at most {most:g} {unit}",
+                f"{where}: a {name} of {peak:g} {unit}",
                 file=where,
                 key=name,
+                expected=f"at most {most:g} {unit}",
             )
     return record
 
@@ -141,7 +147,7 @@ def _table(text: str, where: str) -> tuple[list[Column], list[list[str]], int]:
     """Return the columns of a table, its rows of numbers, and the number of the first of these."""
     if not text.strip():
         raise InputError(
-            f"{where}: the file is empty, expected the heading {EXPECTED}", file=where, key="heading"
+            f"{where}: the file is empty", file=where, key="heading", expected=f"the heading {EXPECTED}"
         )
     delimiter = _delimiter(text)
     rows = [_bare(cells) for _line, cells in sheet_of(text, where, delimiter=delimiter).rows]
@@ -157,15 +163,16 @@ def _table(text: str, where: str) -> tuple[list[Column], list[list[str]], int]:
     width = len(rows[begin])
     if width > MOST_COLUMNS:
         raise InputError(
-            f"{where}: {width} columns, expected at most {MOST_COLUMNS}", file=where, key="columns"
+            f"{where}: {width} columns", file=where, key="columns", expected=f"at most {MOST_COLUMNS}"
         )
     numbers = rows[begin:]
     for k, row in enumerate(numbers):
         if len(row) != width:
             raise InputError(
-                f"{where}: row {begin + k + 1} has {len(row)} cells, expected {width} numbers",
+                f"{where}: row {begin + k + 1} has {len(row)} cells",
                 file=where,
                 key=f"row {begin + k + 1}",
+                expected=f"{width} numbers",
             )
     if delimiter != "," and any(_WHOLE.fullmatch(cell) for row in numbers[:50] for cell in row):
         numbers = [[cell.replace(",", ".") for cell in row] for row in numbers]

@@ -101,8 +101,9 @@ class State(Declared):
         if self.waveform is None:
             if self.changed.waveform is None:
                 raise InputError(
-                    f"the hammer {self.base.name!r} has no [waveform], expected one set in the editor",
+                    f"the hammer {self.base.name!r} has no [waveform]",
                     key="waveform",
+                    expected="one set in the editor",
                 )
             return self.changed.waveform
         return self._set_waveform
@@ -141,11 +142,11 @@ def check_constant(base: Hammer, key: str, value: float) -> None:
     if span is None:
         named = (*base.constants, *open_constants(base))
         known = ", ".join(name for name in named if not name.startswith("waveform."))
-        raise InputError(f"constants.{key} is not known, expected one of {known}", key=f"constants.{key}")
+        raise InputError(f"constants.{key} is not known", key=f"constants.{key}", expected=f"one of {known}")
     if not span.low <= value <= span.high:
         unit = (base.constants.get(key) or open_constants(base)[key][0]).si_unit
         raise InputError(
-            f"{key} = {value:.9g} {unit}, expected {span.low:.6g} to {span.high:.6g}", key=key, value=value
+            f"{key} = {value:.9g} {unit}", key=key, value=value, expected=f"{span.low:.6g} to {span.high:.6g}"
         )
 
 

@@ -140,8 +140,9 @@ def both(low: str | None, high: str | None, first: str, last: str, parameter: st
     """Return both ends of a range; InputError where one is missing."""
     if low is None or high is None:
         raise InputError(
-            f"{first if low is None else last} is missing, expected the range of {parameter}",
+            f"{first if low is None else last} is missing",
             key=first if low is None else last,
+            expected=f"the range of {parameter}",
         )
     return low, high
 

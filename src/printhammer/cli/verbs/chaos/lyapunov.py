@@ -110,7 +110,7 @@ def _periods(
         return values if unit == "s" else 1.0 / values
     if lowest is None or highest is None:
         missing = "--from" if lowest is None else "--to"
-        raise InputError(f"{missing} is missing, expected both --from and --to", key=missing)
+        raise InputError(f"{missing} is missing", key=missing, expected="both --from and --to")
     low, high = read_positive(lowest, "s", "--from"), read_positive(highest, "s", "--to")
     count = _STEPS if steps is None else steps
     if not high > low:

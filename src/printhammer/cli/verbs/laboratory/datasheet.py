@@ -34,7 +34,7 @@ def from_datasheet(
         typer.echo(_example(example), nl=False)
         return Answer()
     if sheet is None:
-        raise InputError("SHEET is missing, expected a data sheet; --example NAME prints one", key="SHEET")
+        raise InputError("SHEET is missing", key="SHEET", expected="a data sheet; --example NAME prints one")
     from printhammer.identify.datasheet.build import hammer_of
     from printhammer.identify.datasheet.sheet import read_sheet
 

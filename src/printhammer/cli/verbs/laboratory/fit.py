@@ -236,7 +236,7 @@ def motion(
 
         if known is None:
             raise InputError(
-                "the hammer is missing, expected --hammer with the constants known already", key="hammer"
+                "the hammer is missing", key="hammer", expected="--hammer with the constants known already"
             )
         keys = [key.strip() for key in free.split(",")] if free is not None else None
         tables = opt.given(magnet=magnet, spring=spring, pack=pack, backstop=backstop)
@@ -279,7 +279,7 @@ def coil(
 
         if known is None:
             raise InputError(
-                "the hammer is missing, expected --hammer with the constants known already", key="hammer"
+                "the hammer is missing", key="hammer", expected="--hammer with the constants known already"
             )
         keys = list(FREE) if free is None else _keys(free)
         return fit_coil(files, known, free=[*keys, *_keys(also or "")], **passed)

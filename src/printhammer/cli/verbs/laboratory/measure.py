@@ -95,7 +95,7 @@ def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str,
         raise InputError.of("KIND", kind, f"one of {', '.join((*KINDS, ALL))}")
     if out is None:
         what = "a folder" if kind == ALL else "a file"
-        raise InputError(f"--out is missing, expected {what} for the measurements", key="--out")
+        raise InputError("--out is missing", key="--out", expected=f"{what} for the measurements")
     if kind != ALL:
         if out.suffix.lower() != ".csv":
             raise InputError(f"--out {out}: expected a name that ends in .csv", key="--out")
@@ -125,9 +125,9 @@ def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str,
         if name in settings and not recorded:
             flag = name.replace("_", "-")
             raise InputError(
-                f"--{flag} {settings[name]} is given with {kinds[0]}, expected it with motion or current"
-                " only",
+                f"--{flag} {settings[name]} is given with {kinds[0]}",
                 key=f"--{flag}",
+                expected="it with motion or current only",
             )
     return {kind: applicable(SENSORS[kind], settings) for kind in kinds}
 
@@ -146,7 +146,7 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
         if not owners:
             right = ", ".join(kind for kind, make in BENCHES.items() if name in signature(make).parameters)
             raise InputError(
-                f"--{name} {text} is given with {kinds[0]}, expected it with {right} only", key=f"--{name}"
+                f"--{name} {text} is given with {kinds[0]}", key=f"--{name}", expected=f"it with {right} only"
             )
         value: Any = (
             text

@@ -36,7 +36,7 @@ def tuned_along(
     axis, values = _read(along)
     if "rate" not in options or "rates" in options:
         raise InputError(
-            "--along is given without --rate, expected one rate, such as --rate 1.3kHz", key="--along"
+            "--along is given without --rate", key="--along", expected="one rate, such as --rate 1.3kHz"
         )
     check_endings(job.wanted["out"], (*opt.DATA, ".h"), "--out")
     with job.counting("tuning") as tell:

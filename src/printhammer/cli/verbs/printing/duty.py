@@ -60,7 +60,7 @@ def duty(
         )
         if hammer is not None:
             raise InputError(
-                f"{hammer} is given, expected no hammer beside --rates", key="HAMMER", value=hammer
+                f"{hammer} is given", key="HAMMER", value=hammer, expected="no hammer beside --rates"
             )
         with located(str(rates)):
             behind = thermal_limit(**read_rates(rates))
@@ -72,7 +72,7 @@ def duty(
     for name in _NEEDED:
         if name not in passed:
             raise InputError(
-                f"--{name.replace('_', '-')} is missing, expected it beside the heat of a dot", key=name
+                f"--{name.replace('_', '-')} is missing", key=name, expected="it beside the heat of a dot"
             )
     made = thermal_duty(heat if heat is not None else _fired(hammer, passed), **passed)
     return Answer(duty_shown(made), files={"out": Content.of(made)})
@@ -84,7 +84,9 @@ def _fired(name: str | None, passed: dict[str, Any]) -> Any:
 
     if "feed" in passed:
         raise InputError(
-            "--feed is given, expected it beside --heat only: a hammer has a driver of its own", key="--feed"
+            "--feed is given",
+            key="--feed",
+            expected="it beside --heat only: a hammer has a driver of its own",
         )
     return heat_of(load_hammer(str(name), fired=True))
 

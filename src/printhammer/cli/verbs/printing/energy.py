@@ -55,11 +55,11 @@ def energy(
     passed |= {"least": "heat" if heat else "positive work", "shape": "pulses" if pulses else "free"}
     current = any(path.suffix.lower() == ".csv" for path in job.outputs)
     if pulses and current:
-        raise InputError("--pulses is given, expected no current (.csv) beside it", key="--pulses")
+        raise InputError("--pulses is given", key="--pulses", expected="no current (.csv) beside it")
     if rates is not None:
         if supply or current:
             raise InputError(
-                "--rates is given, expected neither --supply nor a current (.csv) beside it", key="--rates"
+                "--rates is given", key="--rates", expected="neither --supply nor a current (.csv) beside it"
             )
         return _at_rates(job, hammer, rates, passed)
     with job.counting("dots planned") as tell:

@@ -94,8 +94,9 @@ def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict
 
     if noise is None:
         raise InputError(
-            "--signal-noise is missing, expected the noise of a sample, such as '5 mA' or '50 mV'",
+            "--signal-noise is missing",
             key="--signal-noise",
+            expected="the noise of a sample, such as '5 mA' or '50 mV'",
         )
     with job.counting("sampling") as tell:
         study = impact_time(hammer, signal=signal, noise=[noise], dots=200, units=50, progress=tell)

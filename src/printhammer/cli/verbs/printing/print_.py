@@ -77,7 +77,7 @@ def print_(
     from printhammer.printing.page.pattern import BITMAPS
 
     if rate is None:
-        raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'", key="--rate")
+        raise InputError("--rate is missing", key="--rate", expected="slots per second such as '1.2 kHz'")
     often = read_positive(rate, "Hz", "--rate")
     if not job.outputs:
         *pages, last = (Path(name) for name in _USUAL)
@@ -113,17 +113,18 @@ def _pattern(
 
     if path is not None:
         if text is not None:
-            raise InputError("TEXT and --pattern: both are given, expected one of them", key="--pattern")
+            raise InputError("TEXT and --pattern: both are given", key="--pattern", expected="one of them")
         for name, value in (("--font", font), ("--columns", columns)):
             if value is not None:
                 raise InputError(
-                    f"{name} {value} is given beside --pattern {path}, expected with a text only",
+                    f"{name} {value} is given beside --pattern {path}",
                     key=name,
                     value=value,
+                    expected="with a text only",
                 )
         return Pattern.load(path, wires)
     if text is None:
-        raise InputError("TEXT and --pattern: neither is given, expected one of them", key="--pattern")
+        raise InputError("TEXT and --pattern: neither is given", key="--pattern", expected="one of them")
     return Pattern.from_text(
         text.replace("\\n", "\n"),
         WIRES if wires is None else wires,

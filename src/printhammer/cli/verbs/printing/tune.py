@@ -71,10 +71,10 @@ def tune(
 
     if job.wanted["report"] and not judge:
         raise InputError(
-            f"--report {job.wanted['report'][0]} is given, expected none beside --no-judge", key="--report"
+            f"--report {job.wanted['report'][0]} is given", key="--report", expected="none beside --no-judge"
         )
     if "rate" in passed and "rates" in passed:
-        raise InputError("--rate and --rates are given, expected one of them", key="--rate")
+        raise InputError("--rate and --rates are given", key="--rate", expected="one of them")
     if variability:
         from printhammer.printing.rates.variability import Variability
 
@@ -83,7 +83,7 @@ def tune(
     if along is not None:
         if job.wanted["report"]:
             raise InputError(
-                f"--report {job.wanted['report'][0]} is given, expected none beside --along", key="--report"
+                f"--report {job.wanted['report'][0]} is given", key="--report", expected="none beside --along"
             )
         return tuned_along(job, hammer, along, opt.given(tick=tick), budget, {**passed, **options}, units)
     with job.counting("tuning") as tell:

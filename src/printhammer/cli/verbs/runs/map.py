@@ -79,8 +79,9 @@ def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -
         raise InputError(f"--figure {figure}: expected a picture among the files of --out", key="--figure")
     if measured is not None:
         raise InputError(
-            f"--figure {figure} is given beside --measured {measured}, expected one or the other",
+            f"--figure {figure} is given beside --measured {measured}",
             key="--figure",
+            expected="one or the other",
         )
     return int(figure)
 
@@ -99,9 +100,9 @@ def _axes(
         moments = known[known >= 0.0]
         if len(moments) < 2:
             raise InputError(
-                f"--measured {beside.attrs['source']}: {len(moments)} times from the first firing on,"
-                " expected at least 2",
+                f"--measured {beside.attrs['source']}: {len(moments)} times from the first firing on",
                 key="--measured",
+                expected="at least 2",
             )
     if beside is not None and low is None and high is None and rates is None:
         return beside["rate"].values, moments

@@ -96,14 +96,15 @@ def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
     if file is not None:
         for name in beside:
             raise InputError(
-                f"--{name} is given beside --drive {file}, expected one or the other", key=f"--{name}"
+                f"--{name} is given beside --drive {file}", key=f"--{name}", expected="one or the other"
             )
         return load_drive(file, hammer.waveform)
     if hammer.waveform is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE",
+            f"{hammer.path}: the hammer has no [waveform] to fire",
             file=hammer.path,
             key="waveform",
+            expected="one, or --drive FILE",
         )
     if "at" in beside:
         beside["at"] = [each.strip() for each in beside["at"].split(",")]
