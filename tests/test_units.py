@@ -9,6 +9,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 from printhammer.errors import InputError
 from printhammer.units import DIMENSIONS, describe, from_si, parse, split, to_si
@@ -101,7 +102,7 @@ def test_refusals_say_what_was_expected(text: str, si_unit: str, reason: str) ->
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, True, None, "1", 10**400])
 def test_what_is_not_a_finite_number_is_refused(value: object) -> None:
-    with pytest.raises(InputError, match="not a"):
+    with refused(None, value):
         to_si(value, "m", "m")  # type: ignore[arg-type]
 
 

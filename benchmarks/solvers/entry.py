@@ -70,7 +70,9 @@ def load_peers(folder: Path) -> Peers:
     start, name = folder / "__init__.py", "printhammer_peers"
     spec = importlib.util.spec_from_file_location(name, start, submodule_search_locations=[str(folder)])
     if not start.is_file() or spec is None or spec.loader is None:
-        raise InputError(f"peers = {folder}, expected a folder of solvers with __init__.py")
+        raise InputError(
+            f"peers = {folder}, expected a folder of solvers with __init__.py", key="peers", value=folder
+        )
     for old in [key for key in sys.modules if key.partition(".")[0] == name]:
         del sys.modules[old]
     package = sys.modules[name] = importlib.util.module_from_spec(spec)
@@ -78,4 +80,6 @@ def load_peers(folder: Path) -> Peers:
         spec.loader.exec_module(package)
         return Peers(package.SINGLE, package.ENSEMBLES, package.USED)
     except (ImportError, AttributeError, SyntaxError) as error:
-        raise InputError(f"peers = {folder}, expected a folder of solvers: {error}") from error
+        raise InputError(
+            f"peers = {folder}, expected a folder of solvers: {error}", key="peers", value=folder
+        ) from error

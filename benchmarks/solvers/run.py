@@ -55,7 +55,7 @@ def run(
     from printhammer.support.threads import thread_count
 
     if threads is not None and threads < 1:
-        raise InputError(f"threads = {threads}, expected at least 1")
+        raise InputError.of("threads", threads, "at least 1")
     report_step: Say = say if say is not None else lambda _line: None
     task, others = frozen(), peers if peers is not None else Peers()
     here = machine.machine()

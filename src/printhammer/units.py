@@ -135,12 +135,16 @@ def split(text: str, si_unit: str) -> tuple[float, str]:
     match = _NUMBER.fullmatch(text)
     value = float(match[1]) if match else math.nan
     if match is None or not math.isfinite(value):
-        raise InputError(f"{text!r} is not a finite number with a unit, expected {describe(si_unit)}")
+        raise InputError(
+            f"{text!r} is not a finite number with a unit", value=text, expected=f"{describe(si_unit)}"
+        )
     unit = match[2].strip()
     if re.match(r",\s*\d", unit):
-        raise InputError(f"{text!r} has a comma, expected a number with a decimal point, such as '1.2 kHz'")
+        raise InputError(
+            f"{text!r} has a comma", value=text, expected="a number with a decimal point, such as '1.2 kHz'"
+        )
     if not unit and si_unit != "1":
-        raise InputError(f"{text!r} has no unit, expected {describe(si_unit)}")
+        raise InputError(f"{text!r} has no unit", value=text, expected=f"{describe(si_unit)}")
     return value, unit or "1"
 
 
@@ -151,7 +155,7 @@ def describe(si_unit: str) -> str:
 
 def _scaled(value: object, factor: Fraction, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"{value!r} {unit} is not a number")
+        raise InputError(f"{value!r} {unit} is not a number", value=value)
     try:
         number = float(value)
         if math.isfinite(number):
@@ -159,7 +163,7 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
             return number + 0.0 if factor == 1 else float(Fraction(repr(number)) * factor)
     except OverflowError:
         pass
-    raise InputError(f"{value!r} {unit} is not a finite number")
+    raise InputError(f"{value!r} {unit} is not a finite number", value=value)
 
 
 @lru_cache(maxsize=1024)
@@ -171,7 +175,7 @@ def _factor(unit: str, si_unit: str) -> Fraction:
         known = (name for name in DIMENSIONS if _measure(name)[1] == dimension)
         same = next(known, None)
         is_what = f"is {DIMENSIONS[same]}" if same else "is of another dimension"
-        raise InputError(f"the unit {unit!r} {is_what}, expected {describe(si_unit)}")
+        raise InputError(f"the unit {unit!r} {is_what}", value=unit, expected=f"{describe(si_unit)}")
     return size / si_size
 
 
@@ -187,7 +191,7 @@ def _measure(unit: str) -> tuple[Fraction, UnitsContainer]:
         try:
             full = registry.get_name("percent" if name == "%" else name)
         except UndefinedUnitError:
-            raise InputError(_UNKNOWN.format(unit)) from None
+            raise InputError(_UNKNOWN.format(unit), value=unit) from None
         base = Fraction(str(registry.get_root_units(full)[0]))
         size *= _power(base, power)
         dimension *= registry.get_dimensionality(full) ** power
@@ -203,7 +207,7 @@ def _factors(unit: str) -> Iterator[tuple[str, Fraction]]:
         position, sign = match.end(), -1 if match["operator"] == "/" else 1
         if position == len(text) and not match["operator"]:
             return
-    raise InputError(_UNKNOWN.format(unit))
+    raise InputError(_UNKNOWN.format(unit), value=unit)
 
 
 def _power(base: Fraction, exponent: Fraction) -> Fraction:

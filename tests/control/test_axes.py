@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.axes import AxisTables, tune_along
@@ -146,17 +147,17 @@ int main(void) {{
 
 def test_bad_axes_are_refused(tables: AxisTables) -> None:
     hammer = ph.load("hendriks-1983")
-    for axis, values, sentence in (
-        ("weather", GAPS, "axis = 'weather', expected one of rail, temperature, gap, forms"),
-        ("rail", ("90 V", "100 V"), "expected a hammer whose .waveform. is a driver on a rail"),
-        ("gap", GAPS[:1], "expected two values or more that ascend"),
-        ("gap", GAPS[::-1], "expected two values or more that ascend"),
+    for axis, values, key in (
+        ("weather", GAPS, "axis"),
+        ("rail", ("90 V", "100 V"), "rail.axis"),
+        ("gap", GAPS[:1], "gap"),
+        ("gap", GAPS[::-1], "gap"),
     ):
-        with pytest.raises(ph.InputError, match=sentence):
+        with refused(key):
             tune_along(hammer, axis, values, rate=RATE)
-    with pytest.raises(ph.InputError, match="the tables are made for"):
+    with refused("gap"):
         tables.at("30 um")
-    with pytest.raises(ph.InputError, match="budget = 1 bytes"):
+    with refused("budget"):
         tables.to_header(budget=1)
 
 
@@ -201,5 +202,5 @@ def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
         assert dot.peak_force == pytest.approx(single.force, rel=0.05)
     assert steps == sorted(steps)
     assert steps[-1][0] <= steps[-1][1]
-    with pytest.raises(ph.InputError, match=r"rail = 130 V: .* the waveform peaks at"):
+    with refused("rail.waveform"):
         tune_along(behind_a_rail, "rail", ["100 V", "130 V"], rate=RATE)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.dead_time import DeadTime
@@ -103,21 +104,21 @@ def test_one_pair_makes_a_header_too(table: DeadTime, tmp_path: Path) -> None:
 
 
 def test_what_has_no_rail_is_refused(hammer: ph.Hammer) -> None:
-    with pytest.raises(ph.InputError, match="expected a \\[waveform\\] that is a driver on a rail"):
+    with refused("waveform"):
         ph.dead_time(hammer)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "key"),
     [
-        ({"voltage": [-1.0]}, "voltage = -1.0 is expected to be greater than 0 V"),
-        ({"temperature": ["300 K"]}, "'K' is a difference of temperatures"),
-        ({"blow": 0.0}, "blow = 0.0 is expected to be greater than 0 m/s"),
-        ({"voltage": list(range(1, 202)), "temperature": list(range(100))}, "expected at most 10000 pairs"),
+        ({"voltage": [-1.0]}, "voltage"),
+        ({"temperature": ["300 K"]}, "temperature"),
+        ({"blow": 0.0}, "blow"),
+        ({"voltage": list(range(1, 202)), "temperature": list(range(100))}, "rails"),
     ],
 )
-def test_what_is_no_grid_is_refused(wire: ph.Hammer, wrong: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_what_is_no_grid_is_refused(wire: ph.Hammer, wrong: dict[str, object], key: str) -> None:
+    with refused(key):
         ph.dead_time(wire, **wrong)  # type: ignore[arg-type]
 
 

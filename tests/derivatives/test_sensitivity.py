@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import block, hertz, interpreted, made_of, power, preload
 
 import printhammer as ph
@@ -85,7 +86,7 @@ def test_a_lost_dot_has_none(hammer: "ph.Hammer") -> None:
     # The run as a whole still has its energies.
     assert np.isfinite(found.run_derivatives).all()
     assert "0 of 1 dots struck" in repr(found)
-    with pytest.raises(ph.InputError, match="all dots are lost"):
+    with refused("dot"):
         found.plot()
 
 
@@ -103,7 +104,7 @@ def test_a_constant_that_is_zero_has_an_absolute_derivative_only(hammer: "ph.Ham
     )
     slope = (other.dots - found.dots)[0, return_speed] / little
     assert found.derivatives[0, return_speed, 0] == pytest.approx(slope, rel=1e-4)
-    with pytest.raises(ph.InputError, match=r"backstop\.damping is zero"):
+    with refused("spreads"):
         found.spread({"backstop.damping": 0.01})
 
 
@@ -115,7 +116,7 @@ def test_a_sharp_edge_is_left_out_and_said() -> None:
         found = ph.sensitivities(hammer, drive, duration=1e-3)
         assert set(found.left_out) == {"waveform.rise", "waveform.decay"}
         assert "waveform.rise" not in found.constants
-        with pytest.raises(ph.InputError, match=r"waveform\.rise.* 0\.0"):
+        with refused("constant"):
             ph.sensitivities(hammer, drive, constants=["waveform.rise"])
     assert "waveform.rise" in found.attributes["left_out"]
 
@@ -185,27 +186,27 @@ def test_single_firings_are_listed_for_uneven_trains(hammer: "ph.Hammer") -> Non
 
 
 @pytest.mark.parametrize(
-    ("call", "told"),
+    ("call", "key"),
     [
-        (lambda h, d: ph.sensitivities(h, d, constants=["pack.hardness"]), r"'pack.hardness' is not known"),
-        (lambda h, d: ph.sensitivities(h, d, constants=["firing.7"]), "'firing.7' is not known"),
-        (lambda h, d: ph.sensitivities(h, d, constants=["firing.x"]), "'firing.x' is not known"),
-        (lambda h, d: ph.sensitivities(h, d, constants=["period"]), "a single period and several firings"),
+        (lambda h, d: ph.sensitivities(h, d, constants=["pack.hardness"]), "constant"),
+        (lambda h, d: ph.sensitivities(h, d, constants=["firing.7"]), "constant"),
+        (lambda h, d: ph.sensitivities(h, d, constants=["firing.x"]), "constant"),
+        (lambda h, d: ph.sensitivities(h, d, constants=["period"]), "constant"),
         (lambda h, d: ph.sensitivities(h, d, tolerance=0.0), "tolerance"),
         (lambda h, d: ph.sensitivities(h, d, duration="-1 ms"), "duration"),
-        (lambda h, d: ph.sensitivities(h, d, state=(math.nan, 0.0)), "two finite numbers"),
-        (lambda h, d: ph.sensitivities(h, d).spread({"pack.hardness": 0.1}), "'pack.hardness' is not known"),
-        (lambda h, d: ph.sensitivities(h, d).spread({"mass": -0.1}), "expected a relative spread"),
+        (lambda h, d: ph.sensitivities(h, d, state=(math.nan, 0.0)), "state"),
+        (lambda h, d: ph.sensitivities(h, d).spread({"pack.hardness": 0.1}), "spreads"),
+        (lambda h, d: ph.sensitivities(h, d).spread({"mass": -0.1}), "mass"),
         (lambda h, d: ph.sensitivities(h, d).spread({"mass": "a lot"}), "spreads: mass"),
         (lambda h, d: ph.sensitivities(h, d).spread({"mass": math.inf}), "spreads: mass"),
-        (lambda h, d: ph.sensitivities(h, d).plot(quantities=["beauty"]), "'beauty' is not known"),
-        (lambda h, d: ph.sensitivities(h, d).plot(dot=1), "expected a number from 0 to 0"),
-        (lambda h, d: ph.sensitivities(h, d).plot(bars=0), "at least 1"),
-        (lambda h, d: ph.sensitivities(h, d).plot(quantities=[]), "at least one"),
+        (lambda h, d: ph.sensitivities(h, d).plot(quantities=["beauty"]), "quantity"),
+        (lambda h, d: ph.sensitivities(h, d).plot(dot=1), "dot"),
+        (lambda h, d: ph.sensitivities(h, d).plot(bars=0), "bars"),
+        (lambda h, d: ph.sensitivities(h, d).plot(quantities=[]), "quantities"),
     ],
 )
-def test_bad_arguments(hammer: "ph.Hammer", call: object, told: str) -> None:
-    with pytest.raises(ph.InputError, match=told):
+def test_bad_arguments(hammer: "ph.Hammer", call: object, key: str) -> None:
+    with refused(key):
         call(hammer, ph.PulseTrain(hammer.waveform))
 
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 from tests import hammers
+from tests.errors import refused
 from tests.hammers import crude, made_of
 from tests.tangents import scaled
 
@@ -182,20 +183,20 @@ def test_the_standard_error_of_an_autocorrelated_series() -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "told"),
+    ("call", "key"),
     [
-        (lambda h: tangent_map(h, train(1e-3, 2), 1e-3, 1e-3), "ascending times"),
-        (lambda h: tangent_map(h, train(1e-3, 2), -1e-3, 1e-3), "ascending times"),
-        (lambda h: tangent_map(h, train(1e-3, 2), 0.0, math.inf), "ascending times"),
+        (lambda h: tangent_map(h, train(1e-3, 2), 1e-3, 1e-3), "start"),
+        (lambda h: tangent_map(h, train(1e-3, 2), -1e-3, 1e-3), "start"),
+        (lambda h: tangent_map(h, train(1e-3, 2), 0.0, math.inf), "start"),
         (lambda h: tangent_map(h, train(1e-3, 2), 0.0, 1e-3, tolerance=0.0), "tolerance"),
-        (lambda h: tangent_map(h, train(1e-3, 2), 0.0, 1e-3, state=(math.nan, 0.0)), "two finite numbers"),
-        (lambda h: strobe_exponent(h, h.waveform, last=20), "period is missing"),
+        (lambda h: tangent_map(h, train(1e-3, 2), 0.0, 1e-3, state=(math.nan, 0.0)), "state"),
+        (lambda h: strobe_exponent(h, h.waveform, last=20), "period"),
         (lambda h: strobe_exponent(h, h.waveform, -1e-3, last=20), "period"),
-        (lambda h: strobe_exponent(h, h.waveform, 1e-3, first=20, last=20), "numbers of firings"),
-        (lambda h: strobe_exponent(h, h.waveform, 1e-3, first=0, last=20), "numbers of firings"),
-        (lambda h: strobe_exponent(h, train(1e-3, 5), last=20), "at most 5"),
+        (lambda h: strobe_exponent(h, h.waveform, 1e-3, first=20, last=20), "first"),
+        (lambda h: strobe_exponent(h, h.waveform, 1e-3, first=0, last=20), "first"),
+        (lambda h: strobe_exponent(h, train(1e-3, 5), last=20), "last"),
     ],
 )
-def test_bad_arguments(call: object, told: str) -> None:
-    with pytest.raises(ph.InputError, match=told):
+def test_bad_arguments(call: object, key: str) -> None:
+    with refused(key):
         call(crude())

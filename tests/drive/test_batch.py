@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.drive.batch import Ragged, firings_of, joined
@@ -68,23 +69,23 @@ def test_times_are_refused_as_by_a_single_train(times: list[float]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "key"),
     [
-        ({"rates": [500.0, -1.0]}, "rate = -1.0 is expected to be greater than 0 Hz"),
-        ({"rates": [np.nan]}, "rate = nan is expected to be a finite number"),
-        ({"rates": [1e-310]}, "rate = 1e-310 is expected to be greater than 0 Hz"),
-        ({"rates": [1e-308], "pulses": 1000}, "firing time inf is expected to be finite"),
-        ({"rates": []}, "no train"),
-        ({"rates": ["fast"]}, "rates = .*expected numbers, Hz"),
-        ({"pulses": 0}, "pulses = 0"),
-        ({"overlap": "mix"}, "overlap = 'mix'"),
-        ({"waveform": Sine(amplitude=1.0, frequency=30.0)}, "expected to end"),
-        ({"waveform": "sine"}, "waveform = 'sine'"),
+        ({"rates": [500.0, -1.0]}, "rate"),
+        ({"rates": [np.nan]}, "rate"),
+        ({"rates": [1e-310]}, "rate"),
+        ({"rates": [1e-308], "pulses": 1000}, "at"),
+        ({"rates": []}, "train"),
+        ({"rates": ["fast"]}, "rates"),
+        ({"pulses": 0}, "pulses"),
+        ({"overlap": "mix"}, "overlap"),
+        ({"waveform": Sine(amplitude=1.0, frequency=30.0)}, "waveform"),
+        ({"waveform": "sine"}, "waveform"),
     ],
 )
-def test_wrong_arguments(options: dict[str, Any], message: str) -> None:
+def test_wrong_arguments(options: dict[str, Any], key: str) -> None:
     arguments: dict[str, Any] = {"waveform": PULSE, "rates": [500.0], "pulses": 3, **options}
-    with pytest.raises(ph.InputError, match=message):
+    with refused(key):
         ph.PulseTrains.at_rates(**arguments)
 
 

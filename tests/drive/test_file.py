@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 from printhammer.drive.file import load_drive, read_drive, save_drive
 from printhammer.drive.trains import Burst, Drive, PulseTrain, SineForce
@@ -60,7 +61,7 @@ def test_a_file_is_saved_and_loaded(tmp_path: Path) -> None:
     drive = Burst(PULSE, "1.2 kHz", 3, 2, "5 ms", overlap="replace")
     save_drive(drive, path)
     assert load_drive(path) == drive
-    with pytest.raises(InputError, match="cannot be written"):
+    with refused("drive"):
         save_drive(drive, tmp_path / "none" / "train.toml")
 
 
@@ -68,7 +69,7 @@ def test_the_waveform_is_the_one_of_the_file_or_else_the_given_one() -> None:
     assert read_drive(TRAIN, PULSE) == PulseTrain(PULSE, rate=1200.0, pulses=9)
     half = HalfSine(amplitude=1.0, width=350e-6)
     assert read_drive(TRAIN + HALF, PULSE) == PulseTrain(half, rate=1200.0, pulses=9)
-    with pytest.raises(InputError, match="waveform"):
+    with refused("[waveform]"):
         read_drive(TRAIN)
 
 
@@ -97,74 +98,74 @@ def test_a_sampled_waveform_lies_beside_the_drive_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "key"),
     [
-        ("", "format = None"),
-        ("format = 2", "format = 2"),
-        ("format = true", "format = True"),
-        ("format = 1", "none given"),
-        ("train", "expected TOML"),
-        ("format = " + "1" * 5000, "expected TOML"),
-        ("format = 1\ntrain = 3", "train = 3.*table"),
-        ("format = 1\n[train]\n[sine]", r"\[train\] and \[sine\]"),
-        ('format = 1\n"a\\nb" = 1', "not known"),
-        ("format = 1\n[tarin]", "tarin = {} is not known"),
-        ("format = 1\n[train]\npulses = 9", "train.rate is missing"),
-        ('format = 1\n[burst]\nrate = "1 kHz"', "burst.pulses is missing"),
-        ('format = 1\n[train]\nrate = "1 kHz"\nperiod = "1 ms"\npulses = 2', "rate and period"),
-        ("format = 1\n[train]\nrate = 1200\npulses = 9", "train.rate = 1200 has no unit"),
-        ('format = 1\n[train]\nrate = "1200"\npulses = 9', "train.rate.*no unit"),
-        ('format = 1\n[train]\nrate = "3 lbf"\npulses = 9', "train.rate.*lbf"),
-        ('format = 1\n[train]\nrate = "0 Hz"\npulses = 9', "train: rate = 0.0"),
-        ('format = 1\n[train]\nperiod = "0 s"\npulses = 9', "train: period = 0.0"),
-        ('format = 1\n[train]\nperiod = "-1 s"\npulses = 9', "train: period = -1.0"),
-        ("format = 1\n[train]\nrate = { value = nan, unit = 'Hz' }\npulses = 9", "train.rate.*nan"),
-        ("format = 1\n[train]\nrate = { value = 3 }\npulses = 9", "train.rate.unit is missing"),
-        ("format = 1\n[train]\nrate = { value = 3, unit = 4 }\npulses = 9", "train.rate.unit = 4"),
-        ("format = 1\n[train]\nrate = { value = 3, unit = 'Hz', x = 1 }\npulses = 9", "train.rate.x = 1"),
-        ("format = 1\n[train]\nrate = { value = 'a', unit = 'Hz' }\npulses = 9", "train.rate.*'a'"),
-        ('format = 1\n[train]\nrate = "1 Hz"\npulses = "9"', "pulses = '9'"),
-        ('format = 1\n[train]\nrate = "1 Hz"\npulses = 9\npuls = 1', "train.puls = 1"),
-        ('format = 1\noverlap = "both"\n[train]\nrate = "1 Hz"\npulses = 9', "overlap = 'both'"),
-        ("format = 1\n[times]", "times.at is missing"),
-        ("format = 1\n[times]\nat = 3", "times.at = 3"),
-        ("format = 1\n[times]\nat = [0, 1]", "times.at = 0 has no unit"),
-        ("format = 1\n[times]\nat = []", "list of firing times"),
-        ("format = 1\n[times]\nat = { values = 1, unit = 's' }", "times.at.values = 1"),
-        ("format = 1\n[times]\nat = { values = [1, 1], unit = 's' }", "increase strictly"),
-        ('format = 1\n[burst]\nrate = "1 Hz"\npulses = 9\nbursts = 2', "burst: .*gap"),
-        ('format = 1\n[sine]\namplitude = "1 N"', "sine.frequency is missing"),
-        ('format = 1\n[sine]\namplitude = "1 A"\nfrequency = "1 Hz"', "sine.amplitude.*force"),
+        ("", "format"),
+        ("format = 2", "format"),
+        ("format = true", "format"),
+        ("format = 1", "drive"),
+        ("train", None),
+        ("format = " + "1" * 5000, None),
+        ("format = 1\ntrain = 3", "train"),
+        ("format = 1\n[train]\n[sine]", "drive"),
+        ('format = 1\n"a\\nb" = 1', "'a\\nb'"),
+        ("format = 1\n[tarin]", "tarin"),
+        ("format = 1\n[train]\npulses = 9", "train.rate"),
+        ('format = 1\n[burst]\nrate = "1 kHz"', "burst.pulses"),
+        ('format = 1\n[train]\nrate = "1 kHz"\nperiod = "1 ms"\npulses = 2', "train.period"),
+        ("format = 1\n[train]\nrate = 1200\npulses = 9", "train.rate"),
+        ('format = 1\n[train]\nrate = "1200"\npulses = 9', "train.rate"),
+        ('format = 1\n[train]\nrate = "3 lbf"\npulses = 9', "train.rate"),
+        ('format = 1\n[train]\nrate = "0 Hz"\npulses = 9', "train.rate"),
+        ('format = 1\n[train]\nperiod = "0 s"\npulses = 9', "train.period"),
+        ('format = 1\n[train]\nperiod = "-1 s"\npulses = 9', "train.period"),
+        ("format = 1\n[train]\nrate = { value = nan, unit = 'Hz' }\npulses = 9", "train.rate"),
+        ("format = 1\n[train]\nrate = { value = 3 }\npulses = 9", "train.rate.unit"),
+        ("format = 1\n[train]\nrate = { value = 3, unit = 4 }\npulses = 9", "train.rate.unit"),
+        ("format = 1\n[train]\nrate = { value = 3, unit = 'Hz', x = 1 }\npulses = 9", "train.rate.x"),
+        ("format = 1\n[train]\nrate = { value = 'a', unit = 'Hz' }\npulses = 9", "train.rate"),
+        ('format = 1\n[train]\nrate = "1 Hz"\npulses = "9"', "train.pulses"),
+        ('format = 1\n[train]\nrate = "1 Hz"\npulses = 9\npuls = 1', "train.puls"),
+        ('format = 1\noverlap = "both"\n[train]\nrate = "1 Hz"\npulses = 9', "overlap"),
+        ("format = 1\n[times]", "times.at"),
+        ("format = 1\n[times]\nat = 3", "times.at"),
+        ("format = 1\n[times]\nat = [0, 1]", "times.at"),
+        ("format = 1\n[times]\nat = []", "times.at"),
+        ("format = 1\n[times]\nat = { values = 1, unit = 's' }", "times.at.values"),
+        ("format = 1\n[times]\nat = { values = [1, 1], unit = 's' }", "times.firing times"),
+        ('format = 1\n[burst]\nrate = "1 Hz"\npulses = 9\nbursts = 2', "burst.bursts"),
+        ('format = 1\n[sine]\namplitude = "1 N"', "sine.frequency"),
+        ('format = 1\n[sine]\namplitude = "1 A"\nfrequency = "1 Hz"', "sine.amplitude"),
         ('format = 1\noverlap = "replace"\n[sine]\namplitude = "1 N"\nfrequency = "1 Hz"', "overlap"),
         ('format = 1\n[sine]\namplitude = "1 N"\nfrequency = "1 Hz"\n' + HALF, "waveform"),
-        (TRAIN + "[waveform]", "waveform.shape = None"),
-        (TRAIN + 'waveform = 3\n[waveform]\nshape = "sine"', "waveform"),
-        (TRAIN + '[waveform]\nshape = "sine"', "waveform.shape = 'sine'"),
+        (TRAIN + "[waveform]", "waveform.shape"),
+        (TRAIN + 'waveform = 3\n[waveform]\nshape = "sine"', "train.waveform"),
+        (TRAIN + '[waveform]\nshape = "sine"', "waveform.shape"),
         (TRAIN + '[waveform]\nshape = ["half-sine"]', "waveform.shape"),
         (TRAIN + HALF + 'rise = "1 us"', "waveform.rise"),
-        (TRAIN + HALF.replace("350", "0"), "waveform.width = 0.0"),
-        (TRAIN + HALF.replace("1 A", "1 W"), "waveform.amplitude.*'W'"),
-        (TRAIN + HALF.replace('width = "350 us"', ""), "waveform.width is missing"),
-        (TRAIN + '[waveform]\nshape = "sampled"', "file, or time"),
-        (TRAIN + '[waveform]\nshape = "sampled"\nfile = 3', "waveform.file = 3"),
-        (TRAIN + '[waveform]\nshape = "sampled"\nfile = "none.csv"', "none.csv"),
+        (TRAIN + HALF.replace("350", "0"), "waveform.width"),
+        (TRAIN + HALF.replace("1 A", "1 W"), "waveform.amplitude"),
+        (TRAIN + HALF.replace('width = "350 us"', ""), "waveform.width"),
+        (TRAIN + '[waveform]\nshape = "sampled"', "waveform"),
+        (TRAIN + '[waveform]\nshape = "sampled"\nfile = 3', "waveform.file"),
+        (TRAIN + '[waveform]\nshape = "sampled"\nfile = "none.csv"', None),
         (TRAIN + '[waveform]\nshape = "sampled"\nfile = "a.csv"\nstep = 1', "waveform.step"),
         (
             TRAIN + '[waveform]\nshape = "sampled"\ntime = { values = [0, 1], unit = "s" }\n'
             'current = { values = [0, 1], unit = "A" }\ninterpolation = "cubic"',
-            "waveform.interpolation = 'cubic'",
+            "waveform.interpolation",
         ),
         (
             TRAIN + '[waveform]\nshape = "sampled"\ntime = { values = [1, 0], unit = "s" }\n'
             'current = { values = [0, 1], unit = "A" }',
-            "increase strictly",
+            "times",
         ),
     ],
 )
-def test_a_bad_file_is_one_sentence_that_names_it(tmp_path: Path, text: str, told: str) -> None:
+def test_a_bad_file_is_one_sentence_that_names_it(tmp_path: Path, text: str, key: str | None) -> None:
     path = tmp_path / "drive.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=told) as caught:
+    with refused(key) as caught:
         load_drive(path, PULSE)
     message = str(caught.value)
     assert message.startswith(str(path))
@@ -172,10 +173,10 @@ def test_a_bad_file_is_one_sentence_that_names_it(tmp_path: Path, text: str, tol
 
 
 def test_a_file_that_cannot_be_read_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="No such file"):
+    with refused(None, file="none.toml"):
         load_drive(tmp_path / "none.toml")
     (tmp_path / "noise.toml").write_bytes(bytes(range(128, 256)))
-    with pytest.raises(InputError, match="UTF-8"):
+    with refused(None, file="noise.toml"):
         load_drive(tmp_path / "noise.toml")
 
 
@@ -219,5 +220,6 @@ def test_any_toml_is_a_drive_or_an_input_error(kind: str, timing: str, waveform:
 
 @given(st.text())
 def test_any_text_is_a_drive_or_an_input_error(text: str) -> None:
-    with pytest.raises(InputError, match=r"any\.toml"):
+    with pytest.raises(InputError) as caught:
         read_drive("format = 1\n" + text, name="any.toml")
+    assert caught.value.file == "any.toml"

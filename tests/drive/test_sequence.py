@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests import sequences
+from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
@@ -15,7 +16,6 @@ from printhammer.drive.file import read_drive
 from printhammer.drive.segments import END as END_OF_TABLE
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sine, Trapezoid, Waveform
-from printhammer.errors import InputError
 from printhammer.kernel.model import pulses
 from printhammer.kernel.model.layout import END, Train
 
@@ -160,14 +160,14 @@ def test_a_scaled_sequence() -> None:
     np.testing.assert_allclose(stronger.value(t), 1.1 * drive.value(t), rtol=1e-14)
     assert stronger.waveforms[0] == stronger.waveforms[2] == PULSE.scaled(1.1)
     assert drive.waveforms == (PULSE, SHORT, PULSE)
-    with pytest.raises(InputError, match="factor"):
+    with refused("factor"):
         drive.scaled(math.nan)
 
 
 def test_the_same_pulses_at_other_times() -> None:
     drive = PulseSequence([PULSE, SHORT], [0.0, 1e-3], "replace")
     assert drive.with_times(["0 s", "2 ms"]) == PulseSequence([PULSE, SHORT], [0.0, 2e-3], "replace")
-    with pytest.raises(InputError, match="1 firing times are expected to be as many"):
+    with refused("firing times"):
         drive.with_times([0.0])
 
 
@@ -187,36 +187,35 @@ def test_the_tables_lie_one_after_the_other_the_longest_last() -> None:
 
 
 @pytest.mark.parametrize(
-    ("waveforms", "at", "message"),
+    ("waveforms", "at", "key"),
     [
-        ([], [0.0], "list of waveforms"),
-        (PULSE, [0.0], "list of waveforms"),
-        (3, [0.0], "list of waveforms"),
-        ([PULSE, "soft"], [0.0, 1.0], r"waveforms\[1\] = 'soft' is expected to be a waveform"),
-        ([PULSE], [0.0, 1.0], "2 firing times are expected to be as many as the waveforms, 1"),
-        ([PULSE, PULSE], [1.0, 0.5], "increase strictly"),
-        ([PULSE], [-1.0], "0 s or later"),
+        ([], [0.0], "waveforms"),
+        (PULSE, [0.0], "waveforms"),
+        (3, [0.0], "waveforms"),
+        ([PULSE, "soft"], [0.0, 1.0], "waveforms[1]"),
+        ([PULSE], [0.0, 1.0], "firing times"),
+        ([PULSE, PULSE], [1.0, 0.5], "firing times"),
+        ([PULSE], [-1.0], "at"),
         ([PULSE], ["1 A"], "firing time"),
         (
             [Sine(amplitude=1.0, frequency=1.0)],
             [0.0],
-            r"waveforms\[0\] is a sine, expected a waveform that ends",
+            "waveforms[0]",
         ),
         (
             [PULSE, HalfSine(amplitude="1 N", width=1e-3)],
             [0.0, 1.0],
-            r"waveforms\[1\] is a force, expected a current like the first",
+            "waveforms[1]",
         ),
     ],
 )
-def test_bad_input_is_refused_in_one_sentence(waveforms: Any, at: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message) as caught:
+def test_bad_input_is_refused_in_one_sentence(waveforms: Any, at: Any, key: str) -> None:
+    with refused(key):
         PulseSequence(waveforms, at)
-    assert "\n" not in str(caught.value)
 
 
 def test_an_unknown_overlap_rule_is_refused() -> None:
-    with pytest.raises(InputError, match="overlap = 'sum'"):
+    with refused("overlap"):
         PulseSequence([PULSE], [0.0], "sum")  # type: ignore[arg-type]
 
 
@@ -245,35 +244,34 @@ def test_a_file_names_the_waveforms() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "key"),
     [
         (
             '"soft", "print"]',
             '"soft", "hard"]',
-            r"'hard' is no waveform of the file, expected \[waveforms.print\]",
+            "sequence.waveforms",
         ),
-        ('["print", "soft", "print"]', '"print"', "expected to be a list of names"),
-        ('["print", "soft", "print"]', '["print"]', "3 firing times are expected to be as many"),
-        ('waveforms = ["print", "soft", "print"]\n', "", r"sequence.waveforms is missing"),
-        ('rise = "0 us"\n', "", r"waveforms.soft.rise is missing"),
-        ('shape = "trapezoid"', 'shape = "bell"', r"waveforms.soft.shape = 'bell'"),
-        ("[waveforms.soft]", "[waveforms.soft]\nsoftness = 1", r"waveforms.soft.softness = 1 is not known"),
-        ("[sequence]", '[waveform]\nshape = "half-sine"\n[sequence]', r"waveform is expected to be left out"),
-        ("format = 1\n", "format = 1\nwaveforms = 3\n", "drive"),
-        ("format = 1\n", 'format = 1\noverlap = "sum"\n', "overlap = 'sum'"),
+        ('["print", "soft", "print"]', '"print"', "sequence.waveforms"),
+        ('["print", "soft", "print"]', '["print"]', "sequence.firing times"),
+        ('waveforms = ["print", "soft", "print"]\n', "", "sequence.waveforms"),
+        ('rise = "0 us"\n', "", "waveforms.soft.rise"),
+        ('shape = "trapezoid"', 'shape = "bell"', "waveforms.soft.shape"),
+        ("[waveforms.soft]", "[waveforms.soft]\nsoftness = 1", "waveforms.soft.softness"),
+        ("[sequence]", '[waveform]\nshape = "half-sine"\n[sequence]', "waveform"),
+        ("format = 1\n", "format = 1\nwaveforms = 3\n", None),
+        ("format = 1\n", 'format = 1\noverlap = "sum"\n', "overlap"),
     ],
 )
-def test_a_bad_file_is_refused_in_one_sentence(old: str, new: str, message: str) -> None:
+def test_a_bad_file_is_refused_in_one_sentence(old: str, new: str, key: str | None) -> None:
     assert old in FILE
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(key):
         read_drive(FILE.replace(old, new, 1))
-    assert "\n" not in str(caught.value)
 
 
 def test_waveforms_belong_to_a_sequence() -> None:
     train = FILE.replace('at = ["0 us", "700 us", "1.4 ms"]\n', 'rate = "1 kHz"\npulses = 3\n')
     train = train.replace("[sequence]", "[train]").replace('waveforms = ["print", "soft", "print"]\n', "")
-    with pytest.raises(InputError, match=r"waveforms is expected to be left out beside \[train\]"):
+    with refused("waveforms"):
         read_drive(train)
 
 
@@ -283,7 +281,7 @@ def test_firings_of_their_own_have_no_constants_of_the_pulse() -> None:
     names = parameter_names(hammer, drive)
     assert "firing.1" in names
     assert not [name for name in names if name.startswith("waveform.")]
-    with pytest.raises(InputError, match=r"'waveform\.width' is not known"):
+    with refused("constant"):
         parameters(hammer, drive, ["waveform.width"])
     assert "waveform.width" in parameter_names(hammer, PulseSequence([PULSE, PULSE], [0.0, 1e-3]))
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.errors import refused
 
 from printhammer.drive.input import even_times
 from printhammer.drive.trains import Burst, Drive, Overlap, PulseTrain, SineForce
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Sine, Trapezoid, Waveform
-from printhammer.errors import InputError
 from printhammer.kernel.model.layout import END
 
 PULSE = Rectangle(amplitude=0.9, width=350e-6, rise=1e-5, decay=2.4e-5)
@@ -101,7 +101,7 @@ def test_a_train_by_rate_and_one_by_period() -> None:
 
 
 def test_even_times_need_a_rate_or_a_period() -> None:
-    with pytest.raises(InputError, match="rate or a period"):
+    with refused("rate"):
         even_times(None, None, 3)
 
 
@@ -182,77 +182,76 @@ def test_a_drive_is_told_in_one_line_and_pickled() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "key"),
     [
-        ({"rate": 0.0, "pulses": 3}, "rate = 0.0.*greater than 0 Hz"),
-        ({"rate": -1.0, "pulses": 3}, "rate = -1.0"),
-        ({"rate": math.nan, "pulses": 3}, "rate = nan.*finite"),
-        ({"rate": "1.2 kN", "pulses": 3}, "rate.*kN"),
-        ({"rate": "1.2", "pulses": 3}, "rate.*1.2"),
-        ({"rate": None, "pulses": 3}, "pulses = 3.*rate"),
-        ({"rate": True, "pulses": 3}, "rate = True"),
-        ({"period": 0.0, "pulses": 3}, "period = 0.0"),
-        ({"period": "0 ms", "pulses": 3}, "period = '0 ms'"),
-        ({"period": math.inf, "pulses": 3}, "period = inf"),
-        ({"rate": 1.0, "period": 1.0, "pulses": 3}, "rate and period"),
-        ({"rate": 1.0, "at": [0.0]}, "rate and at"),
-        ({"rate": 1.0, "pulses": 0}, "pulses = 0"),
-        ({"rate": 1.0, "pulses": 2.5}, "pulses = 2.5"),
-        ({"rate": 1.0, "pulses": True}, "pulses = True"),
-        ({"rate": 1.0, "pulses": 10**12}, "pulses = 1000000000000"),
-        ({"at": [0.0], "pulses": 1}, "pulses = 1"),
-        ({"at": []}, "list of firing times"),
-        ({"at": 1.0}, "list of firing times"),
-        ({"at": "0 us"}, "list of firing times"),
+        ({"rate": 0.0, "pulses": 3}, "rate"),
+        ({"rate": -1.0, "pulses": 3}, "rate"),
+        ({"rate": math.nan, "pulses": 3}, "rate"),
+        ({"rate": "1.2 kN", "pulses": 3}, "rate"),
+        ({"rate": "1.2", "pulses": 3}, "rate"),
+        ({"rate": None, "pulses": 3}, "pulses"),
+        ({"rate": True, "pulses": 3}, "rate"),
+        ({"period": 0.0, "pulses": 3}, "period"),
+        ({"period": "0 ms", "pulses": 3}, "period"),
+        ({"period": math.inf, "pulses": 3}, "period"),
+        ({"rate": 1.0, "period": 1.0, "pulses": 3}, "period"),
+        ({"rate": 1.0, "at": [0.0]}, "at"),
+        ({"rate": 1.0, "pulses": 0}, "pulses"),
+        ({"rate": 1.0, "pulses": 2.5}, "pulses"),
+        ({"rate": 1.0, "pulses": True}, "pulses"),
+        ({"rate": 1.0, "pulses": 10**12}, "pulses"),
+        ({"at": [0.0], "pulses": 1}, "pulses"),
+        ({"at": []}, "at"),
+        ({"at": 1.0}, "at"),
+        ({"at": "0 us"}, "at"),
         ({"at": [[0.0, 1.0]]}, "firing time"),
-        ({"at": np.zeros((2, 2))}, "4 firing times"),
-        ({"at": [0.0, 0.0]}, "increase strictly"),
-        ({"at": [1.0, 0.5]}, r"0.5 s \(firing 2\) follows 1 s"),
-        ({"at": [-1.0, 0.5]}, "firing time -1 s"),
-        ({"at": [0.0, math.nan]}, "firing time = nan"),
-        ({"at": np.array([0.0, math.inf])}, "firing time inf"),
-        ({"at": [0.0, "x"]}, "firing time: .*x"),
-        ({"rate": 1.0, "pulses": 2, "start": -1.0}, "start = -1.0"),
-        ({"rate": 1.0, "pulses": 2, "overlap": "both"}, "overlap = 'both'"),
-        ({"period": 1e-20, "pulses": 2, "start": 1.0}, "increase strictly"),
+        ({"at": np.zeros((2, 2))}, "firing times"),
+        ({"at": [0.0, 0.0]}, "firing times"),
+        ({"at": [1.0, 0.5]}, "firing times"),
+        ({"at": [-1.0, 0.5]}, "at"),
+        ({"at": [0.0, math.nan]}, "firing time"),
+        ({"at": np.array([0.0, math.inf])}, "at"),
+        ({"at": [0.0, "x"]}, "firing time"),
+        ({"rate": 1.0, "pulses": 2, "start": -1.0}, "start"),
+        ({"rate": 1.0, "pulses": 2, "overlap": "both"}, "overlap"),
+        ({"period": 1e-20, "pulses": 2, "start": 1.0}, "firing times"),
     ],
 )
-def test_a_bad_train_is_one_sentence(arguments: dict[str, object], told: str) -> None:
-    with pytest.raises(InputError, match=told) as caught:
+def test_a_bad_train_is_one_sentence(arguments: dict[str, object], key: str) -> None:
+    with refused(key):
         PulseTrain(PULSE, **arguments)  # type: ignore[arg-type]
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "key"),
     [
-        ({"pulses": 3}, "rate or a period"),
-        ({"rate": 1.0, "period": 1.0, "pulses": 3}, "rate or a period"),
-        ({"rate": 1.0}, "pulses = None"),
-        ({"rate": 1.0, "pulses": 3, "bursts": 2}, "gap"),
-        ({"rate": 1.0, "pulses": 3, "bursts": 2, "gap": 0.0}, "gap = 0.0"),
-        ({"rate": 1.0, "pulses": 3, "bursts": 0, "gap": 1.0}, "bursts = 0"),
-        ({"rate": 1.0, "pulses": 10**6, "bursts": 10**6, "gap": 1.0}, "at most"),
+        ({"pulses": 3}, "rate"),
+        ({"rate": 1.0, "period": 1.0, "pulses": 3}, "rate"),
+        ({"rate": 1.0}, "pulses"),
+        ({"rate": 1.0, "pulses": 3, "bursts": 2}, "bursts"),
+        ({"rate": 1.0, "pulses": 3, "bursts": 2, "gap": 0.0}, "gap"),
+        ({"rate": 1.0, "pulses": 3, "bursts": 0, "gap": 1.0}, "bursts"),
+        ({"rate": 1.0, "pulses": 10**6, "bursts": 10**6, "gap": 1.0}, "pulses"),
     ],
 )
-def test_a_bad_burst_is_one_sentence(arguments: dict[str, object], told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_a_bad_burst_is_one_sentence(arguments: dict[str, object], key: str) -> None:
+    with refused(key):
         Burst(PULSE, **arguments)  # type: ignore[arg-type]
 
 
 def test_what_is_not_a_pulse_is_refused() -> None:
-    with pytest.raises(InputError, match="waveform = None"):
+    with refused("waveform"):
         PulseTrain(None, rate=1.0, pulses=2)  # type: ignore[arg-type]
     endless = Sine(amplitude=1.0, frequency=50.0)
-    with pytest.raises(InputError, match="end"):
+    with refused("waveform"):
         PulseTrain(endless, rate=1.0, pulses=2)
-    with pytest.raises(InputError, match="end"):
+    with refused("waveform"):
         PulseTrain(PULSE).with_waveform(endless)
-    with pytest.raises(InputError, match="waveform = 3"):
+    with refused("waveform"):
         PulseTrain(PULSE).with_waveform(3)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"frequency = 0\.0"):
+    with refused("frequency"):
         SineForce(1.0, 0.0)
-    with pytest.raises(InputError, match="factor"):
+    with refused("factor"):
         PulseTrain(PULSE).scaled(math.nan)
 
 

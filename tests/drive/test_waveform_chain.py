@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests import sequences
+from tests.errors import refused
 
 from printhammer.drive.file import read_drive
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.chain import TAIL
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, HalfSine, Rectangle, Sine, Trapezoid, Waveform
-from printhammer.errors import InputError
 
 PRINT = Rectangle(amplitude=0.9, width=350e-6, rise=1e-5, decay=2.4e-5)
 BRAKE = Trapezoid(amplitude=0.25, rise=0.0, width=2e-4, fall=0.0)
@@ -75,45 +75,44 @@ def test_a_tail_is_cut_off_where_the_next_part_begins() -> None:
     before, after = chain.value([np.nextafter(begins, 0.0), begins])
     assert 0.0 < before < TAIL * PRINT.peak
     assert after == 0.25
-    with pytest.raises(InputError, match=r"parts\[0\] is over"):
+    with refused("parts[1]"):
         Chain(parts=((0.0, PRINT), (PRINT.width + PRINT.decay * 5.0, BRAKE)))
 
 
 @pytest.mark.parametrize(
-    ("parts", "message"),
+    ("parts", "key"),
     [
-        ([], "pairs of an offset and a waveform"),
-        (3, "pairs of an offset and a waveform"),
-        ([PRINT], "pairs of an offset and a waveform"),
-        ([(0.0, PRINT, 1.0)], "pairs of an offset and a waveform"),
-        ([(0.0, "print")], r"parts\[0\]: 'print' is expected to be a waveform"),
-        ([(-1e-3, PRINT)], r"parts\[0\] begins at -0.001 s, expected a time not before the firing"),
+        ([], "parts"),
+        (3, "parts"),
+        ([PRINT], "parts"),
+        ([(0.0, PRINT, 1.0)], "parts"),
+        ([(0.0, "print")], "parts[0]"),
+        ([(-1e-3, PRINT)], "parts[0]"),
         (
             [(0.0, PRINT), (1e-4, BRAKE)],
-            r"parts\[1\] begins at 0.0001 s, expected a time not before parts\[0\]",
+            "parts[1]",
         ),
-        ([(1e-3, BRAKE), (0.0, BRAKE)], r"parts\[1\] begins at 0 s"),
-        ([(0.0, BRAKE), (0.0, BRAKE)], r"parts\[1\] begins at 0 s"),
-        ([(0.0, PRINT), ("1 A", BRAKE)], r"parts\[1\]: "),
-        ([(0.0, PRINT), (math.nan, BRAKE)], r"parts\[1\]: offset nan"),
-        ([(0.0, PRINT), (True, BRAKE)], r"parts\[1\]: offset True"),
-        ([(0.0, Sine(amplitude=1.0, frequency=1.0))], r"parts\[0\] is a sine, expected a waveform that ends"),
+        ([(1e-3, BRAKE), (0.0, BRAKE)], "parts[1]"),
+        ([(0.0, BRAKE), (0.0, BRAKE)], "parts[1]"),
+        ([(0.0, PRINT), ("1 A", BRAKE)], "parts[1]"),
+        ([(0.0, PRINT), (math.nan, BRAKE)], "parts[1]"),
+        ([(0.0, PRINT), (True, BRAKE)], "parts[1]"),
+        ([(0.0, Sine(amplitude=1.0, frequency=1.0))], "parts[0]"),
         (
             [(0.0, PRINT), (1.0, HalfSine(amplitude="1 N", width=1.0))],
-            r"parts\[1\] is a force, expected a current",
+            "parts[1]",
         ),
     ],
 )
-def test_bad_parts_are_refused_in_one_sentence(parts: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message) as caught:
+def test_bad_parts_are_refused_in_one_sentence(parts: Any, key: str) -> None:
+    with refused(key):
         Chain(parts=parts)
-    assert "\n" not in str(caught.value)
 
 
 def test_the_quantity_is_that_of_the_parts() -> None:
-    with pytest.raises(InputError, match="quantity = 'force'"):
+    with refused("quantity"):
         Chain(parts=((0.0, PRINT),), quantity="force")
-    with pytest.raises(InputError, match="parts is missing"):
+    with refused("parts"):
         Chain()
 
 
@@ -145,25 +144,26 @@ def test_a_file_lists_the_parts() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "new", "key"),
     [
-        ('at = "1.2 ms"\n', "", r"waveform.parts\[1\].at is missing"),
-        ('at = "1.2 ms"', 'at = "100 us"', r"waveform.parts\[1\] begins at 0.0001 s"),
-        ('at = "1.2 ms"', "at = 1.2", r"waveform.parts\[1\].at = 1.2 has no unit"),
-        ('shape = "trapezoid"', 'shape = "bell"', r"waveform.parts\[1\].shape = 'bell'"),
-        ('fall = "0 us"', "", r"waveform.parts\[1\].fall is missing"),
-        ('shape = "chain"', 'shape = "chain"\nwidth = "1 us"', r"waveform.width = '1 us' is not known"),
+        ('at = "1.2 ms"\n', "", "waveform.parts[1].at"),
+        ('at = "1.2 ms"', 'at = "100 us"', "waveform.parts[1]"),
+        ('at = "1.2 ms"', "at = 1.2", "waveform.parts[1].at"),
+        ('shape = "trapezoid"', 'shape = "bell"', "waveform.parts[1].shape"),
+        ('fall = "0 us"', "", "waveform.parts[1].fall"),
+        ('shape = "chain"', 'shape = "chain"\nwidth = "1 us"', "waveform.width"),
     ],
 )
-def test_a_bad_file_is_refused_in_one_sentence(old: str, new: str, message: str) -> None:
+def test_a_bad_file_is_refused_in_one_sentence(old: str, new: str, key: str) -> None:
     assert old in FILE
-    with pytest.raises(InputError, match=message) as caught:
+    with refused(key):
         read_drive(FILE.replace(old, new, 1))
-    assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("parts", ["3", "[]", "[3]"])
-def test_parts_of_a_file_are_a_list_of_tables(parts: str) -> None:
+@pytest.mark.parametrize(
+    ("parts", "key"), [("3", "waveform.parts"), ("[]", "waveform.parts"), ("[3]", "waveform.parts[0]")]
+)
+def test_parts_of_a_file_are_a_list_of_tables(parts: str, key: str) -> None:
     head = FILE.partition("[[")[0]
-    with pytest.raises(InputError, match=r"waveform.parts"):
+    with refused(key):
         read_drive(f"{head}parts = {parts}\n")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.drive.file import read_drive
@@ -63,22 +64,22 @@ def test_text_carries_units() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "key"),
     [
-        ({"at": (1e-5,)}, "one value for each"),
-        ({"at": (), "levels": ()}, "at least one"),
-        ({"at": (1e-5, 1e-5)}, "ascend"),
-        ({"at": (-1e-5, 1e-5)}, "ascend from 0 s"),
-        ({"levels": (0.0, 1.0)}, "end with 0"),
+        ({"at": (1e-5,)}, "levels"),
+        ({"at": (), "levels": ()}, "levels"),
+        ({"at": (1e-5, 1e-5)}, "at"),
+        ({"at": (-1e-5, 1e-5)}, "at"),
+        ({"levels": (0.0, 1.0)}, "levels"),
         ({"edge": 0.0}, "edge"),
-        ({"at": ("1 A", "2 A")}, "at: "),
-        ({"levels": ("1 A", "0 N")}, "levels: "),
-        ({"levels": (float("nan"), 0.0)}, "levels"),
+        ({"at": ("1 A", "2 A")}, "at"),
+        ({"levels": ("1 A", "0 N")}, "levels"),
+        ({"levels": (float("nan"), 0.0)}, "levels.0"),
     ],
 )
-def test_bad_input(change: dict[str, object], words: str) -> None:
+def test_bad_input(change: dict[str, object], key: str) -> None:
     given = {"at": (0.0, 1e-4), "levels": (1.0, 0.0), "edge": 1e-5, **change}
-    with pytest.raises(ph.InputError, match=words):
+    with refused(key):
         Switched(**given)
 
 
@@ -100,17 +101,17 @@ def test_a_file_may_hold_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "key"),
     [
-        ('"1.5 A", "0 A"', '"1.5 A"', "one value for each"),
-        ('"1.5 A", "0 A"', '"1.5 s", "0 s"', r"waveform\.levels"),
-        ('edge = "20 us"', "edge = 2e-5", r"waveform\.edge = 2e-05 has no unit"),
-        ('edge = "20 us"', "", r"waveform\.edge"),
-        ('edge = "20 us"', 'edge = "0 us"', r"waveform\.edge"),
-        ('edge = "20 us"', 'edge = "20 us"\nends = 3', r"ends"),
-        ('"100 us"', '"0 us"', r"waveform\.at"),
+        ('"1.5 A", "0 A"', '"1.5 A"', "waveform.levels"),
+        ('"1.5 A", "0 A"', '"1.5 s", "0 s"', "waveform.levels"),
+        ('edge = "20 us"', "edge = 2e-5", "waveform.edge"),
+        ('edge = "20 us"', "", "waveform.edge"),
+        ('edge = "20 us"', 'edge = "0 us"', "waveform.edge"),
+        ('edge = "20 us"', 'edge = "20 us"\nends = 3', "waveform.ends"),
+        ('"100 us"', '"0 us"', "waveform.at"),
     ],
 )
-def test_a_bad_file(old: str, new: str, words: str) -> None:
-    with pytest.raises(ph.InputError, match=words):
+def test_a_bad_file(old: str, new: str, key: str) -> None:
+    with refused(key):
         read_drive(FILE.replace(old, new))

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 from printhammer.drive.segments import table
 from printhammer.drive.waveforms.shapes import (
@@ -110,25 +111,24 @@ def test_waveforms_are_values() -> None:
 
 
 @pytest.mark.parametrize(
-    ("shape", "constants", "told"),
+    ("shape", "constants", "key"),
     [
         (HalfSine, {"amplitude": 1.0}, "width"),
-        (HalfSine, {"amplitude": 1.0, "width": 0.0}, "width = 0.0: expected more than 0 s"),
-        (HalfSine, {"amplitude": 1.0, "width": -1.0}, "width = -1.0: expected more than 0 s"),
-        (HalfSine, {"amplitude": math.nan, "width": 1.0}, "amplitude = nan.*finite"),
-        (HalfSine, {"amplitude": 1.0, "width": math.inf}, "width = inf"),
+        (HalfSine, {"amplitude": 1.0, "width": 0.0}, "width"),
+        (HalfSine, {"amplitude": 1.0, "width": -1.0}, "width"),
+        (HalfSine, {"amplitude": math.nan, "width": 1.0}, "amplitude"),
+        (HalfSine, {"amplitude": 1.0, "width": math.inf}, "width"),
         (HalfSine, {"amplitude": 1.0, "width": 1.0, "widht": 1.0}, "widht"),
-        (Rectangle, {"amplitude": 1.0, "width": 1.0, "rise": -1.0, "decay": 0.0}, "rise = -1.0"),
-        (Trapezoid, {"amplitude": 1.0, "width": 1.0, "rise": 0.0, "fall": "x"}, "x"),
-        (Sine, {"amplitude": 1.0, "frequency": 0.0}, "frequency = 0.0"),
+        (Rectangle, {"amplitude": 1.0, "width": 1.0, "rise": -1.0, "decay": 0.0}, "rise"),
+        (Trapezoid, {"amplitude": 1.0, "width": 1.0, "rise": 0.0, "fall": "x"}, "fall"),
+        (Sine, {"amplitude": 1.0, "frequency": 0.0}, "frequency"),
     ],
 )
 def test_a_bad_constant_is_one_sentence(
-    shape: type[Waveform], constants: dict[str, object], told: str
+    shape: type[Waveform], constants: dict[str, object], key: str | None
 ) -> None:
-    with pytest.raises(InputError, match=told) as caught:
+    with refused(key):
         shape(**constants)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("interpolation", ["pchip", "linear"])
@@ -169,23 +169,22 @@ def test_the_content_of_a_record_is_its_samples() -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "values", "told"),
+    ("times", "values", "key"),
     [
-        ([], [], "0 samples"),
-        ([0.0], [1.0], "1 samples"),
-        ([0.0, 1.0], [1.0], "2 times and 1 values"),
-        ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], r"increase strictly, but 1 s \(sample 3\)"),
-        ([0.0, 2.0, 1.0], [1.0, 2.0, 3.0], "increase strictly"),
-        ([-1.0, 2.0], [1.0, 2.0], "first time -1"),
-        ([0.0, math.nan], [1.0, 2.0], "time nan of sample 2"),
-        ([0.0, 1.0], [1.0, math.inf], "value inf of sample 2"),
-        (["a", "b"], [1.0, 2.0], "numbers"),
+        ([], [], "time"),
+        ([0.0], [1.0], "time"),
+        ([0.0, 1.0], [1.0], "time"),
+        ([0.0, 1.0, 1.0], [1.0, 2.0, 3.0], "times"),
+        ([0.0, 2.0, 1.0], [1.0, 2.0, 3.0], "times"),
+        ([-1.0, 2.0], [1.0, 2.0], "time"),
+        ([0.0, math.nan], [1.0, 2.0], "time"),
+        ([0.0, 1.0], [1.0, math.inf], "value"),
+        (["a", "b"], [1.0, 2.0], "samples"),
     ],
 )
-def test_bad_samples_are_one_sentence(times: list[float], values: list[float], told: str) -> None:
-    with pytest.raises(InputError, match=told) as caught:
+def test_bad_samples_are_one_sentence(times: list[float], values: list[float], key: str) -> None:
+    with refused(key):
         Sampled.from_samples(times, values)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_csv_file_is_read_with_its_units_relative_to_the_folder(tmp_path: Path) -> None:
@@ -208,42 +207,42 @@ def test_a_csv_file_of_a_force_makes_a_force_waveform(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "key"),
     [
-        ("", "empty"),
-        ("\n\n", "empty"),
-        ("time [us],current [A]\n", "0 samples"),
-        ("time [us],current [A]\n0,1\n", "1 samples"),
-        ("time,current\n0,1\n1,2\n", "unit"),
-        ("time [us],current []\n0,1\n1,2\n", "unit"),
-        ("time [us],current [lbf]\n0,1\n1,2\n", "lbf"),
-        ("time [mm],current [A]\n0,1\n1,2\n", "mm"),
-        ("time [us],power [W]\n0,1\n1,2\n", "power"),
-        ("current [A],time [us]\n0,1\n1,2\n", "'current' and 'time'"),
-        ("time [us]\n0\n1\n", "1 columns"),
-        ("time [us],current [A]\n0,1\n1\n", "line 3 has 1 cells"),
-        ("time [us],current [A]\n0,1\n1,two\n", "line 3: 'two'"),
-        ("time [us],current [A]\n0,1\n1,nan\n", "line 3: 'nan'"),
-        ("time [us],current [A]\n0,1\n2,2\n1,3\n", "increase strictly"),
-        ('time [us],current [A]\n0,"1\n', "comma-separated"),
+        ("", "samples"),
+        ("\n\n", "samples"),
+        ("time [us],current [A]\n", "time"),
+        ("time [us],current [A]\n0,1\n", "time"),
+        ("time,current\n0,1\n1,2\n", "time"),
+        ("time [us],current []\n0,1\n1,2\n", "current []"),
+        ("time [us],current [lbf]\n0,1\n1,2\n", None),
+        ("time [mm],current [A]\n0,1\n1,2\n", None),
+        ("time [us],power [W]\n0,1\n1,2\n", "columns"),
+        ("current [A],time [us]\n0,1\n1,2\n", "columns"),
+        ("time [us]\n0\n1\n", "columns"),
+        ("time [us],current [A]\n0,1\n1\n", "line 3"),
+        ("time [us],current [A]\n0,1\n1,two\n", None),
+        ("time [us],current [A]\n0,1\n1,nan\n", None),
+        ("time [us],current [A]\n0,1\n2,2\n1,3\n", "times"),
+        ('time [us],current [A]\n0,"1\n', "line 2"),
     ],
 )
-def test_a_bad_csv_file_is_one_sentence_that_names_it(tmp_path: Path, text: str, told: str) -> None:
+def test_a_bad_csv_file_is_one_sentence_that_names_it(tmp_path: Path, text: str, key: str | None) -> None:
     path = tmp_path / "bad.csv"
     path.write_text(text)
-    with pytest.raises(InputError, match=told) as caught:
+    with refused(key) as caught:
         Sampled(file=str(path))
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_a_file_that_is_missing_or_not_text_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="No such file"):
+    with refused(None, file="none.csv"):
         Sampled(file=str(tmp_path / "none.csv"))
     (tmp_path / "noise.csv").write_bytes(bytes(range(128, 256)))
-    with pytest.raises(InputError, match="UTF-8"):
+    with refused(None, file="noise.csv"):
         Sampled(file=str(tmp_path / "noise.csv"))
-    with pytest.raises(InputError, match="file"):
+    with refused("file"):
         SHAPES["sampled"]()
 
 
@@ -270,5 +269,5 @@ def test_the_unit_of_the_amplitude_tells_what_is_driven(amplitude: str, quantity
 
 
 def test_a_wrong_dimension_is_an_input_error() -> None:
-    with pytest.raises(InputError, match="lbf"):
+    with refused("width"):
         HalfSine(amplitude=1.0, width="3 lbf")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.figures import FIGURES
@@ -201,7 +202,7 @@ def test_a_motion_that_stopped_says_so(hammer: "ph.Hammer") -> None:
 
 def test_a_motion_is_shown_up_to_a_time(single: "ph.Motion") -> None:
     assert plot(single, until="0.5 ms").axes[0].get_xlim() == pytest.approx((0.0, 0.5))
-    with pytest.raises(ph.InputError, match="until"):
+    with refused("until"):
         plot(single, until=0.0)
 
 
@@ -228,11 +229,11 @@ def test_settings_of_the_user_stay(hammer: "ph.Hammer") -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "missing", "said"),
+    ("number", "missing", "key"),
     [(2, "magnet", "magnet"), (3, "waveform", "waveform"), (10, "waveform", "waveform"), (7, "pack", "pack")],
 )
-def test_a_missing_part_is_named(hammer: "ph.Hammer", number: int, missing: str, said: str) -> None:
-    with pytest.raises(ph.InputError, match=rf"^the hammer 'hendriks-1983' has no {said}[^\n]*$"):
+def test_a_missing_part_is_named(hammer: "ph.Hammer", number: int, missing: str, key: str) -> None:
+    with refused(key):
         FIGURES[number].draw(hammer.replace(missing, None))
 
 
@@ -241,11 +242,11 @@ def test_figure_2_needs_no_more_than_a_magnet_and_a_scale(hammer: "ph.Hammer") -
     gids = {found.get_gid() for found in FIGURES[2].draw(bare).axes[0].lines}
     assert {"magnet 0 A", "backstop", "platen"} <= gids
     assert not {"spring", "pack"} & gids
-    with pytest.raises(ph.InputError, match="neither platen nor pack"):
+    with refused("pack"):
         FIGURES[2].draw(hammer.replace({"pack": None, "platen": None}))
 
 
 @pytest.mark.parametrize("delays", [(), (0.0,), (1e-4, 2e-4, 3e-4, 4e-4)])
 def test_delays_that_make_no_sense_are_refused(hammer: "ph.Hammer", delays: tuple[float, ...]) -> None:
-    with pytest.raises(ph.InputError, match=r"^delays = .*, expected one to three positive numbers$"):
+    with refused("delays"):
         FIGURES[6].draw(hammer, delays=delays)

@@ -3,12 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 from matplotlib.figure import Figure
 from tests import measurements as lab
+from tests.errors import refused
 from tests.measurements import write
 
-from printhammer.errors import InputError
 from printhammer.figures.fit import plot
 from printhammer.identify.static.backstop import Stiffness, fit_backstop
 from printhammer.identify.static.magnet import fit_magnet
@@ -65,5 +64,5 @@ def test_exact_data_can_be_drawn(tmp_path: Path) -> None:
 
 
 def test_bodies_have_nothing_to_draw() -> None:
-    with pytest.raises(InputError, match="without a table"):
+    with refused("table"):
         plot(fit_backstop(stiffness=Stiffness(1e9, 0.0, "computed")))

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.figures import FIGURES, save
@@ -214,7 +215,7 @@ def test_a_map_of_one_time_is_not_drawn(hammer: "ph.Hammer", chart: xr.Dataset) 
         lambda: FIGURES[9].draw(hammer, chart=short),
         lambda: compare_maps(chart, short),
     ):
-        with pytest.raises(ph.InputError, match="the map has 1 times, expected at least 2 to draw it"):
+        with refused("times"):
             draw()
 
 

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.figures import FIGURES, FORMATS, save
@@ -33,7 +34,7 @@ def test_all_formats_are_written_and_nothing_else(hammer: "ph.Hammer", tmp_path:
 
 def test_a_folder_that_cannot_be_written_is_an_input_error(hammer: "ph.Hammer", tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(ph.InputError, match=r"^[^\n]*file: the figure figure2 cannot be written \([^\n]*\)$"):
+    with refused(None):
         save(FIGURES[2].draw(hammer), tmp_path / "file", "figure2")
     assert (tmp_path / "file").read_text() == "in the way"
 
@@ -41,7 +42,7 @@ def test_a_folder_that_cannot_be_written_is_an_input_error(hammer: "ph.Hammer", 
 def test_what_was_there_stays_if_writing_fails(hammer: "ph.Hammer", tmp_path: Path) -> None:
     (tmp_path / ".figure2.png.part").mkdir()
     (tmp_path / "figure2.png").write_bytes(b"old")
-    with pytest.raises(ph.InputError, match="cannot be written"):
+    with refused(None):
         save(FIGURES[2].draw(hammer), tmp_path, "figure2", formats=["png"])
     assert (tmp_path / "figure2.png").read_bytes() == b"old"
 
@@ -69,7 +70,7 @@ def test_an_interrupted_call_leaves_all_files_as_they_were(
 
 
 def test_an_unknown_format_is_refused(hammer: "ph.Hammer", tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match=r"^format = 'gif', expected one of svg, pdf, png$"):
+    with refused("format"):
         save(FIGURES[2].draw(hammer), tmp_path, "figure2", formats=["gif"])
 
 

@@ -3,10 +3,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import CRUDE
 
 import printhammer
-from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import (
     Equilibrium,
     equilibria,
@@ -181,7 +181,7 @@ def test_the_range_may_be_given() -> None:
     for within, expected in (((60e-6, 381e-6), everything[2:]), ((-1.0, 381e-6), everything)):
         found = equilibria(HAMMER, 0.5, within=within)
         assert [point.x for point in found] == pytest.approx([point.x for point in expected], rel=1e-14)
-    with pytest.raises(InputError, match="empty"):
+    with refused("range"):
         equilibria(HAMMER, 0.0, within=(2e-4, 1e-4))
 
 
@@ -196,27 +196,27 @@ def test_a_measured_table_gives_the_equilibria_of_the_law_it_samples() -> None:
         measured, fitted = (equilibria(hammer, level, within=(30e-6, 381e-6)) for hammer in (table, HAMMER))
         assert [point.x for point in measured] == pytest.approx([point.x for point in fitted], rel=1e-4)
         assert [point.stable for point in measured] == [point.stable for point in fitted]
-    with pytest.raises(InputError, match="current = 3"):
+    with refused("current"):
         equilibria(table, 3.0)
 
 
 @pytest.mark.parametrize(
-    ("hammer", "told"),
+    ("hammer", "key"),
     [
-        (replace(HAMMER, magnet=MAGNET.model_copy(update={"Am": 0.1})), "at the backstop the net force"),
-        (replace(HAMMER, backstop=None), "no stable equilibrium"),
-        (Bench(), "no stable equilibrium"),
-        (Bench(backstop=HERTZ), "no stable equilibrium"),
-        (Bench(spring=PreloadSpring(preload=1.0, stiffness=-1e3)), "no stable equilibrium"),
-        (Bench(spring=PreloadSpring(preload=1.0, stiffness=0.0), pack=PACK), "no stable equilibrium"),
+        (replace(HAMMER, magnet=MAGNET.model_copy(update={"Am": 0.1})), "rest, value=state"),
+        (replace(HAMMER, backstop=None), "rest, value=state"),
+        (Bench(), "rest, value=state"),
+        (Bench(backstop=HERTZ), "rest, value=state"),
+        (Bench(spring=PreloadSpring(preload=1.0, stiffness=-1e3)), "rest, value=state"),
+        (Bench(spring=PreloadSpring(preload=1.0, stiffness=0.0), pack=PACK), "rest, value=state"),
         (
             replace(HAMMER, backstop=HertzBackstop(position=51e-6, stiffness=1e3, damping=0.0)),
-            "crushed",
+            "rest, value=state",
         ),
     ],
 )
-def test_a_hammer_without_a_rest_state_says_so_in_one_sentence(hammer: Bench, told: str) -> None:
-    with pytest.raises(InputError, match=told) as caught:
+def test_a_hammer_without_a_rest_state_says_so_in_one_sentence(hammer: Bench, key: str) -> None:
+    with refused(key) as caught:
         rest_state(hammer)
     assert "'bench' has no rest state" in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -226,11 +226,11 @@ def test_a_hammer_without_a_rest_state_says_so_in_one_sentence(hammer: Bench, to
 
 
 def test_release_needs_a_magnet_that_can_let_go() -> None:
-    with pytest.raises(InputError, match="no magnet"):
+    with refused("release, value=current"):
         release_current(replace(HAMMER, magnet=None))
-    with pytest.raises(InputError, match="no backstop"):
+    with refused("release, value=current"):
         release_current(replace(HAMMER, backstop=None))
-    with pytest.raises(InputError, match="lifts the armature"):
+    with refused("release, value=current"):
         release_current(replace(HAMMER, magnet=MAGNET.model_copy(update={"Bm": 0.0})))
     assert release_current(replace(HAMMER, magnet=MAGNET.model_copy(update={"Am": 0.1}))) == 0.0
 

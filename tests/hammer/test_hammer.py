@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 from tests.hammers import CRUDE
 
 import printhammer as ph
@@ -107,9 +108,9 @@ def test_a_textbook_oscillator_is_built_of_parts() -> None:
     assert built.spring == PreloadSpring(preload=0.0, stiffness=1.0)
     assert {constant.source for constant in built.constants.values()} == {"given in Python"}
     assert ph.Hammer.from_toml(built.to_toml()) == built
-    with pytest.raises(ph.InputError, match="oscillator: mass = 0"):
+    with refused("mass"):
         ph.Hammer.build(0.0, name="oscillator")
-    with pytest.raises(ph.InputError, match="the key 'wheel' is not known"):
+    with refused("wheel"):
         ph.Hammer.build(1.0, wheel=None)
 
 
@@ -234,13 +235,13 @@ def test_a_hammer_in_memory_is_not_called_its_file(hammer: ph.Hammer) -> None:
     assert hammer.replace("mass", 4e-4).replace("mass", 5e-4).path == f"{CRUDE}, changed"
     made = ph.Hammer.build(4e-4, name="ball")
     assert made.path == "ball"
-    with pytest.raises(ph.InputError, match=r"^ball: the hammer has no \[waveform\]"):
+    with refused("waveform"):
         ph.quality(made, 900.0)
 
 
 def test_a_table_held_in_memory_cannot_be_written_to_a_file(hammer: ph.Hammer) -> None:
     table = TableMagnet.from_arrays([1e-5, 4e-4], [0.0, 1.0], [[-5.0, 1.0], [-5.0, 1.0]])
-    with pytest.raises(ph.InputError, match="expected a table that names its file"):
+    with refused("magnet"):
         hammer.replace("magnet", table)
 
 
@@ -334,7 +335,7 @@ def test_tables_are_saved_beside_the_file(hammer: ph.Hammer, tmp_path: Path) -> 
     table.save(folder / "h.toml")
     assert ph.load(folder / "h.toml") == table
     (folder / "force.csv").write_text("something else")
-    with pytest.raises(ph.InputError, match=r"force\.csv: the file is another table"):
+    with refused(None, file="force.csv"):
         table.save(folder / "h.toml")
     assert (folder / "force.csv").read_text() == "something else"
 
@@ -343,7 +344,7 @@ def test_what_cannot_be_written_leaves_nothing_behind(hammer: ph.Hammer, tmp_pat
     (tmp_path / "file").write_text("kept")
     (tmp_path / "folder.toml").mkdir()
     for target in (tmp_path / "file" / "h.toml", tmp_path / "missing" / "h.toml", tmp_path / "folder.toml"):
-        with pytest.raises(ph.InputError, match="the hammer file cannot be written"):
+        with refused(None):
             hammer.save(target)
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["file", "folder.toml"]
     assert (tmp_path / "file").read_text() == "kept"
@@ -361,11 +362,9 @@ def test_hammers_travel_between_processes(hammer: ph.Hammer) -> None:
 def test_a_hammer_that_flies_off_its_backstop_is_refused(hammer: ph.Hammer) -> None:
     # At 0.002 in, Am^2 / sqrt(x) is 26.8 N against F0 + Bs = 16.8 N; a spring of 30 N overcomes it.
     for force in ("30 N", 0.437407904**2 / 50.8e-6**0.5 - 2.47161892 + 1e-9):
-        with pytest.raises(
-            ph.InputError, match=r"hendriks-1983\.toml, changed: .* has no rest state: at the backstop"
-        ):
+        with refused("rest, value=state", file="hendriks-1983.toml"):
             hammer.replace("spring.Bs", force).check()
-    with pytest.raises(ph.InputError, match="expected a negative force"):
+    with refused("rest, value=state"):
         hammer.replace("spring.Bs", "30 N").warnings()
     hammer.replace({"spring.Bs": "30 N", "magnet": None}).check()
 

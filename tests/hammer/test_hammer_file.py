@@ -11,6 +11,7 @@ import jsonschema
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.errors import refused
 from tests.hammers import CRUDE
 
 import printhammer as ph
@@ -176,16 +177,16 @@ def test_bad_input_is_one_sentence(tmp_path: Path, text: str, parts: list[str]) 
 
 
 def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match=r"no such file, expected a path or one of .*hendriks-1983"):
+    with refused(None):
         ph.load("nobody")
-    with pytest.raises(ph.InputError, match=r"no such file, expected a path or 'hendriks-1983'$"):
+    with refused(None):
         ph.load("hendriks-1893")
-    with pytest.raises(ph.InputError, match="cannot be read"):
+    with refused(None):
         ph.load(tmp_path)
-    with pytest.raises(ph.InputError, match="cannot be read"):
+    with refused(None):
         ph.load("a\0b")
     (tmp_path / "latin.toml").write_bytes('name = "\xe4"'.encode("latin-1"))
-    with pytest.raises(ph.InputError, match=r"latin\.toml: expected a TOML file in UTF-8"):
+    with refused(None, file="latin.toml"):
         ph.load(tmp_path / "latin.toml")
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 
@@ -56,21 +57,20 @@ def test_what_is_set_anew_loses_its_error(known: "ph.Hammer", tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "key"),
     [
-        ({"constants": ["mass", "pack.width", "platen"]}, "'pack.width', the hammer has no such constant"),
-        ({"constants": ["mass", "mass", "platen"]}, "'mass', it is there twice"),
-        ({"constants": "mass"}, "constants = 'mass': expected a list of texts"),
-        ({"standard_errors": ["1 mg"]}, "has 1 entries, expected 3"),
-        ({"standard_errors": ["1 mg", "1 um", "0 N s/m^2.5"]}, "expected more than 0"),
-        ({"standard_errors": ["1 mg", "1 N", "2e8 N s/m^2.5"]}, "1 N"),
-        ({"correlation": [[0.5]]}, "expected 2 rows of 1, 2, ... numbers"),
-        ({"correlation": [[0.5], [0.5, 1.5]]}, "row 2 ="),
-        ({"correlation": [[1.0], [1.0, -1.0]]}, "is that of no covariance"),
-        ({"errors": []}, "uncertainty.errors is not known"),
+        ({"constants": ["mass", "pack.width", "platen"]}, "uncertainty.constants"),
+        ({"constants": ["mass", "mass", "platen"]}, "uncertainty.constants"),
+        ({"constants": "mass"}, "uncertainty.constants"),
+        ({"standard_errors": ["1 mg"]}, "uncertainty.standard_errors"),
+        ({"standard_errors": ["1 mg", "1 um", "0 N s/m^2.5"]}, "uncertainty"),
+        ({"standard_errors": ["1 mg", "1 N", "2e8 N s/m^2.5"]}, "uncertainty"),
+        ({"correlation": [[0.5]]}, "uncertainty.correlation"),
+        ({"correlation": [[0.5], [0.5, 1.5]]}, "uncertainty.correlation"),
+        ({"correlation": [[1.0], [1.0, -1.0]]}, "uncertainty.correlation"),
+        ({"errors": []}, "uncertainty.errors"),
     ],
 )
-def test_what_is_wrong_is_named(hammer: "ph.Hammer", change: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=r"uncertainty") as raised:
+def test_what_is_wrong_is_named(hammer: "ph.Hammer", change: dict[str, object], key: str) -> None:
+    with refused(key):
         hammer.replace("uncertainty", {**TABLE, **change})
-    assert said in str(raised.value)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 
@@ -67,22 +68,26 @@ def test_the_voltage_of_the_table_drives_the_coil(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "options", "sentence"),
+    ("table", "options", "key"),
     [
-        ("time [us],current [A]\n0,0\n2,1\n1,1\n", {}, r"line 4: time 1e-06 s, expected ascending times"),
-        ("time [us],current [A]\n-2,0\n-1,1\n", {}, "no time after 0 s"),
-        ("time [us],current [A]\n0,0\n1,0\n", {}, "there is no current or no voltage"),
-        ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.turns"]}, "coil.turns"),
-        ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.leakage"]}, "coil.leakage is not more than 0"),
-        ("time [us],current [A]\n0,0\n1,1\n", {"free": []}, "no constants to find"),
-        ("time [us],current [A]\n0,0\n1,1\n", {}, "2 rows, too few for the constants of the coil"),
-        ("# locked: here\ntime [us],current [A]\n0,0\n1,1\n", {}, "the comment 'locked'"),
+        ("time [us],current [A]\n0,0\n2,1\n1,1\n", {}, "time"),
+        ("time [us],current [A]\n-2,0\n-1,1\n", {}, "time"),
+        ("time [us],current [A]\n0,0\n1,0\n", {}, "current"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.turns"]}, "constant"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.leakage"]}, "coil.leakage"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"free": []}, "free"),
+        ("time [us],current [A]\n0,0\n1,1\n", {}, "rows"),
+        (
+            "# locked: here\ntime [us],current [A]\n0,0\n1,1\n",
+            {},
+            "locked",
+        ),
     ],
 )
-def test_bad_input(table: str, options: dict[str, Any], sentence: str, tmp_path: Path) -> None:
+def test_bad_input(table: str, options: dict[str, Any], key: str, tmp_path: Path) -> None:
     path = tmp_path / "bad.csv"
     path.write_text(table, "utf-8")
-    with pytest.raises(ph.InputError, match=sentence):
+    with refused(key):
         ph.fit("coil", path, hammer=driven(), **options)
 
 
@@ -90,11 +95,11 @@ def test_a_hammer_without_a_driver(tmp_path: Path) -> None:
     path = tmp_path / "current.csv"
     path.write_text("time [us],current [A]\n0,0\n1,1\n", "utf-8")
     paper = ph.load("hendriks-1983")
-    with pytest.raises(ph.InputError, match=r"no column 'voltage': .*no \[waveform\] that is a voltage"):
+    with refused("waveform"):
         ph.fit("coil", path, hammer=paper)
-    with pytest.raises(ph.InputError, match=r"no \[waveform\] that is a voltage"):
+    with refused("waveform"):
         ph.measure("current", paper)
-    with pytest.raises(ph.InputError, match="the hammer is missing"):
+    with refused("hammer"):
         ph.fit("coil", path)
 
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 from tests import measurements as lab
+from tests.errors import refused
 from tests.measurements import write
 
 import printhammer as ph
-from printhammer.errors import InputError
 
 
 def test_what_the_hammer_knows(tmp_path: Path, hammer: ph.Hammer) -> None:
@@ -31,17 +31,17 @@ def test_what_the_hammer_knows(tmp_path: Path, hammer: ph.Hammer) -> None:
 
 def test_what_it_refuses(tmp_path: Path, hammer: ph.Hammer) -> None:
     forces = write(tmp_path / "m.csv", lab.magnet())
-    with pytest.raises(InputError, match="kind = 'wheel', expected one of magnet"):
+    with refused("kind"):
         ph.fit("wheel", forces)
-    with pytest.raises(InputError, match="2 tables, expected one of the kind 'pack'"):
+    with refused("tables"):
         ph.fit("pack", [forces, forces], hammer=hammer)
-    with pytest.raises(InputError, match="one table with the column 'current' and one without"):
+    with refused("current"):
         ph.fit("magnet", [forces, forces], hammer=hammer)
-    with pytest.raises(InputError, match="the hammer is missing"):
+    with refused("hammer"):
         ph.fit("motion", forces)
-    with pytest.raises(InputError, match=r"position: .* a length"):
+    with refused("position"):
         ph.fit("spring", forces, position="2 s")
-    with pytest.raises(InputError, match="thickness of the pack is missing"):
+    with refused("thickness"):
         ph.fit("pack", forces, hammer=hammer.replace("pack", None))
-    with pytest.raises(InputError, match="thickness of the pack is -1 m"):
+    with refused("thickness"):
         ph.fit("pack", forces, thickness=-1.0)

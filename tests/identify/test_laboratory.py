@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests import hammers
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.identify.bench.laboratory import KINDS, SENSORS, SI, UNITS
@@ -251,34 +252,34 @@ def test_what_is_refused(kind: str, options: dict, said: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({"sampling_rate": 0.0}, "sampling_rate = 0.0 is expected to be more than 0 Hz"),
-        ({"bandwidth": math.inf}, "bandwidth = inf is expected to be more than 0 Hz"),
-        ({"outliers": 0.7}, "outliers = 0.7 is expected to be a share from 0 to 0.5"),
+        ({"sampling_rate": 0.0}, "sampling_rate"),
+        ({"bandwidth": math.inf}, "bandwidth"),
+        ({"outliers": 0.7}, "outliers"),
     ],
 )
-def test_sensors_that_cannot_be(options: dict, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_sensors_that_cannot_be(options: dict, key: str) -> None:
+    with refused(key):
         Sensor({}, **options)
 
 
 @pytest.mark.parametrize("kind", OWN)
 def test_a_hammer_that_lacks_what_is_measured(kind: str) -> None:
     key = "waveform" if kind == "motion" else kind
-    with pytest.raises(ph.InputError, match=rf"has no \[{key}\]"):
+    with refused(key):
         ph.measure(kind, HAMMER.replace(key, None))
 
 
 def test_benches_that_cannot_choose_for_themselves() -> None:
-    with pytest.raises(ph.InputError, match="no current to fire, expected currents"):
+    with refused("current"):
         ph.measure("magnet", HAMMER.replace("waveform", None))
     bare = HAMMER.replace({"pack": None, "platen": None})
-    with pytest.raises(ph.InputError, match="no platen or pack, expected displacements"):
+    with refused("platen"):
         ph.measure("spring", bare)
     assert len(ph.measure("spring", bare, displacements=[60e-6, 90e-6]).values["force"]) == 2
     soft = HAMMER.replace("pack", hammers.PACKS["dashpot"])
-    with pytest.raises(ph.InputError, match="the pack has no thickness"):
+    with refused("pack"):
         ph.measure("pack", soft)
     table = ph.measure("pack", soft, sensor={"exact": True}, peaks=[20e-6], points=4)
     # A linear spring pressed slowly has no loop.

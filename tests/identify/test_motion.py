@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import CRUDE
 from tests.identify import shots
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle
-from printhammer.errors import InputError
 from printhammer.identify.shots.motion import fit_motion
 
 HAMMER = ph.load(CRUDE)
@@ -60,11 +60,11 @@ def test_other_constants_may_be_30_percent_off_too(
         assert far[key].value == pytest.approx(near[key].value, abs=0.01 * near[key].standard_error)
 
 
-@pytest.mark.parametrize("factor", [0.7, 1.3])
-def test_a_magnet_too_far_off_is_told(tmp_path: Path, factor: float) -> None:
+@pytest.mark.parametrize(("factor", "key"), [(0.7, "motion"), (1.3, "fit")])
+def test_a_magnet_too_far_off_is_told(tmp_path: Path, factor: float, key: str) -> None:
     path = shots.write(tmp_path / "shot.csv", HAMMER, seed=3)
     start = HAMMER.replace("magnet.Am", factor * truth("magnet.Am"))
-    with pytest.raises(InputError, match=r"does not converge|does not move so that"):
+    with refused(key):
         fit_motion([path], start, free=["magnet.Am"])
 
 
@@ -175,7 +175,7 @@ def test_a_record_counts_once(tmp_path: Path) -> None:
     path = shots.write(tmp_path / "shot.csv", HAMMER, seed=11)
     first = fit_motion([path], FAR)
     built = first.into(FAR)
-    with pytest.raises(ph.InputError, match=r"shot\.csv.*fitted to this record already, expected another"):
+    with refused("record", file="shot.csv"):
         fit_motion([path], built)
     other = shots.write(tmp_path / "other.csv", HAMMER, seed=12)
     twice = fit_motion([other], built)
@@ -217,7 +217,7 @@ def test_what_a_motion_cannot_tell_apart(tmp_path: Path) -> None:
         (["pack.stiffness", "pack.thickness"], ("pack.stiffness and pack.thickness",)),
         (["magnet.F0", "spring.Bs", "spring.As"], ("magnet.F0, spring.Bs and spring.As",)),
     ):
-        with pytest.raises(ph.InputError, match="a motion cannot tell apart") as told:
+        with refused("free") as told:
             fit_motion([path], FAR, free=free)
         assert all(name in str(told.value) for name in named)
 
@@ -250,57 +250,60 @@ BAD: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "misses": (
         {"waveform": Rectangle(**{**WAVEFORM.model_dump(), "width": 150e-6})},
         {},
-        r"the record misses the impact: its largest displacement is .* um, expected .*beyond the front",
+        "displacement",
     ),
-    "ends early": ({"end": 0.4e-3}, {}, r"the record ends at .* us inside the pack"),
-    "begins late": ({"begin": 150e-6}, {}, r"the record begins at 150 us with the armature .* um off the"),
-    "coarse": ({"spacing": 50e-6}, {}, r"samples in the pack, one every 50 us, expected at least 5"),
+    "ends early": ({"end": 0.4e-3}, {}, "end"),
+    "begins late": ({"begin": 150e-6}, {}, "start"),
+    "coarse": ({"spacing": 50e-6}, {}, "pack"),
     "no rebound": (
         {"end": 0.5e-3},
         {"free": ["mass", "backstop.damping"]},
-        r"does not touch the backstop after the shot, expected one that does for backstop.damping",
+        "backstop.damping",
     ),
-    "unknown": ({}, {"free": ["weight"]}, r"free: 'weight' is no constant of .*hendriks-1983\.toml"),
-    "misspelt": ({}, {"free": ["backstop.dampng"]}, r"expected 'backstop.damping'$"),
-    "platen": ({}, {"free": ["platen"]}, r"free: 'platen' is no constant .* that moves the armature"),
-    "twice": ({}, {"free": ["mass", "mass"]}, r"free: mass is given twice"),
-    "nothing": ({}, {"free": []}, r"free: no constants are given"),
-    "bandwidth": ({}, {"bandwidth": -1.0}, r"bandwidth = -1.0 Hz, expected a positive number"),
-    "short": ({"end": 0.0, "begin": -15e-6}, {}, r"samples, expected the record of a whole shot"),
+    "unknown": ({}, {"free": ["weight"]}, "free"),
+    "misspelt": ({}, {"free": ["backstop.dampng"]}, "free"),
+    "platen": ({}, {"free": ["platen"]}, "free"),
+    "twice": ({}, {"free": ["mass", "mass"]}, "free"),
+    "nothing": ({}, {"free": []}, "free"),
+    "bandwidth": ({}, {"bandwidth": -1.0}, "bandwidth"),
+    "short": ({"end": 0.0, "begin": -15e-6}, {}, "samples"),
 }
 
 
 @pytest.mark.parametrize("which", BAD)
 def test_bad_input_is_told_in_one_sentence(tmp_path: Path, which: str) -> None:
     """With the file, what is wrong with it, and what was expected."""
-    record, options, sentence = BAD[which]
+    record, options, key = BAD[which]
     path = tmp_path / "shot.csv"
     if which == "short":
         path.write_text("time [us],displacement [um]\n0,50\n1,50\n2,50\n")
     else:
         shots.write(path, HAMMER, **record)
-    with pytest.raises(ph.InputError, match=sentence) as told:
+    with refused(key):
         fit_motion([path], HAMMER, **options)
-    assert "\n" not in str(told.value)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("old", "new", "key"),
     [
-        ("time [us]", "time", r"line 2: heading 'time' is expected to carry its unit"),
-        ("# bandwidth: 200000.0 Hz", "# bandwidth: 2 mm", r"the comment 'bandwidth': .*mm"),
+        ("time [us]", "time", "time"),
+        (
+            "# bandwidth: 200000.0 Hz",
+            "# bandwidth: 2 mm",
+            "bandwidth",
+        ),
         (
             "# bandwidth: 200000.0 Hz",
             "# bandwidth: -2 Hz",
-            r"the comment 'bandwidth': -2 Hz, expected a positive",
+            "bandwidth",
         ),
     ],
 )
-def test_bad_headings_and_comments(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+def test_bad_headings_and_comments(tmp_path: Path, old: str, new: str, key: str) -> None:
     """Also of what the file says of the sensor."""
     path = shots.write(tmp_path / "shot.csv", HAMMER)
     path.write_text(path.read_text().replace(old, new))
-    with pytest.raises(ph.InputError, match=sentence):
+    with refused(key):
         fit_motion([path], HAMMER)
 
 
@@ -310,7 +313,7 @@ def test_times_must_ascend(tmp_path: Path) -> None:
     lines = path.read_text().splitlines()
     lines[10], lines[11] = lines[11], lines[10]
     path.write_text("\n".join(lines))
-    with pytest.raises(ph.InputError, match=r"line 12: time .* expected ascending times"):
+    with refused("time"):
         fit_motion([path], HAMMER)
 
 
@@ -322,10 +325,10 @@ def test_a_current_that_is_none(tmp_path: Path) -> None:
         for line in path.read_text().splitlines()
     ]
     path.write_text("\n".join(flat))
-    with pytest.raises(ph.InputError, match="the column 'current' shows no pulse"):
+    with refused("current"):
         fit_motion([path], HAMMER)
     shots.write(path, HAMMER)
-    with pytest.raises(ph.InputError, match=r"neither the record has a column 'current \[A\]' nor"):
+    with refused("current"):
         fit_motion([path], HAMMER.replace("waveform", None))
 
 

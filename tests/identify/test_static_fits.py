@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests import measurements as lab
+from tests.errors import refused
 from tests.measurements import Array, write
 
 import printhammer as ph
@@ -167,10 +168,10 @@ def test_into_a_hammer_and_back(tmp_path: Path, hammer: ph.Hammer) -> None:
 
 def test_a_hammer_that_does_not_go_with_the_fit(tmp_path: Path, hammer: ph.Hammer) -> None:
     fit = fit_spring(write(tmp_path / "s.csv", lab.spring()), position=6e-5)
-    with pytest.raises(InputError, match=r"backstop\.position = 0\.002 in, expected 6e-05 m"):
+    with refused("backstop.position"):
         fit.into(hammer)
     other = hammer.replace({"spring": None})
-    with pytest.raises(InputError, match="the spring is missing, expected the law 'linear'"):
+    with refused("spring"):
         fit_spring(write(tmp_path / "s.csv", lab.spring()), position=lab.B).into(other)
 
 
@@ -328,21 +329,21 @@ def test_bad_data_in_one_sentence(tmp_path: Path, name: str) -> None:
 
 def test_missing_pieces_in_one_sentence(tmp_path: Path) -> None:
     spring = write(tmp_path / "s.csv", lab.spring())
-    with pytest.raises(InputError, match="position of the backstop is missing"):
+    with refused("position"):
         magnet(tmp_path, spring=spring)
-    with pytest.raises(InputError, match="table of rebounds, or the geometry"):
+    with refused("backstop"):
         fit_backstop()
     columns, branch = lab.pack()
     loading = np.array(branch) == "loading"
     table = write(tmp_path / "p.csv", {name: values[loading] for name, values in columns.items()})
     assert "not tested" in fit_pack(table, thickness=lab.THICKNESS).remarks[0]
-    with pytest.raises(InputError, match="no rows of unloading"):
+    with refused("rows"):
         fit_pack(table, thickness=lab.THICKNESS, exponents=True)
-    for bodies, said in (
-        (([(1e-3, 0.0)], [(1e9, 0.0)], [(0.3, 0.0)] * 2), "Young's modulus: 1 given, expected 2"),
-        (([(1e-3, 0.0)] * 3, [(1e9, 0.0)] * 2, [(0.3, 0.0)] * 2), "radius: 3 given"),
-        (([(-1e-3, 0.0)], [(1e9, 0.0)] * 2, [(0.3, 0.0)] * 2), "radius: -0.001, expected more than 0"),
-        (([(1e-3, 0.0)], [(1e9, 0.0)] * 2, [(0.3, 0.0), (0.6, 0.0)]), "at most 0.5"),
+    for bodies, key in (
+        (([(1e-3, 0.0)], [(1e9, 0.0)], [(0.3, 0.0)] * 2), "Young's modulus"),
+        (([(1e-3, 0.0)] * 3, [(1e9, 0.0)] * 2, [(0.3, 0.0)] * 2), "radius"),
+        (([(-1e-3, 0.0)], [(1e9, 0.0)] * 2, [(0.3, 0.0)] * 2), "radius"),
+        (([(1e-3, 0.0)], [(1e9, 0.0)] * 2, [(0.3, 0.0), (0.6, 0.0)]), "Poisson ratio"),
     ):
-        with pytest.raises(InputError, match=said):
+        with refused(key):
             Stiffness.from_bodies(*bodies)

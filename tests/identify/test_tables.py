@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 from printhammer.errors import InputError
 from printhammer.identify.tables import Readings, read_table
@@ -114,10 +115,10 @@ def test_bad_tables_in_one_sentence(tmp_path: Path, text: str, said: tuple[str, 
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such file"):
+    with refused(None, file="none.csv"):
         read_table(tmp_path / "none.csv", COLUMNS)
-    with pytest.raises(InputError, match="cannot be read"):
+    with refused(None):
         read_table(tmp_path, COLUMNS)
     (tmp_path / "latin.csv").write_bytes(b"displacement [\xb5m],force [N]\n1,2\n")
-    with pytest.raises(InputError, match="UTF-8"):
+    with refused(None, file="latin.csv"):
         read_table(tmp_path / "latin.csv", COLUMNS)

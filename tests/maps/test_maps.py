@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.maps.frequency import rms_difference
@@ -96,10 +97,10 @@ def test_a_map_is_read_back_as_it_was(chart: xr.Dataset, tmp_path: Path, name: s
 
 
 def test_a_map_is_not_half_written(chart: xr.Dataset, tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match=r"map\.txt: expected a name that ends in one of \.nc, \.zarr"):
+    with refused(None, file="map.txt"):
         save_dataset(chart, tmp_path / "map.txt")
     for name in ("map.nc", "map.zarr"):
-        with pytest.raises(ph.InputError, match="cannot be written"):
+        with refused(None):
             save_dataset(chart, tmp_path / "nowhere" / name)
     assert list(tmp_path.iterdir()) == []
 
@@ -129,33 +130,33 @@ def test_progress_is_told(hammer: "ph.Hammer") -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({"rates": []}, r"rates: .* expected a list of at least one rate, Hz"),
-        ({"rates": [500.0, np.nan]}, r"rates: nan Hz, expected finite numbers greater than 0 Hz"),
-        ({"rates": [-5.0]}, r"rates: -5 Hz, expected finite numbers greater than 0 Hz"),
-        ({"rates": [500.0, 500.0]}, r"rates: 500 Hz follows 500 Hz, expected ascending rates"),
-        ({"rates": ["fast"]}, r"rates: expected numbers, Hz"),
-        ({"pulses": 0}, r"pulses = 0 is expected to be a whole number from 1"),
-        ({"times": 1}, r"times = 1, expected a whole number of at least 2, or the times, s"),
-        ({"times": 2.5}, r"times = 2.5, expected a whole number"),
-        ({"times": [1e-3, 1e-4]}, r"times: expected ascending times"),
-        ({"times": [-1e-3, 1e-4]}, r"times: expected ascending times, s, not negative"),
-        ({"times": [np.inf]}, r"times: expected a list of finite numbers, s"),
-        ({"rates": range(1, 20002), "times": 10**4}, r"20001 rates x 10000 times, expected at most"),
-        ({"tolerance": 1.0}, r"tolerance = 1.0, expected"),
-        ({"threads": 0}, r"threads = 0, expected at least 1"),
-        ({"overlap": "both"}, r"overlap = 'both' is expected to be"),
+        ({"rates": []}, "rates"),
+        ({"rates": [500.0, np.nan]}, "rates"),
+        ({"rates": [-5.0]}, "rates"),
+        ({"rates": [500.0, 500.0]}, "rates"),
+        ({"rates": ["fast"]}, "rates"),
+        ({"pulses": 0}, "pulses"),
+        ({"times": 1}, "times"),
+        ({"times": 2.5}, "times"),
+        ({"times": [1e-3, 1e-4]}, "times"),
+        ({"times": [-1e-3, 1e-4]}, "times"),
+        ({"times": [np.inf]}, "times"),
+        ({"rates": range(1, 20002), "times": 10**4}, "rates"),
+        ({"tolerance": 1.0}, "tolerance"),
+        ({"threads": 0}, "threads"),
+        ({"overlap": "both"}, "overlap"),
     ],
 )
-def test_bad_input(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=rf"^{said}[^\n]*$"):
+def test_bad_input(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         ph.frequency_map(hammer, **options)
 
 
 def test_a_hammer_without_a_waveform_is_given_one(hammer: "ph.Hammer") -> None:
     bare = hammer.replace("waveform", None)
-    with pytest.raises(ph.InputError, match="has no waveform to fire"):
+    with refused("waveform"):
         ph.frequency_map(bare, RATES)
     found = ph.frequency_map(bare, RATES[:1], times=11, waveform=hammer.waveform)
     assert found["struck"].all()

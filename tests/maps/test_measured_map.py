@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.maps.layout import LAYOUT
@@ -101,7 +102,7 @@ def test_times_may_be_asked_for(write: Write) -> None:
     np.testing.assert_allclose(
         found["displacement"], [[55e-6, 70e-6, np.nan], [61e-6, 91e-6, np.nan]], rtol=1e-6
     )
-    with pytest.raises(ph.InputError, match="times: expected ascending numbers, s"):
+    with refused("times"):
         load_measured_map(write(LONG), times=[1.0, 0.0])
 
 
@@ -136,47 +137,47 @@ def test_netcdf_with_other_units_order_and_times(tmp_path: Path) -> None:
 
 
 BAD_TABLES = {
-    "no unit": (LONG.replace("time [us]", "time"), r"column 'time' is expected to carry its unit"),
-    "unknown unit": (LONG.replace("[us]", "[uz]"), r"column 'time \[uz\]': the unit 'uz' is not known"),
-    "other dimension": (LONG.replace("[um]", "[N]"), r"column 'displacement \[N\]': .* expected a length"),
-    "word": (LONG.replace("1.2,10,71", "1.2,10,much"), r"line 8, column 'displacement \[um\]': 'much'"),
-    "infinite": (LONG.replace("1.2,10,71", "1.2,10,inf"), r"line 8, column 'displacement \[um\]': 'inf'"),
-    "no time": (LONG.replace("1.2,10,71", "1.2,,71"), r"line 8, column 'time \[us\]': ''"),
-    "rate of zero": (LONG.replace("1.2,", "0,"), r"line 7: rate 0 Hz is expected to be greater"),
-    "twice": (LONG.replace("1.2,10,71", "1.2,20,71"), r"line 9: time 2e-05 s at 1200 Hz .* in line 8,"),
-    "one sample": (LONG + "1.7,0,50\n", r"1 displacements at 1700 Hz, expected at least 2"),
-    "cells": (LONG.replace("1.2,10,71", "1.2,10"), r"line 8 has 2 cells, expected 3"),
+    "no unit": (LONG.replace("time [us]", "time"), "time"),
+    "unknown unit": (LONG.replace("[us]", "[uz]"), "time [uz]"),
+    "other dimension": (LONG.replace("[um]", "[N]"), "displacement [N]"),
+    "word": (LONG.replace("1.2,10,71", "1.2,10,much"), "displacement [um]"),
+    "infinite": (LONG.replace("1.2,10,71", "1.2,10,inf"), "displacement [um]"),
+    "no time": (LONG.replace("1.2,10,71", "1.2,,71"), "time [us]"),
+    "rate of zero": (LONG.replace("1.2,", "0,"), "rate"),
+    "twice": (LONG.replace("1.2,10,71", "1.2,20,71"), "time"),
+    "one sample": (LONG + "1.7,0,50\n", "rate"),
+    "cells": (LONG.replace("1.2,10,71", "1.2,10"), "line 8"),
     "another column": (
         LONG.replace("displacement", "velocity"),
-        r"columns 'rate \[kHz\]', .*'velocity \[um\]', expected 'rate \[Hz\]",
+        "columns",
     ),
-    "no rate": (WIDE.replace("1.2 kHz", "left"), r"column 'left \[um\]': .*; expected 'rate \[Hz\]"),
-    "rate in metres": (WIDE.replace("1.2 kHz", "1.2 m"), r"column '1.2 m \[um\]': .*expected a frequency"),
-    "rate twice": (WIDE.replace("1.2 kHz", "0.5 kHz"), r"the rate 500 Hz has two columns"),
-    "empty": ("", r"0 rows, expected the heading"),
-    "heading alone": (WIDE.splitlines()[0], r"1 rows, expected the heading .* and samples"),
-    "quotes": ('time [us],500 Hz [um]\n"0,1\n', r"expected comma-separated values"),
+    "no rate": (WIDE.replace("1.2 kHz", "left"), "left [um]"),
+    "rate in metres": (WIDE.replace("1.2 kHz", "1.2 m"), "1.2 m [um]"),
+    "rate twice": (WIDE.replace("1.2 kHz", "0.5 kHz"), "500 Hz [mil]"),
+    "empty": ("", "rows"),
+    "heading alone": (WIDE.splitlines()[0], "rows"),
+    "quotes": ('time [us],500 Hz [um]\n"0,1\n', "line 2"),
 }
 
 
 @pytest.mark.parametrize("kind", BAD_TABLES)
 def test_odd_tables_are_told_with_column_and_line(write: Write, kind: str) -> None:
-    text, said = BAD_TABLES[kind]
-    with pytest.raises(ph.InputError, match=rf"^[^\n]*measured\.csv: [^\n]*{said}[^\n]*$"):
+    text, key = BAD_TABLES[kind]
+    with refused(key):
         load_measured_map(write(text))
 
 
 def test_odd_files(tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match=r"nowhere\.csv: the measured map cannot be read \(No such file"):
+    with refused(None, file="nowhere.csv"):
         load_measured_map(tmp_path / "nowhere.csv")
-    with pytest.raises(ph.InputError, match=r"the measured map cannot be read"):
+    with refused(None, file="nowhere.zarr"):
         load_measured_map(tmp_path / "nowhere.zarr")
     for start in (b"CDF\x01", b"\x89HDF\r\n\x1a\n"):
         (tmp_path / "broken.nc").write_bytes(start + b"broken")
-        with pytest.raises(ph.InputError, match=r"^[^\n]*broken\.nc: (the measured map cannot|NetCDF-4)"):
+        with refused(None, file="broken.nc"):
             load_measured_map(tmp_path / "broken.nc")
     (tmp_path / "latin.csv").write_bytes("time [µs],500 Hz [µm]\n".encode("latin-1"))
-    with pytest.raises(ph.InputError, match=r"latin\.csv: the measured map is expected to be UTF-8 text"):
+    with refused(None, file="latin.csv"):
         load_measured_map(tmp_path / "latin.csv")
 
 
@@ -191,30 +192,30 @@ def laboratory(**changes: object) -> xr.Dataset:
 
 
 BAD_SETS = {
-    "no displacement": ({"displacement": None}, r"expected the variable displacement, there is rate, time"),
-    "no unit": ({"time": ("time", [0.0, 1.0])}, r"time is expected to carry its unit in the attribute units"),
-    "other unit": ({"time": ("time", [0.0, 1.0], {"units": "m"})}, r"time: .* expected a time"),
+    "no displacement": ({"displacement": None}, "displacement"),
+    "no unit": ({"time": ("time", [0.0, 1.0])}, "time"),
+    "other unit": ({"time": ("time", [0.0, 1.0], {"units": "m"})}, "time"),
     "one dimension": (
         {"displacement": ("rate", [1.0, 2.0], {"units": "m"})},
-        r"displacement lies over rate,",
+        "displacement",
     ),
-    "other dimension": ({"time": ("t", [0.0], {"units": "s"})}, r"time lies over t, expected time"),
+    "other dimension": ({"time": ("t", [0.0], {"units": "s"})}, "time"),
     "infinite": (
         {"displacement": (("rate", "time"), np.full((2, 2), np.inf), {"units": "m"})},
-        r"displacement is expected to hold finite numbers",
+        "displacement",
     ),
-    "rate twice": ({"rate": ("rate", [500.0, 500.0], {"units": "Hz"})}, r"row 2: rate 500 Hz .*given twice"),
+    "rate twice": ({"rate": ("rate", [500.0, 500.0], {"units": "Hz"})}, "row 2"),
     "text": (
         {"displacement": (("rate", "time"), np.full((2, 2), "a"), {"units": "m"})},
-        r"displacement is expected to hold numbers",
+        "displacement",
     ),
 }
 
 
 @pytest.mark.parametrize("kind", BAD_SETS)
 def test_odd_data_sets(tmp_path: Path, kind: str) -> None:
-    changes, said = BAD_SETS[kind]
+    changes, key = BAD_SETS[kind]
     path = tmp_path / "laboratory.nc"
     laboratory(**changes).to_netcdf(path, engine="scipy")
-    with pytest.raises(ph.InputError, match=rf"^[^\n]*laboratory\.nc: [^\n]*{said}[^\n]*$"):
+    with refused(key):
         load_measured_map(path)

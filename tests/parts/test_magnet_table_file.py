@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 from printhammer.errors import InputError
 from printhammer.parts.magnet.linkage_table import LinkageTableMagnet
@@ -89,20 +90,20 @@ def test_a_bad_table_is_refused_in_one_sentence(tmp_path: Path, text: str | byte
 
 @pytest.mark.parametrize("name", ["absent.csv", "."])
 def test_a_table_that_cannot_be_read_is_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="the force table cannot be read"):
+    with refused(None):
         TableMagnet(file=str(tmp_path / name))
 
 
 @pytest.mark.parametrize(
-    ("force", "sentence"),
+    ("force", "key"),
     [
-        ([[1.0, 2.0]], "expected 2 rows of 2 forces"),
-        ([[1.0, 2.0], [3.0]], "expected 2 rows of 2 forces"),
-        ([[1.0, 2.0], [3.0, float("inf")]], "the point 0.0002 m, 1.0 A, inf N is expected to be finite"),
+        ([[1.0, 2.0]], "rows"),
+        ([[1.0, 2.0], [3.0]], "rows"),
+        ([[1.0, 2.0], [3.0, float("inf")]], "point"),
     ],
 )
-def test_arrays_that_are_no_grid_are_refused(force: list[list[float]], sentence: str) -> None:
-    with pytest.raises(InputError, match=sentence):
+def test_arrays_that_are_no_grid_are_refused(force: list[list[float]], key: str) -> None:
+    with refused(key):
         TableMagnet.from_arrays([1e-4, 2e-4], [0.0, 1.0], force)
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
-from printhammer.errors import InputError
 from printhammer.parts import PARTS, outside
 from printhammer.parts.outside import load_installed, load_parts
 
@@ -93,40 +93,38 @@ def test_a_package_brings_a_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert ph.load(hammer).spring is not None
     monkeypatch.setattr(outside, "entry_points", lambda group: [EntryPoint("springs", "own_missing", group)])
     load_installed.cache_clear()
-    with pytest.raises(
-        InputError, match=r"'springs' = 'own_missing' of printhammer.parts cannot be imported"
-    ):
+    with refused("springs"):
         ph.load(hammer)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "key"),
     [
         (
             "spring_force(c, x)",
             "spring_force(x)",
-            r"spring_force\(x\), expected the function spring_force\(c",
+            "spring_force",
         ),
-        ("spring_energy(c, x)", "spring_energy(c, x, v)", r"expected the function spring_energy\(c, x\)$"),
+        ("spring_energy(c, x)", "spring_energy(c, x, v)", "spring_energy"),
         (
             "def spring_force",
             "def spring_forces",
-            r"law 'own_.*' has no force, expected the function spring_f",
+            "force",
         ),
-        ("@register\n", "", "registers no part, expected a class marked with @register"),
-        ("class CubicSpring", "class Cubic Spring", "cannot be imported, SyntaxError: "),
-        ("from printhammer.parts", "from printhammer.prats", "cannot be imported, ModuleNotFoundError: "),
+        ("@register\n", "", "part"),
+        ("class CubicSpring", "class Cubic Spring", None),
+        ("from printhammer.parts", "from printhammer.prats", None),
         (
             "def spring_energy(c, x):",
             "spring_energy = 3\ndef other(c, x):",
-            "spring_energy = 3, expected the",
+            "spring_energy",
         ),
     ],
 )
-def test_a_law_that_is_none_is_a_sentence(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_law_that_is_none_is_a_sentence(tmp_path: Path, old: str, new: str, key: str | None) -> None:
     assert old in CUBIC
     path = written(tmp_path, f"own_{abs(hash(new))}", CUBIC.replace(old, new))
-    with pytest.raises(InputError, match=said) as caught:
+    with refused(key) as caught:
         load_parts(path)
     assert path.name in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -142,21 +140,21 @@ def test_a_wrong_law_is_a_sentence_in_python_too(tmp_path: Path, monkeypatch: py
         lambda: module.CubicSpring(stiffness=1.0, cubic=1.0),
     ]
     for made in make:
-        with pytest.raises(InputError, match=r"own_wrong.py: spring_force\(x\), expected the function"):
+        with refused("spring_force"):
             made()
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "key"),
     [
-        ("none.py", "no such file"),
-        ("own-part.py", "expected a Python file whose name can be imported"),
-        ("own.txt", "expected a Python file whose name can be imported"),
-        ("random.py", "a module of the name 'random' is there already"),
+        ("none.py", None),
+        ("own-part.py", None),
+        ("own.txt", None),
+        ("random.py", "module"),
     ],
 )
-def test_a_file_that_cannot_be_imported_is_a_sentence(tmp_path: Path, name: str, said: str) -> None:
+def test_a_file_that_cannot_be_imported_is_a_sentence(tmp_path: Path, name: str, key: str | None) -> None:
     if name != "none.py":
         (tmp_path / name).write_text(CUBIC)
-    with pytest.raises(InputError, match=said):
+    with refused(key):
         load_parts(tmp_path / name)

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
+from tests.errors import refused
 from tests.report.reconstruction_files import changed, write
 
-from printhammer.errors import InputError
 from printhammer.report.reconstruction.results import FILES, Results, shipped_results
 from printhammer.report.reconstruction.shares import Share
 
@@ -44,57 +44,59 @@ def test_what_ships_can_be_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fault", "told"),
+    ("fault", "key"),
     [
-        ({"base_rates": []}, "base_rates.json: expected an object"),
-        (changed("base_rates", "format", to=2), "format = 2: expected 1"),
+        ({"base_rates": []}, None),
+        (changed("base_rates", "format", to=2), "format"),
         (
             changed("base_rates", "claims", "settle_out", "holds", to=901),
-            "claims.settle_out: expected no more",
+            "claims.settle_out",
         ),
         (
             changed("base_rates", "claims", "settle_out", "holds", to=-1),
-            "claims.settle_out.holds = -1: expected",
+            "claims.settle_out.holds",
         ),
         (
             changed("base_rates", "claims", to={"setle_out": {"measured": 1, "holds": 1}}),
-            "setle_out.*: expected the name",
+            "claims.setle_out",
         ),
-        (changed("predictions", "extra", to=1), "the key extra is not known"),
-        (changed("predictions", "claims", "settle_out", "kind", to="odd"), "kind = 'odd': expected 'stated'"),
-        (changed("search", "core_hours", to="long"), "core_hours = 'long': expected a valid number"),
-        (changed("search", "searches", to=[]), "search.json: searches: expected"),
-        (changed("search", "searches", 1, "aim", to="shape"), "searches.*aim = 'shape': expected 'stated'"),
+        (changed("predictions", "extra", to=1), "extra"),
+        (changed("predictions", "claims", "settle_out", "kind", to="odd"), "claims.settle_out.kind"),
+        (changed("search", "core_hours", to="long"), "core_hours"),
+        (changed("search", "searches", to=[]), "searches"),
+        (changed("search", "searches", 1, "aim", to="shape"), "searches[2].aim"),
         (
             changed("search", "failing", "release_margin", "best", "costs", to=["x"]),
-            "costs.* = 'x': expected the name",
+            "failing.release_margin.best.costs[1]",
         ),
-        (changed("family", "hammers", to=[]), "family.json: hammers: expected"),
+        (changed("family", "hammers", to=[]), "hammers"),
         (
             changed("family", "hammers", 0, "verdicts", to={"settle_out": "odd"}),
-            "settle_out = 'odd': expected",
+            "hammers[1].verdicts.settle_out",
         ),
     ],
 )
-def test_corrupt_files_are_told_in_one_sentence(tmp_path: Path, fault: dict[str, Any], told: str) -> None:
+def test_corrupt_files_are_told_in_one_sentence(
+    tmp_path: Path, fault: dict[str, Any], key: str | None
+) -> None:
     (name,) = fault
-    with pytest.raises(InputError, match=told) as error:
+    with refused(key) as error:
         Results(write(tmp_path, **fault)).check()
     assert f"{name}.json: " in str(error.value)
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "key"),
     [
-        (b"{", "expected JSON"),
-        (b'{"format": NaN}', "NaN is no number of JSON"),
-        (b"\xff\xfe", "cannot be read"),
+        (b"{", None),
+        (b'{"format": NaN}', None),
+        (b"\xff\xfe", None),
     ],
 )
-def test_files_that_are_no_json(tmp_path: Path, content: bytes, told: str) -> None:
+def test_files_that_are_no_json(tmp_path: Path, content: bytes, key: str | None) -> None:
     (tmp_path / "search.json").write_bytes(content)
-    with pytest.raises(InputError, match=f"search.json: .*{told}"):
+    with refused(key, file="search.json"):
         Results(tmp_path).check()
 
 

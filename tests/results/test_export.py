@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from tests import hammers
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.run.motion import FORCES
@@ -49,11 +50,10 @@ def test_parquet_round_trip(motion: ph.Motion, tmp_path: Path) -> None:
 
 
 def test_a_failed_write_leaves_what_was_there(motion: ph.Motion, tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match="the file cannot be written") as error:
+    with refused(None, file="motion.csv"):
         motion.to_csv(tmp_path / "missing" / "motion.csv")
-    assert "\n" not in str(error.value)
     taken = tmp_path / "taken.csv"
     taken.mkdir()
-    with pytest.raises(ph.InputError, match="the file cannot be written"):
+    with refused(None, file="taken.csv"):
         motion.to_csv(taken)
     assert [entry.name for entry in tmp_path.iterdir()] == ["taken.csv"]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
-import printhammer as ph
 from printhammer.results.store import Layout, Store, Variable, open_store
 
 if TYPE_CHECKING:
@@ -110,18 +110,18 @@ def test_a_draft_of_a_store_is_begun_anew(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("layout", "told"),
+    ("layout", "key"),
     [
-        (replace(LAYOUT, identity={"store_format": "2", "tolerance": "1e-09"}), "store format 1, expected 2"),
+        (replace(LAYOUT, identity={"store_format": "2", "tolerance": "1e-09"}), "store_format"),
         (
             replace(LAYOUT, identity={"store_format": "1", "tolerance": "1e-08"}),
-            "tolerance 1e-09, expected 1e-08",
+            "tolerance",
         ),
     ],
 )
-def test_results_of_something_else_are_refused(tmp_path: Path, layout: Layout, told: str) -> None:
+def test_results_of_something_else_are_refused(tmp_path: Path, layout: Layout, key: str) -> None:
     whole = filled(tmp_path / "a.zarr")
-    with pytest.raises(ph.InputError, match=told):
+    with refused(key):
         Store(tmp_path / "a.zarr", layout, NOW)
     assert files_of(tmp_path / "a.zarr") == whole
 
@@ -134,7 +134,7 @@ def test_another_folder_is_refused_and_left_alone(tmp_path: Path, content: dict[
     folder.mkdir()
     for name, text in content.items():
         (folder / name).write_text(text)
-    with pytest.raises(ph.InputError, match="no store of printhammer"):
+    with refused(None):
         Store(folder, LAYOUT, NOW)
     assert {path.name: path.read_text() for path in folder.iterdir()} == content
 
@@ -142,22 +142,22 @@ def test_another_folder_is_refused_and_left_alone(tmp_path: Path, content: dict[
 def test_a_file_is_refused_and_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "taken"
     path.write_text("mine")
-    with pytest.raises(ph.InputError, match="no store of printhammer"):
+    with refused(None):
         Store(path, LAYOUT, NOW)
     assert path.read_text() == "mine"
-    with pytest.raises(ph.InputError, match="there is no such store"):
+    with refused(None):
         open_store(tmp_path / "none")
 
 
 def test_a_place_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match=r"cannot be written \(No such file or directory\)"):
+    with refused(None, file="a.zarr"):
         Store(tmp_path / "none" / "a.zarr", LAYOUT, NOW)
 
 
 def test_two_processes_do_not_share_a_store(tmp_path: Path) -> None:
     with Store(tmp_path / "a.zarr", LAYOUT, NOW) as store:
         store.write((0,), block(0))
-        with pytest.raises(ph.InputError, match="another process is at work on this store"):
+        with refused(None, file="a.zarr"):
             Store(tmp_path / "a.zarr", LAYOUT, NOW)
     with Store(tmp_path / "a.zarr", LAYOUT, NOW) as store:
         assert store.done((0,))
@@ -167,7 +167,7 @@ def test_two_processes_do_not_lay_out_the_same_store(tmp_path: Path, monkeypatch
     rename = Path.rename
 
     def meanwhile(self: Path, target: Path) -> Path:
-        with pytest.raises(ph.InputError, match="another process"):
+        with refused(None, file="a.zarr"):
             Store(tmp_path / "a.zarr", LAYOUT, NOW)
         return rename(self, target)
 
@@ -195,7 +195,7 @@ def test_a_full_disk_costs_only_the_block(
         monkeypatch.setattr(Path, failing, full)
         for index in range(3):
             if left < 2:
-                with pytest.raises(ph.InputError, match=r"b.zarr: .*No space left on device.*is kept"):
+                with refused(None, file="b.zarr"):
                     store.write((index,), block(index))
                 break
             store.write((index,), block(index))
@@ -224,6 +224,6 @@ def test_a_full_disk_leaves_no_half_laid_out_store(
         return genuine(self, data)
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(ph.InputError, match="No space left on device"):
+    with refused(None, file="a.zarr"):
         Store(tmp_path / "a.zarr", LAYOUT, NOW)
     assert list(tmp_path.iterdir()) == []

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests import hammers
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.run import ensemble_group
@@ -23,55 +24,54 @@ def made(hammer: Any = None, drives: Any = None, ends: Any = END, **options: Any
 
 
 @pytest.mark.parametrize(
-    ("make", "sentence"),
+    ("make", "key"),
     [
-        (lambda: made(drives=[drive()] * 3, ends=[END] * 2), "ends: 2 are given, expected 1 or 3"),
-        (lambda: made([hammers.crude()] * 2, [drive()] * 3), "hammers: 2 are given, expected 1 or 3"),
-        (lambda: made(drives=[drive()] * 2, ends=[END] * 3), "drives: 2 are given, expected 1 or 3"),
-        (lambda: made(ends=[END] * 3, states=[[6e-5, 0.0]] * 2), "states: 2 are given, expected 1 or 3"),
-        (lambda: made(ends=0.0), r"ends = 0\.0 s, expected positive"),
-        (lambda: made(ends=[END, -1.0]), r"ends = -1\.0 s, expected positive"),
-        (lambda: made(ends=np.inf), "ends = inf s, expected positive"),
-        (lambda: made(ends=np.nan), "ends = nan s, expected positive"),
-        (lambda: made(ends="1 ms"), "ends = '1 ms', expected numbers"),
-        (lambda: made(ends=[[END]]), r"ends: an array of shape \(1, 1\), expected one number"),
-        (lambda: made(states=5.0), r"states: an array of shape \(\), expected rows"),
-        (lambda: made(states=[1e-4, 0.0, 1.0]), r"states: an array of shape \(3,\), expected rows"),
-        (lambda: made(states=np.zeros((2, 2, 2))), r"states: an array of shape \(2, 2, 2\), expected rows"),
-        (lambda: made(states=(np.nan, 0.0)), "expected two finite numbers"),
-        (lambda: made(states=(-1e-6, 0.0)), "expected a displacement from 0 m"),
-        (lambda: made(states=(2.5e-4, 0.0, 0.0, 0.0)), "branch = 0, expected a pack and one of 1"),
-        (lambda: made(states=(2.5e-4, 0.0, 99.0, 0.0)), "branch = 99, expected"),
-        (lambda: made(states=(2.5e-4, 0.0, 1.5, 0.0)), r"branch = 1\.5, expected"),
-        (lambda: made(states=(1e-4, 0.0, 2.0, 3e-4)), "expected more than its front"),
-        (lambda: made(states=(2.5e-4, 0.0, 2.0, 2.4e-4)), "expected a displacement not less than"),
+        (lambda: made(drives=[drive()] * 3, ends=[END] * 2), "ends"),
+        (lambda: made([hammers.crude()] * 2, [drive()] * 3), "hammers"),
+        (lambda: made(drives=[drive()] * 2, ends=[END] * 3), "drives"),
+        (lambda: made(ends=[END] * 3, states=[[6e-5, 0.0]] * 2), "states"),
+        (lambda: made(ends=0.0), "ends"),
+        (lambda: made(ends=[END, -1.0]), "ends"),
+        (lambda: made(ends=np.inf), "ends"),
+        (lambda: made(ends=np.nan), "ends"),
+        (lambda: made(ends="1 ms"), "ends"),
+        (lambda: made(ends=[[END]]), "ends"),
+        (lambda: made(states=5.0), "states"),
+        (lambda: made(states=[1e-4, 0.0, 1.0]), "states"),
+        (lambda: made(states=np.zeros((2, 2, 2))), "states"),
+        (lambda: made(states=(np.nan, 0.0)), "state"),
+        (lambda: made(states=(-1e-6, 0.0)), "state"),
+        (lambda: made(states=(2.5e-4, 0.0, 0.0, 0.0)), "branch"),
+        (lambda: made(states=(2.5e-4, 0.0, 99.0, 0.0)), "branch"),
+        (lambda: made(states=(2.5e-4, 0.0, 1.5, 0.0)), "branch"),
+        (lambda: made(states=(1e-4, 0.0, 2.0, 3e-4)), "x"),
+        (lambda: made(states=(2.5e-4, 0.0, 2.0, 2.4e-4)), "memory"),
         (lambda: made(tolerance=0.0), "tolerance"),
         (lambda: made(tolerance=1.0), "tolerance"),
         (lambda: made(tolerance=np.nan), "tolerance"),
         (lambda: made(tolerance="1e-9"), "tolerance"),
-        (lambda: made().run(engine="fast"), "engine = 'fast', expected one of auto, plain, lanes"),
-        (lambda: made().run(threads=0), "threads = 0, expected at least 1"),
-        (lambda: made().run(strobes="firing"), "strobes = 'firing', expected \"firings\""),
-        (lambda: made().run(strobes=3), "strobes = 3, expected"),
-        (lambda: made().run(strobes=[[0.0]] * 2), "strobes: 2 arrays, expected 1"),
-        (lambda: made().run(strobes=[[2e-4, 1e-4]]), "strobes: expected ascending numbers"),
-        (lambda: made().run(strobes=[[np.nan]]), "strobes: expected ascending numbers"),
-        (lambda: made().run(times=[2e-4, 1e-4]), "times: expected ascending numbers"),
-        (lambda: made().run(times=[-1e-4, 1e-4]), "times: expected ascending numbers"),
-        (lambda: made().run(times=[0.0, np.inf]), "times: expected ascending numbers"),
+        (lambda: made().run(engine="fast"), "engine"),
+        (lambda: made().run(threads=0), "threads"),
+        (lambda: made().run(strobes="firing"), "strobes"),
+        (lambda: made().run(strobes=3), "strobes"),
+        (lambda: made().run(strobes=[[0.0]] * 2), "strobes"),
+        (lambda: made().run(strobes=[[2e-4, 1e-4]]), "strobes"),
+        (lambda: made().run(strobes=[[np.nan]]), "strobes"),
+        (lambda: made().run(times=[2e-4, 1e-4]), "times"),
+        (lambda: made().run(times=[-1e-4, 1e-4]), "times"),
+        (lambda: made().run(times=[0.0, np.inf]), "times"),
         (
             lambda: made().run(times=[0.0], x=np.zeros((2, 1), np.float32)),
-            r"shape \(2, 1\).*expected \(1, 1\)",
+            "x",
         ),
-        (lambda: made().run(times=[0.0], x=np.zeros((1, 1))), "float64, expected .* float32"),
-        (lambda: made().run(times=[0, 1e-4], x=np.zeros((1, 4), np.float32)[:, ::2]), "without gaps"),
-        (lambda: made().run(x=np.zeros((1, 4), np.float32)), r"expected \(1, 0\)"),
+        (lambda: made().run(times=[0.0], x=np.zeros((1, 1))), "x"),
+        (lambda: made().run(times=[0, 1e-4], x=np.zeros((1, 4), np.float32)[:, ::2]), "x"),
+        (lambda: made().run(x=np.zeros((1, 4), np.float32)), "x"),
     ],
 )
-def test_one_sentence(make: Callable[[], Any], sentence: str) -> None:
-    with pytest.raises(ph.InputError, match=sentence) as caught:
+def test_one_sentence(make: Callable[[], Any], key: str) -> None:
+    with refused(key):
         make()
-    assert "\n" not in str(caught.value)
 
 
 def test_no_rest_state_to_start_from() -> None:
@@ -84,13 +84,13 @@ def test_no_rest_state_to_start_from() -> None:
 
 def test_lanes_for_laws_that_they_are_not_for() -> None:
     rigid = hammers.made_of(spring=hammers.preload(-4.0), pack=hammers.power(), backstop=hammers.rigid(0.5))
-    with pytest.raises(ph.InputError, match='"lanes", expected "plain" or "auto"'):
+    with refused("engine"):
         Ensemble(rigid, hammers.idle(), END, states=(1e-4, 0.0)).run(engine="lanes")
 
 
 def test_a_start_on_a_branch_runs_by_itself() -> None:
     ensemble = made(states=(2.5e-4, 0.1, 1.0, 0.0))
-    with pytest.raises(ph.InputError, match='"lanes", expected "plain" or "auto"'):
+    with refused("engine"):
         ensemble.run(engine="lanes")
     assert ensemble.run().ok.all()
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import CRUDE
 
 import printhammer as ph
@@ -30,9 +31,9 @@ def test_starts_are_checked() -> None:
     hammer = ph.load(CRUDE)
     drive = ph.PulseTrain(hammer.waveform)
     for starts in (-1e-6, 2e-3, np.nan):
-        with pytest.raises(ph.InputError, match=r"starts = .*expected a number from 0 to before the end"):
+        with refused("starts"):
             ph.Ensemble(hammer, drive, 1e-3, starts=starts)
-    with pytest.raises(ph.InputError, match="expected 1 or 3"):
+    with refused("ends"):
         ph.Ensemble(hammer, drive, [1e-3, 2e-3], starts=[0.0, 0.0, 0.0])
-    with pytest.raises(ph.InputError, match="later than at time 0"):
+    with refused("start"):
         ph.Ensemble(hammer, drive, 1e-3, starts=1e-4).motion(0)

@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 from tests import hammers
+from tests.errors import refused
 from tests.hammers import FRONT, STOP, STROKE
 
 import printhammer as ph
@@ -131,7 +132,7 @@ def test_largest_maxima_between_firings(motion: ph.Motion) -> None:
         assert found is not None
         assert found[1] == pytest.approx(x.max(), rel=1e-9)
         assert found[0] == pytest.approx(times[np.argmax(x)], abs=2.0 * (times[1] - times[0]))
-    with pytest.raises(ph.InputError, match="firing = 3: the drive has firings 0 to 2"):
+    with refused("firing"):
         motion.peak_after(3)
 
 
@@ -145,7 +146,7 @@ def test_strobe(motion: ph.Motion) -> None:
 
 def test_a_time_outside_is_refused(motion: ph.Motion) -> None:
     for time in (-1e-9, motion.end * 1.001, np.nan):
-        with pytest.raises(ph.InputError, match="lies outside the motion, expected a time from 0 s to"):
+        with refused("t"):
             motion.at([0.0, time])
 
 

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import strobes
@@ -37,7 +38,7 @@ def test_a_regime_stands_for_itself(hammer: ph.Hammer) -> None:
     assert ph.Regime.of(regime) is regime
     assert ph.Regime.of(regime, phase=0.5) == ph.Regime.of(hammer, period=1e-3, phase=0.5)
     assert regime.at_firings == ph.Regime.of(hammer, rate=1000.0)
-    with pytest.raises(ph.InputError, match="a regime is given, expected no rate or overlap beside it"):
+    with refused("regime"):
         ph.Regime.of(regime, rate=1000.0, overlap="replace")
 
 
@@ -58,7 +59,7 @@ def test_verbs_take_a_regime_and_make_it_of_the_short_form(hammer: ph.Hammer) ->
     assert len({train.fano for train in intervals}) == 1
     assert ph.zero_one(regime).k == ph.zero_one(hammer, **short).k
     assert ph.recurrence(regime).rate > 0.0
-    with pytest.raises(ph.InputError, match="points are given, expected no rate beside them"):
+    with refused("points"):
         ph.zero_one(points[0], rate=1e3)
 
 
@@ -76,7 +77,7 @@ def test_a_waveform_of_its_own(hammer: ph.Hammer) -> None:
     regime = Regime.of(hammer, period=1e-3, waveform=HalfSine(amplitude=1.0, width=3e-4))
     assert regime.with_("waveform.width", 2e-4).fired == HalfSine(amplitude=1.0, width=2e-4)
     assert "waveform.rise" not in regime.names
-    with pytest.raises(ph.InputError, match=r"'waveform\.rise' is not known"):
+    with refused("constant"):
         regime.value("waveform.rise")
 
 
@@ -87,7 +88,7 @@ def test_an_endless_force(hammer: ph.Hammer) -> None:
     assert regime.with_("period", 0.01).drive == ph.SineForce(1.0, 100.0)
     assert regime.with_("drive.amplitude", 2.0).drive == ph.SineForce(2.0, 50.0)
     assert regime.with_("drive.phase", 0.5).value("drive.phase") == 0.5
-    with pytest.raises(ph.InputError, match=r"'waveform\.amplitude' is not known"):
+    with refused("constant"):
         regime.with_("waveform.amplitude", 1.0)
 
 
@@ -119,33 +120,31 @@ def test_with_replace_only_one_pulse_counts(hammer: ph.Hammer) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({}, "period and rate"),
-        ({"period": 1e-3, "rate": 1e3}, "period and rate"),
+        ({}, "period"),
+        ({"period": 1e-3, "rate": 1e3}, "period"),
         ({"period": -1e-3}, "period"),
         ({"rate": "0 Hz"}, "rate"),
         ({"period": 1e-3, "overlap": "mix"}, "overlap"),
-        ({"period": 1e-3, "drive": ph.SineForce(1.0, 1.0)}, "drive is given"),
+        ({"period": 1e-3, "drive": ph.SineForce(1.0, 1.0)}, "drive"),
     ],
 )
-def test_bad_input(hammer: ph.Hammer, options: dict, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input(hammer: ph.Hammer, options: dict, key: str) -> None:
+    with refused(key):
         Regime.of(hammer, **options)
 
 
 def test_more_bad_input(hammer: ph.Hammer) -> None:
     regime = Regime.of(hammer, period=1e-3)
-    with pytest.raises(
-        ph.InputError, match=r"'backstop\.dampingg' is not known, expected 'backstop\.damping'"
-    ):
+    with refused("constant"):
         regime.with_("backstop.dampingg", 1.0)
-    with pytest.raises(ph.InputError, match=r"mass"):
+    with refused("mass"):
         regime.with_("mass", -1.0)
-    with pytest.raises(ph.InputError, match="period"):
+    with refused("period"):
         regime.with_("period", 0.0)
-    with pytest.raises(ph.InputError, match="waveform to fire"):
+    with refused("waveform"):
         Regime.of(ph.Hammer.build("1 g"), period=1e-3)
     train = ph.PulseTrain(hammer.waveform, period=1e-3, pulses=9)
-    with pytest.raises(ph.InputError, match="endless force"):
+    with refused("drive"):
         Regime.of(hammer, drive=train)

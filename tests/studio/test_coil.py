@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
-from printhammer.errors import InputError
 from printhammer.hammer.hammer import load
 from printhammer.studio.frames import unframe
 from printhammer.studio.pictures.chart import FULL, map_frame
@@ -62,15 +62,15 @@ def test_a_winding_gets_warm() -> None:
 
 
 @pytest.mark.parametrize(
-    ("hammer", "key", "value", "reason"),
+    ("hammer", "key", "value", "wrong_key"),
     [
-        ("relay-5v", "coil.temperature", 500.0, "coil.temperature = 500 degC, expected -40 to 180"),
-        ("hendriks-1983", "coil.resistance", 1e4, "coil.resistance = 10000 ohm, expected 2.86 to 286"),
-        ("bouncing-ball", "coil.temperature", 30.0, "coil.temperature is not known"),
+        ("relay-5v", "coil.temperature", 500.0, "coil.temperature"),
+        ("hendriks-1983", "coil.resistance", 1e4, "coil.resistance"),
+        ("bouncing-ball", "coil.temperature", 30.0, "constants.coil.temperature"),
     ],
 )
-def test_open_constants_have_a_range(hammer: str, key: str, value: float, reason: str) -> None:
-    with pytest.raises(InputError, match=reason):
+def test_open_constants_have_a_range(hammer: str, key: str, value: float, wrong_key: str) -> None:
+    with refused(wrong_key):
         _ = of(hammer, constants={key: value}).changed
 
 

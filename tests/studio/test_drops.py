@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 from tests.hammers import CRUDE
 
 from printhammer.errors import InputError
@@ -85,39 +86,39 @@ def test_a_long_curve_is_thinned_and_keeps_its_ends() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"),
+    ("text", "key"),
     [
-        ("", "the file is empty"),
-        ("time [us],colour [m]\nred,blue", "expected columns of numbers"),
-        ("time [us],current [A]\n0,1\n0,2", "increasing times"),
-        ("time [us],current [A]\n0,1\n1,x", "row 3 is expected to hold finite numbers"),
-        ("time [us],current [A]\n0,1\n1,nan", "row 3"),
-        ("time [us],current [A]\n0,1\n1", "row 3 has 1 cells, expected 2"),
-        ("time [us],current [s]\n0,1\n1,2", "unit 's' is a time"),
-        ('time [us],current [A]\n0,"1\n1,2', "comma-separated"),
-        ("time [us],current [A],current [A]\n0,1,1\n1,2,2", "2 columns of current, expected one"),
-        ("time [s],current [A]\n0,1\n1,2", "a current of 1 s, expected at most 0.5 s"),
-        ("time [us],current [kA]\n0,1\n1,2", "a current of 2000 A, expected at most 100 A"),
-        (",".join("1" * 17), "17 columns, expected at most 16"),
+        ("", "heading"),
+        ("time [us],colour [m]\nred,blue", "heading"),
+        ("time [us],current [A]\n0,1\n0,2", "time"),
+        ("time [us],current [A]\n0,1\n1,x", "a.csv: row 3"),
+        ("time [us],current [A]\n0,1\n1,nan", "a.csv: row 3"),
+        ("time [us],current [A]\n0,1\n1", "row 3"),
+        ("time [us],current [s]\n0,1\n1,2", "current"),
+        ('time [us],current [A]\n0,"1\n1,2', "line 3"),
+        ("time [us],current [A],current [A]\n0,1,1\n1,2,2", "current"),
+        ("time [s],current [A]\n0,1\n1,2", "current"),
+        ("time [us],current [kA]\n0,1\n1,2", "current"),
+        (",".join("1" * 17), "columns"),
     ],
 )
-def test_what_is_no_curve_is_refused_in_one_sentence(text: str, reason: str) -> None:
-    with pytest.raises(InputError, match=rf"^a\.csv: .*{reason}"):
+def test_what_is_no_curve_is_refused_in_one_sentence(text: str, key: str) -> None:
+    with refused(key):
         read_record(text, "a.csv")
 
 
 @pytest.mark.parametrize(
-    ("told", "reason"),
+    ("told", "key"),
     [
-        ([("time", "us")], "2 columns, expected as many answers"),
-        ([("", ""), ("current", "A")], "expected a column of time"),
-        ([("time", "us"), ("", "")], "expected a column of time"),
-        ([("time", "us"), ("current", "")], "unit"),
-        ([("time", "us"), ("current", "V")], "unit 'V' is a voltage"),
+        ([("time", "us")], "columns"),
+        ([("", ""), ("current", "A")], "time"),
+        ([("time", "us"), ("", "")], "time"),
+        ([("time", "us"), ("current", "")], "b"),
+        ([("time", "us"), ("current", "V")], "b"),
     ],
 )
-def test_an_answer_that_is_none_is_refused(told: list[tuple[str, str]], reason: str) -> None:
-    with pytest.raises(InputError, match=rf"^a\.csv: .*{reason}"):
+def test_an_answer_that_is_none_is_refused(told: list[tuple[str, str]], key: str) -> None:
+    with refused(key):
         read_record("a,b\n0,1\n1,2\n", "a.csv", told)
 
 

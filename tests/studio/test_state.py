@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 from tests.hammers import CRUDE
 from tests.studio.server import STATE
 
-from printhammer.errors import InputError
 from printhammer.hammer.hammer import load
 from printhammer.studio import bounds
 from printhammer.studio.states.shelf import Shelf
@@ -99,47 +99,47 @@ def test_a_set_waveform_is_fired() -> None:
 
 
 @pytest.mark.parametrize(
-    ("constants", "reason"),
+    ("constants", "key"),
     [
-        ({"pack.colour": 1.0}, "pack.colour is not known"),
-        ({"waveform.width": 1e-4}, "waveform.width is not known"),
-        ({"backstop.stiffness": 1e30}, "backstop.stiffness = 1e[+]30"),
-        ({"mass": -1.0}, "mass = -1 kg"),
+        ({"pack.colour": 1.0}, "constants.pack.colour"),
+        ({"waveform.width": 1e-4}, "constants.waveform.width"),
+        ({"backstop.stiffness": 1e30}, "backstop.stiffness"),
+        ({"mass": -1.0}, "mass"),
     ],
 )
-def test_constants_stay_near_those_of_the_hammer(constants: dict[str, float], reason: str) -> None:
-    with pytest.raises(InputError, match=reason):
+def test_constants_stay_near_those_of_the_hammer(constants: dict[str, float], key: str) -> None:
+    with refused(key):
         _ = state(constants=constants).changed
 
 
 def test_a_hammer_is_offered_by_name_and_never_read_from_a_path() -> None:
     assert Shelf().hammer(NAME).name == NAME
     for name in (str(CRUDE), "../hammers/" + NAME, "", NAME + ".toml"):
-        with pytest.raises(InputError, match="expected one of"):
+        with refused("hammer"):
             Shelf().hammer(name)
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"),
+    ("text", "key"),
     [
-        ("x = [", "expected a TOML file"),
+        ("x = [", None),
         ("name = 'a'", "format"),
         (
             'name = "a"\n[waveform]\nshape = "sampled"\nfile = "/etc/passwd"\n',
-            r"waveform\.file names another",
+            "waveform.file",
         ),
         (
             'format = 1\nname = "a"\n[magnet]\nlaw = "table"\nfile = "t.csv"\n',
-            r"magnet\.file names another file",
+            "magnet.file",
         ),
         # These would take minutes to read.
-        ("a." * 150_000 + "b = 1", "without keys of more than 200 dots"),
-        ("x = {" + "a." * 150_000 + "b = 1}", "without keys of more than 200 dots"),
-        ("[" + "a." * 150_000 + "b]", "without keys of more than 200 dots"),
+        ("a." * 150_000 + "b = 1", "dots"),
+        ("x = {" + "a." * 150_000 + "b = 1}", "dots"),
+        ("[" + "a." * 150_000 + "b]", "dots"),
     ],
 )
-def test_a_dropped_file_is_a_hammer_that_names_no_other_file(text: str, reason: str) -> None:
-    with pytest.raises(InputError, match=reason):
+def test_a_dropped_file_is_a_hammer_that_names_no_other_file(text: str, key: str | None) -> None:
+    with refused(key):
         dropped_hammer(text)
 
 

@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, model_validator
 
 from printhammer.errors import InputError
-from printhammer.support.constants import expected, folder_of, options, quantities, quantity, sentence, shown
+from printhammer.support.constants import expected, folder_of, invalid, options, quantities, quantity, shown
 
 
 class Sample(BaseModel):
@@ -31,9 +31,8 @@ class Sample(BaseModel):
 def told(context: object = None, **fields: object) -> str:
     with pytest.raises(ValidationError) as caught:
         Sample.model_validate(fields, strict=True, context=context)
-    return sentence(
-        caught.value, Sample, "sample.", {"length": "3 in"} if fields.get("length") == -3.0 else None
-    )
+    written = {"length": "3 in"} if fields.get("length") == -3.0 else None
+    return str(invalid(caught.value, Sample, "sample.", written))
 
 
 def test_quantities_and_options_are_told_apart() -> None:

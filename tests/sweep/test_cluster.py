@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.results.store import open_store
@@ -161,7 +162,7 @@ def test_an_address_where_no_scheduler_answers(
 
 @pytest.mark.parametrize("address", ["nonsense://here", "tcp://127.0.0.1:port"])
 def test_an_address_that_is_none(address: str, spec_file: Callable[..., Path], tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match="no dask scheduler answers there"):
+    with refused("dask"):
         ph.sweep(spec_file(), tmp_path / "out.zarr", dask=address)
     assert not (tmp_path / "out.zarr").exists()
 

@@ -8,8 +8,8 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from tests.errors import refused
 
-import printhammer as ph
 from printhammer.sweep.plan import make_plan
 from printhammer.sweep.spec import read_spec
 from printhammer.sweep.tables import schema
@@ -41,94 +41,94 @@ def axes(*tables: dict[str, Any], **changes: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("spec", "told"),
+    ("spec", "key"),
     [
-        (changed(format=2), r"format = 2: expected 1"),
-        (changed(hammer=None), r"hammer is missing, expected name of a shipped hammer"),
-        (changed(hammer="no-such.toml"), r"no-such.toml: there is no such file"),
-        (changed(colour="red"), r"the key colour is not known, expected one of format"),
-        (changed(tolerance=2.0), r"tolerance = 2.0: expected less than or equal to 0.00001"),
-        (changed(duration="3"), r"duration: '3' has no unit, expected a time"),
-        (changed(duration=0.003), r"duration = 0.003 has no unit"),
-        (changed(duration="-3 ms"), r"duration = -0.003 s: expected more than 0 s"),
-        (changed(chunk=0), r"chunk = 0: expected greater than or equal to 1"),
-        (changed(members=3), r"members is given, a grid is expected to have none"),
-        (changed(axis=[]), r"axis = \[\]"),
-        (changed(outputs={}), r"outputs: nothing is asked for"),
-        (changed(outputs={"dots": ["stuck"]}), r"outputs.dots: 'stuck' is not known, expected 'struck'"),
-        (changed(outputs={"dots": ["struck", "struck"]}), r"expected different names"),
-        (changed(outputs={"final": 1}), r"outputs.final = 1: expected true or false"),
-        (changed(outputs={"speed": True}), r"the key outputs.speed is not known, expected one of dots"),
+        (changed(format=2), "format"),
+        (changed(hammer=None), "hammer"),
+        (changed(hammer="no-such.toml"), None),
+        (changed(colour="red"), "colour"),
+        (changed(tolerance=2.0), "tolerance"),
+        (changed(duration="3"), "duration"),
+        (changed(duration=0.003), "duration"),
+        (changed(duration="-3 ms"), "duration"),
+        (changed(chunk=0), "chunk"),
+        (changed(members=3), "members"),
+        (changed(axis=[]), "axis"),
+        (changed(outputs={}), "outputs"),
+        (changed(outputs={"dots": ["stuck"]}), "outputs.dots"),
+        (changed(outputs={"dots": ["struck", "struck"]}), "outputs.dots"),
+        (changed(outputs={"final": 1}), "outputs.final"),
+        (changed(outputs={"speed": True}), "outputs.speed"),
         (
             changed(outputs={"displacement": {"end": "1 ms", "count": 1}}),
-            r"outputs.displacement: expected at least 2 times",
+            "outputs.displacement",
         ),
-        (changed(drive={}), r"drive: expected exactly one of the tables"),
-        (changed(drive={"burst": {}}), r"burst.pulses is missing"),
-        (changed(drive={"train": {"pulses": 2, "rat": 1}}), r"train.rat = 1 is not known"),
+        (changed(drive={}), "drive"),
+        (changed(drive={"burst": {}}), "burst.pulses"),
+        (changed(drive={"train": {"pulses": 2, "rat": 1}}), "train.rat"),
         (
             changed(drive={"train": {"pulses": 2, "rate": "1 kHz"}}),
-            r"drive.train.rate is given beside the axis",
+            "drive.train.rate",
         ),
-        (changed(drive="none.toml"), r"none.toml: the drive file cannot be read"),
-        (changed(constants={"pack.stifness": "1 N"}), r"constants: 'pack.stifness' names no constant"),
-        (axes({"key": "pack.stifness", "values": ["1 N"]}), r"expected 'pack.stiffness'"),
-        (axes({"key": "drive.rat", "values": ["1 Hz"]}), r"axis\[0\].key = 'drive.rat' names no constant"),
-        (axes({"key": "drive.at.1", "values": ["1 ms"]}), r"the axis 'drive.at.1' names no firing"),
+        (changed(drive="none.toml"), "drive"),
+        (changed(constants={"pack.stifness": "1 N"}), "constants"),
+        (axes({"key": "pack.stifness", "values": ["1 N"]}), "axis[0].key"),
+        (axes({"key": "drive.rat", "values": ["1 Hz"]}), "axis[0].key"),
+        (axes({"key": "drive.at.1", "values": ["1 ms"]}), "drive.at.1"),
         (
             changed(drive=SEQUENCE, axis=[{"key": "waveform.width", "values": ["1 ms"]}]),
-            r"the axis 'waveform.width' changes what \[drive.sequence\] does not fire",
+            "waveform.width",
         ),
         (
             changed(drive=SEQUENCE, axis=[{"key": "waveforms.b.width", "values": ["1 ms"]}]),
-            r"names no constant of .* or its drive, expected 'waveforms.a.amplitude'",
+            "axis[0].key",
         ),
         (
             changed(drive=SEQUENCE, axis=[{"key": "waveforms.a.amplitude", "values": ["1 N"]}]),
-            r"is a force, expected a current",
+            "axis[0] (waveforms.a.amplitude).values[0]",
         ),
-        (axes({"key": "mass"}), r"axis\[0\] \(mass\).low is missing, expected values, or low, high"),
-        (axes({"key": "mass", "values": []}), r"values = \[\]: expected a list of quantities, at least one"),
-        (axes({"key": "mass", "values": [1.0]}), r"values\[0\] = 1.0 has no unit, expected a mass \(kg\)"),
-        (axes({"key": "mass", "values": ["1 mm"]}), r"is a length, expected a mass"),
-        (axes({"key": "mass", "values": ["0 g"]}), r"0.0 kg is out of bounds, expected more than 0 kg"),
-        (axes({"key": "mass", "values": ["1 g", "0.001 kg"]}), r"expected different values"),
-        (axes({"key": "mass", "values": ["1 g"], "count": 2}), r"expected no range beside them"),
-        (axes({**RANGE, "high": "3 g", "count": 3}), r"the range from 0.003 to 0.003 kg is empty"),
-        (axes({**RANGE, "count": 0}), r"axis\[0\].count = 0: expected greater than or equal to 1"),
-        (axes({**RANGE, "count": 1}), r"count = 1: expected at least 2 values of a range"),
-        (axes({**RANGE, "count": 2, "steps": 1}), r"the key axis\[0\].steps is not known"),
+        (axes({"key": "mass"}), "axis[0] (mass).low"),
+        (axes({"key": "mass", "values": []}), "axis[0] (mass).values"),
+        (axes({"key": "mass", "values": [1.0]}), "axis[0] (mass).values[0]"),
+        (axes({"key": "mass", "values": ["1 mm"]}), "axis[0] (mass).values[0]"),
+        (axes({"key": "mass", "values": ["0 g"]}), "axis[0] (mass)"),
+        (axes({"key": "mass", "values": ["1 g", "0.001 kg"]}), "axis[0] (mass).values"),
+        (axes({"key": "mass", "values": ["1 g"], "count": 2}), "axis[0] (mass)"),
+        (axes({**RANGE, "high": "3 g", "count": 3}), "axis[0] (mass)"),
+        (axes({**RANGE, "count": 0}), "axis[0].count"),
+        (axes({**RANGE, "count": 1}), "axis[0] (mass).count"),
+        (axes({**RANGE, "count": 2, "steps": 1}), "axis[0].steps"),
         (
             axes({"key": "state.x", "low": "0 m", "high": "1 m", "count": 2, "spacing": "geometric"}),
-            r"a geometric range is expected to lie above 0 m",
+            "axis[0] (state.x)",
         ),
-        (axes({**RANGE, "count": 2}, {**RANGE, "count": 3}), r"axis\[1\].key = 'mass': expected another key"),
-        (axes({**RANGE, "count": 2}, constants={"mass": "1 g"}), r"'mass' is replaced by an axis"),
-        (axes(RANGE, design="latin-hypercube", members=5), r"seed is missing"),
-        (axes({**RANGE, "count": 2}, **LATIN), r"expected to have members instead"),
-        (axes({"key": "mass", "values": ["1 g"]}, **LATIN), r"expected to have low and high"),
+        (axes({**RANGE, "count": 2}, {**RANGE, "count": 3}), "axis[1].key"),
+        (axes({**RANGE, "count": 2}, constants={"mass": "1 g"}), "constants"),
+        (axes(RANGE, design="latin-hypercube", members=5), "seed"),
+        (axes({**RANGE, "count": 2}, **LATIN), "axis[0] (mass).count"),
+        (axes({"key": "mass", "values": ["1 g"]}, **LATIN), "axis[0] (mass)"),
         (
             changed(
                 axis=[{"key": "drive.pulses", "low": 2, "high": 9}],
                 drive={"train": {"rate": "1 kHz"}},
                 **LATIN,
             ),
-            r"a count cannot be drawn",
+            "axis[0] (drive.pulses)",
         ),
         (
             changed(axis=[{"key": "drive.pulses", "values": [1.5]}], drive={"train": {"rate": "1 kHz"}}),
-            r"expected whole numbers",
+            "axis[0] (drive.pulses)",
         ),
         (
             changed(
                 axis=[{"key": "drive.frequency", "values": ["300 Hz"]}], drive={"sine": {"amplitude": "1 N"}}
             ),
-            r"duration is missing, and the drive does not end",
+            "duration",
         ),
     ],
 )
-def test_a_fault_is_told_in_one_sentence(spec: dict[str, Any], told: str) -> None:
-    with pytest.raises(ph.InputError, match=told) as caught:
+def test_a_fault_is_told_in_one_sentence(spec: dict[str, Any], key: str | None) -> None:
+    with refused(key) as caught:
         make_plan(read_spec(spec))
     assert str(caught.value).startswith("spec: ")
     assert "\n" not in str(caught.value)
@@ -136,15 +136,15 @@ def test_a_fault_is_told_in_one_sentence(spec: dict[str, Any], told: str) -> Non
 
 def test_a_fault_names_the_file(tmp_path: Path) -> None:
     path = tmp_path / "spec.toml"
-    for text, told in (
-        ("format = ", "expected TOML"),
-        ("format = 1\n", "hammer is missing"),
-        (None, "cannot be read"),
+    for text, key in (
+        ("format = ", None),
+        ("format = 1\n", "hammer"),
+        (None, None),
     ):
         path.unlink(missing_ok=True)
         if text is not None:
             path.write_text(text, "utf-8")
-        with pytest.raises(ph.InputError, match=told) as caught:
+        with refused(key) as caught:
             read_spec(path)
         assert str(caught.value).startswith(f"{path}: ")
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from tests.errors import refused
 from tests.hammers import CRUDE
 
 import printhammer as ph
@@ -277,8 +278,8 @@ def test_tables_that_change_meanwhile_are_told(
     before = make_plan(read_spec(spec))
     run_chunk(before.spec.base, before.spec.outputs, before.rows([0]))
     (tmp_path / "pulse.csv").write_text("time [us],current [A]\n0,0\n100,1.3\n400,0\n", "utf-8")
-    with pytest.raises(ph.InputError, match="a table that it names has changed since the sweep began"):
+    with refused("table"):
         run_chunk(before.spec.base, before.spec.outputs, before.rows([0]))
     Store(tmp_path / "out.zarr", before.layout(), "now").close()
-    with pytest.raises(ph.InputError, match="the store was made with hammer fingerprint"):
+    with refused("hammer_fingerprint"):
         ph.sweep(spec, tmp_path / "out.zarr")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.strobe_maps import strobe_map
 from tests.truth.damped_impacts import Array, DampedImpacts, newton
 
@@ -16,7 +17,6 @@ import printhammer as ph
 from printhammer.chaos import BifurcationCurve, Branch
 from printhammer.chaos.continuation.fixed_points import MapValue
 from printhammer.chaos.curves.systems import ImpactSystem
-from printhammer.errors import InputError
 from printhammer.run.regime import Regime
 
 CASE = DampedImpacts()
@@ -217,28 +217,28 @@ def test_a_curve_begins_anew_from_files(tmp_path: Path, doubling: BifurcationCur
 
 def test_bad_input_is_refused_in_one_sentence(tmp_path: Path) -> None:
     branch = branch_of(0.85, 0.325, (3.19, 0.34), 0.02, 10)
-    for second, bounds, options, sentence in (
+    for second, bounds, options, key in (
         (
             "rate",
             BOUNDS,
             {"event": "fold"},
-            "event = fold: the branch has none, its events are: period doubling",
+            "event",
         ),
-        ("rate", BOUNDS, {"event": 7}, "event = 7, expected the number of one of 1 events"),
-        ("rate", BOUNDS, {"event": "cusp"}, "event = 'cusp', expected a number, first, last"),
-        ("rate", BOUNDS, {"event": "first"}, "the branch does not end in a grazing there"),
-        ("drive.amplitude", (0.1, 0.2), {}, "expected another constant than that of the branch"),
-        ("rate", (0.9 / TURN, 0.99 / TURN), {}, "at the start, expected one within the bounds"),
-        ("rate", BOUNDS, {"first": (0.4, 0.5)}, "drive.amplitude = 0.324317.* at the start, expected one"),
-        ("rate", BOUNDS, {"regime": branch.regime}, "expected no regime beside it"),
+        ("rate", BOUNDS, {"event": 7}, "event"),
+        ("rate", BOUNDS, {"event": "cusp"}, "event"),
+        ("rate", BOUNDS, {"event": "first"}, "event"),
+        ("drive.amplitude", (0.1, 0.2), {}, "second"),
+        ("rate", (0.9 / TURN, 0.99 / TURN), {}, "rate"),
+        ("rate", BOUNDS, {"first": (0.4, 0.5)}, "drive.amplitude"),
+        ("rate", BOUNDS, {"regime": branch.regime}, "regime"),
     ):
-        with pytest.raises(InputError, match=sentence):
+        with refused(key):
             ph.bifurcation_curve(branch, second, bounds, **options)  # type: ignore[arg-type]
     branch.save(tmp_path / "branch.nc")
-    with pytest.raises(InputError, match="expected a regime beside the file"):
+    with refused("regime"):
         ph.bifurcation_curve(tmp_path / "branch.nc", "rate", BOUNDS)
     other = Regime.of(oscillator().replace("mass", 1.1), drive=sine(0.85, 0.325))
-    with pytest.raises(InputError, match="hammer_fingerprint = "):
+    with refused("hammer_fingerprint"):
         ph.bifurcation_curve(tmp_path / "branch.nc", "rate", BOUNDS, regime=other)
 
 

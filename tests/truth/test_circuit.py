@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from tests.circuits import Device, Phase, Run, integrate
+from tests.errors import refused
 from tests.hammers import interpreted
 
 import printhammer as ph
@@ -336,37 +337,37 @@ class Exponentials(Waveform):
 
 
 @pytest.mark.parametrize(
-    ("coil", "waveform", "words"),
+    ("coil", "waveform", "key"),
     [
-        ({}, Rail(voltage=24.0, width=1e-3), "coil.resistance is missing"),
+        ({}, Rail(voltage=24.0, width=1e-3), "coil.resistance"),
         (
             {"resistance": "2 ohm", "inductance": "0.5 mH"},
             Rail(voltage=24.0, width=1e-3),
-            "inductance = 0.0005",
+            "coil.inductance",
         ),
         (
             {"resistance": "20 ohm", "inductance": "3 mH"},
             PeakAndHold(voltage=24.0, width=1e-3, peak_time=1e-4, hold_upper=2.0, hold_lower=1.0),
-            "hold_upper = 2 A: expected less than 1.2 A",
+            "hold_upper",
         ),
     ],
 )
 def test_a_coil_that_is_no_circuit_is_one_sentence(
-    coil: dict[str, str], waveform: Waveform, words: str
+    coil: dict[str, str], waveform: Waveform, key: str
 ) -> None:
     hammer = ph.load("hendriks-1983")
     if coil:
         hammer = hammer.replace("coil", coil)
-    with pytest.raises(ph.InputError, match=words):
+    with refused(key):
         ph.simulate(hammer, ph.PulseTrain(waveform, rate="1 kHz", pulses=1))
 
 
 def test_thresholds_in_the_wrong_order_and_negative_resistance_are_refused() -> None:
-    with pytest.raises(ph.InputError, match="below upper"):
+    with refused(None, file="chopper waveform"):
         Chopper(voltage=24.0, width=1e-3, upper=1.0, lower=1.2)
-    with pytest.raises(ph.InputError, match="expected either lower"):
+    with refused(None, file="chopper waveform"):
         Chopper(voltage=24.0, width=1e-3, upper=1.0)
-    with pytest.raises(ph.InputError, match="resistance = -1"):
+    with refused("coil.resistance"):
         ph.load("hendriks-1983").replace("coil.resistance", "-1 ohm")
-    with pytest.raises(ph.InputError, match="zener voltage"):
+    with refused(None, file="rail waveform"):
         Rail(voltage=24.0, width=1e-3, decay="zener")

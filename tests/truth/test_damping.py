@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import (
     BACKSTOPS,
     MAGNETS,
@@ -158,7 +159,7 @@ def test_lanes_take_damped_hammers_too(hammer: ph.Hammer) -> None:
 
 def test_the_schemes_of_1983_have_no_damping(hammer: ph.Hammer) -> None:
     damped = hammer.replace({"damping": {"law": "viscous", "coefficient": "0.5 N s/m"}})
-    with pytest.raises(ph.InputError, match=r"the schemes of 1983 expect a hammer without \[damping\]"):
+    with refused("damping"):
         ph.simulate(damped, ph.PulseTrain(hammer.waveform), scheme="trapezoid")
 
 
@@ -169,7 +170,7 @@ def test_a_file_says_it_with_a_unit(hammer: ph.Hammer) -> None:
     assert again.fingerprint != hammer.fingerprint
     assert again.damping == ViscousDamping(coefficient=0.5)
     assert "drag" not in ph.simulate(hammer, ph.PulseTrain(hammer.waveform)).force
-    with pytest.raises(ph.InputError, match=r"damping\.coefficient = -1\.0 N s/m: expected .*0"):
+    with refused("damping.coefficient"):
         hammer.replace({"damping": {"law": "viscous", "coefficient": "-1.0 N s/m"}})
 
 

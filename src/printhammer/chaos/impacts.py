@@ -195,7 +195,10 @@ def _counts(
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
     if not 1 <= limit <= room:
         raise InputError(
-            f"firings = {limit} after a transient of {skipped}, expected at most {MOST_PULSES - 1} together"
+            f"firings = {limit} after a transient of {skipped}",
+            key="firings",
+            value=limit,
+            expected=f"at most {MOST_PULSES - 1} together",
         )
     return wanted, skipped, limit
 
@@ -203,9 +206,13 @@ def _counts(
 def _section(train: Train, surface: Surface, counts: tuple[int, int, int], tolerance: float) -> Section:
     wanted, skipped, limit = counts
     if surface not in SURFACES:
-        raise InputError(f"surface = {surface!r}, expected {' or '.join(SURFACES)}")
+        raise InputError.of("surface", surface, " or ".join(SURFACES))
     if getattr(train.hammer, surface) is None:
-        raise InputError(f"surface = {surface!r}: the hammer {train.hammer.name!r} has no {surface}")
+        raise InputError(
+            f"surface = {surface!r}: the hammer {train.hammer.name!r} has no {surface}",
+            key="surface",
+            value=surface,
+        )
     state = initial_state(train.hammer, train.state)
     problem = Problem(train.hammer, train.drive, state, 0.0, tolerance)
     firing = np.arange(1, skipped + limit + 2)
@@ -362,7 +369,7 @@ def impact_train(
     if isinstance(touches, Regime | Hammer):
         touches = section(touches, **firing)
     elif firing:
-        raise InputError(f"times are given, expected no {' or '.join(firing)} beside them")
+        raise InputError("times are given", key="times", expected=f"no {' or '.join(firing)} beside them")
     source = touches if isinstance(touches, Section) else None
     times = _times(touches.t if isinstance(touches, Section) else touches, source)
     intervals = np.diff(times)
@@ -427,7 +434,9 @@ def _times(touches: npt.ArrayLike, source: Section | None) -> FloatArray:
     times = read_array(touches, "touches", "times, s")
     if times.ndim != 1 or times.size <= _FEWEST:
         why = f" ({source.remark})" if source is not None and source.remark else ""
-        raise InputError(f"touches: {times.size} times, expected at least {_FEWEST + 1}{why}")
+        raise InputError(
+            f"touches: {times.size} times", key="touches", expected=f"at least {_FEWEST + 1}{why}"
+        )
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise InputError("touches: expected finite, ascending times, s")
+        raise InputError("touches: expected finite, ascending times, s", key="touches")
     return times

@@ -141,7 +141,7 @@ def choice(choices: str, what: str, **more: Any) -> Any:
 
     def read(written: str, name: str) -> str:
         if written not in words:
-            raise InputError(f"{name} = {written!r}, expected {' or '.join(words)}")
+            raise InputError.of(name, written, " or ".join(words))
         return written
 
     return Option(what, choices, read=read, **more)
@@ -189,12 +189,18 @@ def rates_between(what: str, most: int) -> Any:
         parts = [part.strip() for part in written.split(",")]
         if len(parts) != 3:
             example = "'1.2 kHz, 1.4 kHz, 41'"
-            raise InputError(f"{name} {written!r}: expected two rates and a number, such as {example}")
+            raise InputError(
+                f"{name} {written!r}: expected two rates and a number, such as {example}",
+                key=name,
+                value=written,
+            )
         low, high = (read_positive(part, "Hz", name) for part in parts[:2])
         count = read_whole(parts[2], name)
         if not low < high or not 2 <= count <= most:
             raise InputError(
-                f"{name} {written!r}: expected the lower rate first, and a number from 2 to {most}"
+                f"{name} {written!r}: expected the lower rate first, and a number from 2 to {most}",
+                key=name,
+                value=written,
             )
         return [float(rate) for rate in np.linspace(low, high, count)]
 
@@ -216,7 +222,7 @@ def read_whole(written: str, name: str) -> int:
     try:
         return int(written)
     except ValueError:
-        raise InputError(f"{name} = {written!r}: expected a whole number") from None
+        raise InputError.of(name, written, "a whole number", said=": expected") from None
 
 
 def read_plain(written: str, name: str) -> float:
@@ -225,7 +231,7 @@ def read_plain(written: str, name: str) -> float:
         return float(written)
     except ValueError:
         point = " with a decimal point" if "," in written else ""
-        raise InputError(f"{name} = {written!r}: expected a number{point}") from None
+        raise InputError.of(name, written, f"a number{point}", said=": expected") from None
 
 
 def read_share(written: str, name: str) -> float:
@@ -238,7 +244,11 @@ def read_span(written: str, name: str) -> tuple[str, str, int]:
     """Read two ends with their units and a number of values, such as '0 um, 100 um, 64'; else InputError."""
     parts = [part.strip() for part in written.split(",")]
     if len(parts) != 3:
-        raise InputError(f"{name} {written!r}: expected two ends and a number, such as '30 um, 90 um, 128'")
+        raise InputError(
+            f"{name} {written!r}: expected two ends and a number, such as '30 um, 90 um, 128'",
+            key=name,
+            value=written,
+        )
     return parts[0], parts[1], read_whole(parts[2], name)
 
 
@@ -252,7 +262,9 @@ def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float
         return []
     low, high = (read_number(end, si, name) for end in span[:2])
     if not low <= high or span[2] < 1:
-        raise InputError(f"{name} {', '.join(map(str, span))!r}: expected the lower end first, and 1 or more")
+        raise InputError(
+            f"{name} {', '.join(map(str, span))!r}: expected the lower end first, and 1 or more", key=name
+        )
     return [float(value) for value in np.linspace(low, high, span[2])]
 
 
@@ -264,14 +276,14 @@ def given(**options: Any) -> dict[str, Any]:
 def need_one(options: Mapping[str, object], example: str) -> None:
     """Make sure that one of `period` and `rate` is given, and one only; else InputError."""
     if (options.get("period") is None) == (options.get("rate") is None):
-        raise InputError(f"--period and --rate: expected one of them, such as {example}")
+        raise InputError(f"--period and --rate: expected one of them, such as {example}", key="--period")
 
 
 def refuse(options: Mapping[str, object], expected: str) -> None:
     """Make sure that none of some options is given; else InputError, which tells what is expected."""
     for name, value in options.items():
         if value is not None:
-            raise InputError(f"--{name} is given, expected {expected}")
+            raise InputError(f"--{name} is given", key=f"--{name}", expected=expected)
 
 
 _TRAIN: Final = "Train (one of --period and --rate)"

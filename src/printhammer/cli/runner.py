@@ -150,7 +150,9 @@ class Job:
         """Make sure, before any work, that no file is there yet, unless with --force; else InputError."""
         for path in paths:
             if not self.force and (path.exists() or path.is_symlink()):
-                raise InputError(f"{path}: expected a new file, this one is there; --force writes over it")
+                raise InputError(
+                    f"{path}: expected a new file, this one is there; --force writes over it", file=path
+                )
 
     def counting(self, name: str, *, remaining: bool = True) -> AbstractContextManager[terminal.Counted]:
         """Show a bar during work that is counted, and note its time; see `progress.counting`."""
@@ -312,7 +314,12 @@ def load_hammer(name: str, *, fired: bool) -> Hammer:
     for warning in hammer.warnings():
         warn(f"{hammer.path}: {warning}")
     if fired and hammer.waveform is None:
-        raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
+        raise InputError(
+            f"{hammer.path}: the hammer has no [waveform] to fire",
+            file=hammer.path,
+            key="waveform",
+            expected="one",
+        )
     return hammer
 
 
@@ -333,7 +340,11 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
     """Make sure that names end as what can be written there, if any end is named; else InputError."""
     for path in paths:
         if endings and path.suffix.lower() not in endings:
-            raise InputError(f"{option} {path}: expected a name that ends in one of {', '.join(endings)}")
+            raise InputError(
+                f"{option} {path}: expected a name that ends in one of {', '.join(endings)}",
+                key=option,
+                value=path,
+            )
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
@@ -358,7 +369,10 @@ def firing_of(
     if file is None:
         if hammer.waveform is None:
             raise InputError(
-                f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE"
+                f"{hammer.path}: the hammer has no [waveform] to fire",
+                file=hammer.path,
+                key="waveform",
+                expected="one, or --drive FILE",
             )
         if timed:
             opt.need_one(train, f"{example}, or --drive FILE")
@@ -374,6 +388,8 @@ def firing_of(
         return {"drive": drive}
     if not isinstance(drive, PulseTrain) or drive.period is None:
         raise InputError(
-            f"{file}: expected a force without end, [sine], or pulses at a constant rate, [train]"
+            f"{file}: expected a force without end, [sine], or pulses at a constant rate, [train]",
+            file=file,
+            key="drive",
         )
     return {"waveform": drive.waveform, "period": drive.period, "overlap": drive.overlap}

@@ -114,9 +114,8 @@ def _warm(hammer: Hammer, value: float) -> Hammer:
 
 def _check_driver(hammer: Hammer, axis: str) -> None:
     if not hasattr(hammer.waveform, "voltage"):
-        raise InputError(
-            f"{hammer.path}: axis = {axis!r}, expected a hammer whose [waveform] is a driver on a rail,"
-            " such as 'rail'"
+        raise InputError.of(
+            "axis", axis, "a hammer whose [waveform] is a driver on a rail, such as 'rail'", file=hammer.path
         )
 
 
@@ -149,7 +148,11 @@ class AxisTables:
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
-            raise InputError(f"{self.axis} = {asked:g}: the tables are made for {least:g} to {most:g}")
+            raise InputError(
+                f"{self.axis} = {asked:g}: the tables are made for {least:g} to {most:g}",
+                key=self.axis,
+                value=asked,
+            )
         after = int(np.clip(np.searchsorted(self.values, asked), 1, len(self.values) - 1))
         first, second = self.tables[after - 1 : after + 1]
         share = (asked - self.values[after - 1]) / (self.values[after] - self.values[after - 1])
@@ -179,7 +182,10 @@ class AxisTables:
         size = self.size(tick)
         if budget is not None and size > budget:
             raise InputError(
-                f"budget = {budget} bytes: the tables take {size}, expected a larger budget or fewer"
+                f"budget = {budget} bytes: the tables take {size}",
+                key="budget",
+                value=budget,
+                expected="a larger budget or fewer",
             )
         scale = NANOSECOND if AXES[self.axis].unit == "m" else _MILLIONTH
         head = {name: getattr(first, name) for name in HEAD}
@@ -274,16 +280,16 @@ def tune_along(
         The axis is not known, the values do not ascend, or as for `printhammer.tune`.
     """
     if axis not in AXES:
-        raise InputError(f"axis = {axis!r}, expected one of {', '.join(AXES)}")
+        raise InputError.of("axis", axis, f"one of {', '.join(AXES)}")
     places = tuple(read_number(value, AXES[axis].unit, axis) for value in values)
     if len(places) < 2 or any(second <= first for first, second in pairwise(places)):
-        raise InputError(f"{axis} = {list(values)!r}, expected two values or more that ascend")
+        raise InputError.of(axis, list(values), "two values or more that ascend")
     largest = read_positive(largest_current, "A", "largest_current")
     design = driven_by(hammer, driver, largest)
     known, own = nominal(design, tolerance=DISPLAY_TOLERANCE), nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     fired = []
     for place in places:
-        with located(f"{axis} = {place:g} {AXES[axis].unit}"):
+        with located(f"{axis} = {place:g} {AXES[axis].unit}", key=axis):
             other = AXES[axis].change(design, place)
             pulse: Any = other.waveform
             fired.append(of_force(other, pulse, known.force, 0.5 * pulse.width, 1.5 * pulse.width))

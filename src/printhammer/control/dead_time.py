@@ -257,13 +257,19 @@ def dead_time(
     waveform = hammer.waveform
     own: Any = waveform
     if waveform is None or not hasattr(waveform, "voltage"):
-        raise InputError(f"{hammer.path}: expected a [waveform] that is a driver on a rail, such as 'rail'")
+        raise InputError(
+            f"{hammer.path}: expected a [waveform] that is a driver on a rail, such as 'rail'",
+            file=hammer.path,
+            key="waveform",
+        )
     rails = np.unique([read_positive(each, "V", "voltage") for each in voltage])
     warm = np.unique([read_temperature(each, "temperature") for each in temperature])
     rails = rails if rails.size else own.voltage * np.array([0.9, 1.0, 1.1])
     warm = warm if warm.size else np.array([20.0, 60.0, 100.0])
     if rails.size * warm.size > MOST:
-        raise InputError(f"{rails.size} rails and {warm.size} temperatures, expected at most {MOST} pairs")
+        raise InputError(
+            f"{rails.size} rails and {warm.size} temperatures", key="rails", expected=f"at most {MOST} pairs"
+        )
     reference, reach = _reference(hammer, waveform, tolerance)
     wanted = reference.speed if blow is None else read_positive(blow, "m/s", "blow")
     shape = rails.size, warm.size
@@ -307,7 +313,11 @@ def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_F
         if fired.speed > 0.0:
             return fired, LONGEST * fired.time
         span *= 2.0
-    raise InputError(f"{hammer.path}: expected a hammer whose own pulse reaches what it strikes")
+    raise InputError(
+        f"{hammer.path}: expected a hammer whose own pulse reaches what it strikes",
+        file=hammer.path,
+        key="waveform",
+    )
 
 
 def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fired:

@@ -76,7 +76,7 @@ class DotHeat:
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
     """Return the heat of one dot from that at 20 degC, J, and the quantity that its driver keeps constant."""
     if feed not in FEEDS:
-        raise InputError(f"feed = {feed!r}, expected one of {', '.join(FEEDS)}")
+        raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
 
 
@@ -90,7 +90,7 @@ def read_temperature(value: float | str, name: str) -> float:
     """
     temperature = read_number(value, "degC", name)
     if not temperature > COLDEST:
-        raise InputError(f"{name} = {value!r} is expected to be more than {COLDEST:.4g} degC")
+        raise InputError.of(name, value, f"more than {COLDEST:.4g} degC", said=" is expected to be")
     return temperature
 
 
@@ -224,9 +224,15 @@ def thermal_duty(
     one_dot = heat if isinstance(heat, DotHeat) else dot_heat(heat, feed)
     if (body_resistance is None) != (body_capacity is None):
         missing = "body_capacity" if body_capacity is None else "body_resistance"
-        raise InputError(f"{missing} is missing, expected body_resistance and body_capacity, or neither")
+        raise InputError(
+            f"{missing} is missing", key=missing, expected="body_resistance and body_capacity, or neither"
+        )
     if body_capacity is not None and thermal_capacity is None:
-        raise InputError("thermal_capacity is missing, expected that of the winding beside body_capacity")
+        raise InputError(
+            "thermal_capacity is missing",
+            key="thermal_capacity",
+            expected="that of the winding beside body_capacity",
+        )
     coil = ThermalCoil(
         read_positive(thermal_resistance, "K/W", "thermal_resistance"),
         None if thermal_capacity is None else read_positive(thermal_capacity, "J/K", "thermal_capacity"),
@@ -236,7 +242,7 @@ def thermal_duty(
     largest = read_temperature(limit, "limit")
     ambients = np.array([read_temperature(each, "ambient") for each in ambient])
     if not ambients.size:
-        raise InputError("ambient is empty, expected one temperature or more")
+        raise InputError("ambient is empty", key="ambient", expected="one temperature or more")
     at_limit = one_dot.at(largest)
     rate = np.maximum(largest - ambients, 0.0) / (at_limit * coil.whole)
     bursts = np.array([_rate(each) for each in burst or [rate.max()] if each != 0.0])
@@ -310,7 +316,7 @@ def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate
 def _rate(value: float | str) -> float:
     rate = read_number(value, "Hz", "burst")
     if rate <= 0.0:
-        raise InputError(f"burst = {value!r} is expected to be greater than 0 Hz")
+        raise InputError.of("burst", value, "greater than 0 Hz", said=" is expected to be")
     return rate
 
 
@@ -337,10 +343,17 @@ def heat_of(hammer: Hammer) -> DotHeat:
 
     waveform: Any = hammer.waveform
     if hammer.coil_resistance is None:
-        raise InputError(f"{hammer.path}: coil.resistance is missing, expected it for the heat of a dot")
+        raise InputError(
+            f"{hammer.path}: coil.resistance is missing",
+            file=hammer.path,
+            key="coil.resistance",
+            expected="it for the heat of a dot",
+        )
     if waveform is None or waveform.quantity == "force":
         raise InputError(
-            f"{hammer.path}: expected a [waveform] of a voltage or a current for the heat of a dot"
+            f"{hammer.path}: expected a [waveform] of a voltage or a current for the heat of a dot",
+            file=hammer.path,
+            key="waveform",
         )
     drive = PulseTrain(waveform, at=[0.0])
     if waveform.quantity == "current":
@@ -361,5 +374,8 @@ def _copper_loss(hammer: Hammer, drive: PulseTrain) -> float:
             return motion.energy.copper_loss
         span *= 2.0
     raise InputError(
-        f"{hammer.path}: the current lasts for ever, expected one that ends for the heat of a dot"
+        f"{hammer.path}: the current lasts for ever",
+        file=hammer.path,
+        key="waveform",
+        expected="one that ends for the heat of a dot",
     )

@@ -80,11 +80,18 @@ class ImpactEstimator:
         self.hammer, self.pulse = hammer, pulse_of(hammer, pulse)
         if self.pulse.quantity != "voltage":
             raise InputError(
-                f"{hammer.path}: the waveform is a {self.pulse.quantity}, expected the voltage of a driver"
-                " on a coil, whose current and voltage an impact changes"
+                f"{hammer.path}: the waveform is a {self.pulse.quantity}",
+                file=hammer.path,
+                key="waveform",
+                expected="the voltage of a driver on a coil, whose current and voltage an impact changes",
             )
         if hammer.front is None:
-            raise InputError(f"{hammer.path}: the hammer has no pack, expected one that it strikes")
+            raise InputError(
+                f"{hammer.path}: the hammer has no pack",
+                file=hammer.path,
+                key="pack",
+                expected="one that it strikes",
+            )
         self.step = 1.0 / sampling.sampling_rate
         self.flight, self.contact = self._dot()
         parts = min(BEFORE * self.contact, _MOST_BEFORE * self.flight), AFTER * self.contact
@@ -92,14 +99,21 @@ class ImpactEstimator:
         self._before, self._size = before, before + after + 1
         if self._size < _LEAST:
             raise InputError(
-                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self._size} samples fall on the contact of"
-                f" {1e6 * self.contact:.3g} us, expected {_LEAST} at least"
+                (
+                    f"sampling_rate = {sampling.sampling_rate:g} Hz: {self._size} samples fall on the"
+                    f" contact of {1e6 * self.contact:.3g} us"
+                ),
+                key="sampling_rate",
+                value=sampling.sampling_rate,
+                expected=f"{_LEAST} at least",
             )
         self.count = math.ceil((1.0 + REACH) * self.flight / self.step) + after + 2
         if self.count > _MOST:
             raise InputError(
-                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self.count} samples a dot, expected at most"
-                f" {_MOST}"
+                f"sampling_rate = {sampling.sampling_rate:g} Hz: {self.count} samples a dot",
+                key="sampling_rate",
+                value=sampling.sampling_rate,
+                expected=f"at most {_MOST}",
             )
         fine = np.asarray(self.step / PHASES * np.arange(PHASES * self.count), np.float64)
         run = simulate(hammer, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
@@ -184,7 +198,12 @@ class ImpactEstimator:
             if dot.flight_time is not None and dot.contact_time is not None:
                 return float(dot.flight_time), float(dot.contact_time)
             span *= 2.0
-        raise InputError(f"{self.hammer.path}: a single pulse makes no dot, expected a hammer that prints")
+        raise InputError(
+            f"{self.hammer.path}: a single pulse makes no dot",
+            file=self.hammer.path,
+            key="waveform",
+            expected="a hammer that prints",
+        )
 
     def _without_pack(self, sampling: Sampling, fine: FloatArray) -> FloatArray:
         """Return the signal where the pack does nothing, A or V; where that run ends early, its last."""
@@ -200,19 +219,39 @@ class ImpactEstimator:
             return
         if sampling.signal == "voltage" and not self.clearness > 0.0:
             raise InputError(
-                f"{self.hammer.path}: the voltage shows no impact, since the supply or a diode holds it, or"
-                " the magnet is not permanent, expected signal = 'current'"
+                (
+                    f"{self.hammer.path}: the voltage shows no impact, since the supply or a diode holds"
+                    " it, or the magnet is not permanent"
+                ),
+                file=self.hammer.path,
+                key="signal",
+                expected="signal = 'current'",
             )
         if sampling.signal == "current" and abs(now) < _FLOWING * largest:
             raise InputError(
-                f"{self.hammer.path}: the current shows no impact, since {1e3 * now:.3g} mA of"
-                f" {1e3 * largest:.3g} mA are left of it by then, expected a pulse that lasts until the"
-                " impact, a slower decay, or signal = 'voltage' if the magnet is permanent"
+                (
+                    f"{self.hammer.path}: the current shows no impact, since {1e3 * now:.3g} mA of"
+                    f" {1e3 * largest:.3g}"
+                    " mA are left of it by then"
+                ),
+                file=self.hammer.path,
+                key="signal",
+                expected=(
+                    "a pulse that lasts until the impact, a slower decay, or signal = 'voltage' if the"
+                    " magnet is permanent"
+                ),
             )
         raise InputError(
-            f"{self.hammer.path}: the impact changes the {sampling.signal} by {self.clearness:.2g} standard"
-            f" deviations, expected less noise than {sampling.noise:g} {sampling.unit}, more bits than"
-            f" {sampling.bits}, or faster sampling"
+            (
+                f"{self.hammer.path}: the impact changes the {sampling.signal} by {self.clearness:.2g}"
+                " standard deviations"
+            ),
+            file=self.hammer.path,
+            key="signal",
+            expected=(
+                f"less noise than {sampling.noise:g} {sampling.unit}, more bits than {sampling.bits},"
+                " or faster sampling"
+            ),
         )
 
 
@@ -246,15 +285,17 @@ class Sampling(Declared):
 
     def __post_init__(self) -> None:
         if self.signal not in SIGNALS:
-            raise InputError(f"signal = {self.signal!r}, expected {' or '.join(SIGNALS)}")
+            raise InputError.of("signal", self.signal, " or ".join(SIGNALS))
         if not 0.0 <= self.noise < math.inf:
-            raise InputError(f"noise = {self.noise!r} is expected to be a number not below 0")
+            raise InputError.of("noise", self.noise, "a number not below 0", said=" is expected to be")
         if not 0.0 < self.sampling_rate < math.inf:
-            raise InputError(f"sampling_rate = {self.sampling_rate!r} is expected to be a number above 0")
+            raise InputError.of(
+                "sampling_rate", self.sampling_rate, "a number above 0", said=" is expected to be"
+            )
         if type(self.bits) is not int or not 1 <= self.bits <= _MOST_BITS:
-            raise InputError(f"bits = {self.bits!r}, expected a whole number from 1 to {_MOST_BITS}")
+            raise InputError.of("bits", self.bits, f"a whole number from 1 to {_MOST_BITS}")
         if self.full_scale is not None and not 0.0 < self.full_scale < math.inf:
-            raise InputError(f"full_scale = {self.full_scale!r} is expected to be a number above 0")
+            raise InputError.of("full_scale", self.full_scale, "a number above 0", said=" is expected to be")
 
     @property
     def unit(self) -> str:

@@ -92,10 +92,12 @@ class ImpactTime(Result, rows=_CELLS):
         same for every dot of a unit, is its offset.
         """
         if self.bias.size != 1:
-            raise InputError(f"{self.bias.size} ways to sample were studied, expected one for a sensor")
+            raise InputError(
+                f"{self.bias.size} ways to sample were studied", key="index", expected="one for a sensor"
+            )
         noise, units = float(self.deviation[0, 0, 0]), float(self.unit_deviation[0, 0, 0])
         if not np.isfinite(noise + units):
-            raise InputError("no impact was seen in the samples, expected less noise for a sensor")
+            raise InputError("no impact was seen in the samples", expected="less noise for a sensor")
         # The mean over units is known at the design, and is taken off.
         offset = float(np.sqrt(max(units**2 - noise**2, 0.0)))
         missed = min(float(self.unit_missed[0, 0, 0]), _MOST_MISSED)
@@ -166,8 +168,10 @@ def impact_time(
     span = None if full_scale is None else read_positive(full_scale, UNITS.get(signal, "A"), "full_scale")
     if not 2 <= many <= _MOST_DOTS or not 2 <= others <= many:
         raise InputError(
-            f"dots = {many} and units = {others}, expected 2 to {_MOST_DOTS} dots, and from 2"
-            " units to as many"
+            f"dots = {many} and units = {others}",
+            key="dots",
+            value=many,
+            expected=f"2 to {_MOST_DOTS} dots, and from 2 units to as many",
         )
     if not levels.size:
         scale = 10.0 if volts else _largest_current(hammer)
@@ -175,7 +179,7 @@ def impact_time(
     shape = levels.size, rates.size, widths.size
     total = int(np.prod(shape))
     if not 0 < total <= MOST:
-        raise InputError(f"{total} ways to sample are asked for, expected 1 to {MOST}")
+        raise InputError(f"{total} ways to sample are asked for", key="sampling", expected=f"1 to {MOST}")
     spread = Variability.of(hammer) if variability is None else variability
     drawn = spread.draw(hammer, others, first)
     rng = np.random.default_rng((first, 1))

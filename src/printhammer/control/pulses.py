@@ -39,8 +39,10 @@ def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
         if faded.any():
             return float(times[int(np.argmax(faded))] - own.width)
     raise InputError(
-        f"{hammer.path}: the current lasts {_SPAN * 2.0**_DOUBLINGS:g} times the width of the pulse, expected"
-        " a driver whose current decays sooner"
+        (f"{hammer.path}: the current lasts {_SPAN * 2.0**_DOUBLINGS:g} times the width of the pulse"),
+        file=hammer.path,
+        key="waveform",
+        expected="a driver whose current decays sooner",
     )
 
 

@@ -90,12 +90,15 @@ def thermal_limit(
     rails = np.array([read_number(each, "V", "voltage") for each in voltage or [0.0] * len(cold)])
     if not cold.size == rates.size == rails.size:
         raise InputError(
-            f"{cold.size} ambient temperatures, {rates.size} rates and {rails.size} voltages, expected as"
-            " many of each"
+            f"{cold.size} ambient temperatures, {rates.size} rates and {rails.size} voltages",
+            key="rates",
+            expected="as many of each",
         )
     _kinds, group = np.unique(rails, return_inverse=True)
     if not any(np.unique(cold[group == each]).size > 1 for each in group):
-        raise InputError("expected rates at two ambient temperatures or more of one rail at least")
+        raise InputError(
+            "expected rates at two ambient temperatures or more of one rail at least", key="rates"
+        )
 
     def centred(values: FloatArray) -> FloatArray:
         sums = np.bincount(group, values)
@@ -111,7 +114,7 @@ def thermal_limit(
     hottest = float(cold.max())
     low, high = hottest + 1e-6 * (hottest - COLDEST), hottest + _HIGHEST
     if not slope(low) > 0.0 > slope(high):
-        raise InputError("the rates are expected to fall as the ambient temperature rises")
+        raise InputError("the rates are expected to fall as the ambient temperature rises", key="rates")
     limit = bisect(slope, low, high)
     residuals = off(limit)
     spare = cold.size - np.unique(group).size - 1

@@ -151,7 +151,7 @@ def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
     """Return the period or rate of an even train, its first firing staying where it is, or of a sine."""
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
-        raise InputError(f"constant = {name!r}, expected a drive with a single period and several firings")
+        raise InputError.of("constant", name, "a drive with a single period and several firings")
     value, sign = (period, 1.0) if name == PERIOD else (1.0 / period, -1.0)
     firings, pieces = np.zeros(count), np.zeros(drive.kernel_arrays()[2].shape)
     waveform = drive.waveform
@@ -193,7 +193,11 @@ def _table_change(made: Callable[[float], Waveform], value: float, scale: float,
     def table(moved: float) -> FloatArray:
         segments = made(moved).segments()
         if len(segments) != len(kinds) or (segments[:, 1] != kinds).any():
-            raise InputError(f"constant = {name!r}: the waveform has other segments beside {value!r}")
+            raise InputError(
+                f"constant = {name!r}: the waveform has other segments beside {value!r}",
+                key="constant",
+                value=name,
+            )
         return segments
 
     return _difference(table, value, scale, name)
@@ -213,7 +217,9 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
         change = np.asarray(change) / (12.0 * _SPACING)
         return np.where(np.isfinite(change), change, 0.0)
     raise InputError(
-        f"constant = {name!r} has the value {value!r}, at which nothing is differentiable with it"
+        f"constant = {name!r} has the value {value!r}, at which nothing is differentiable with it",
+        key="constant",
+        value=name,
     )
 
 

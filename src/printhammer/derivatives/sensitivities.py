@@ -150,9 +150,11 @@ class Sensitivities(Result):
             place = self.constants.index(name)
             shares[place] = read_number(number, "1", f"spreads: {name}")
             if shares[place] < 0.0:
-                raise InputError(f"spreads: {name} = {number!r}, expected a relative spread, 0 or more")
+                raise InputError.of(name, number, "a relative spread, 0 or more", file="spreads")
             if self.values[place] == 0.0:
-                raise InputError(f"spreads: {name} is zero, expected a constant with a relative spread")
+                raise InputError(
+                    f"spreads: {name} is zero", key="spreads", expected="a constant with a relative spread"
+                )
         return Spread(
             sensitivities=self,
             spreads=shares,

@@ -192,7 +192,12 @@ def problem_between(
 ) -> Problem:
     """Return the run of a map from `start` to `end`, s, its arguments checked as `tangent_map` says."""
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
-        raise InputError(f"start = {start!r} s and end = {end!r} s, expected ascending times, not negative")
+        raise InputError(
+            f"start = {start!r} s and end = {end!r} s",
+            key="start",
+            value=start,
+            expected="ascending times, not negative",
+        )
     return _problem(hammer, drive, state, tolerance)
 
 
@@ -308,20 +313,29 @@ def _strobes(
 ) -> tuple[Drive, FloatArray, float]:
     """Return the drive, the times of the firings 1 to `last`, and the time between them."""
     if not 1 <= first < last:
-        raise InputError(f"first = {first!r} and last = {last!r}, expected numbers of firings, ascending")
+        raise InputError(
+            f"first = {first!r} and last = {last!r}",
+            key="first",
+            value=first,
+            expected="numbers of firings, ascending",
+        )
     drive = waveform_or_drive
     if not isinstance(drive, Drive):
         if period is None:
-            raise InputError("period is missing, expected the time between the firings of the waveform")
+            raise InputError(
+                "period is missing", key="period", expected="the time between the firings of the waveform"
+            )
         drive = PulseTrain(drive, period=period, pulses=last)
     spacing = drive.period if period is None else period
     if spacing is None or not (math.isfinite(spacing) and spacing > 0.0):
-        raise InputError(f"period = {spacing!r} s, expected a positive number")
+        raise InputError.of("period", spacing, "a positive number", unit="s")
     times = np.array(drive.times, dtype=np.float64)
     if times.size == 1:
         times = times[0] + spacing * np.arange(last)
     if times.size < last:
-        raise InputError(f"last = {last}, expected at most {times.size}, the number of firings of the drive")
+        raise InputError.of(
+            "last", last, f"at most {times.size}, the number of firings of the drive", written=str(last)
+        )
     return drive, times[:last], float(spacing)
 
 

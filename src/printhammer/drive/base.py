@@ -34,9 +34,11 @@ class Drive:
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap = "add", period: float | None = None
     ) -> None:
         if not isinstance(waveform, Waveform):
-            raise InputError(f"waveform = {waveform!r} is expected to be a waveform, the drive has none")
+            raise InputError.of(
+                "waveform", waveform, "a waveform, the drive has none", said=" is expected to be"
+            )
         if overlap not in OVERLAPS:
-            raise InputError(f"overlap = {overlap!r} is expected to be 'add' or 'replace'")
+            raise InputError.of("overlap", overlap, "'add' or 'replace'", said=" is expected to be")
         self._waveform = waveform
         self._overlap: Overlap = "replace" if waveform.replaces else overlap
         self._period = period

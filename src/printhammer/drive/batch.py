@@ -195,7 +195,7 @@ class PulseTrains(Sequence[PulseTrain]):
     def _check(self) -> None:
         """Refuse times that are no firing times, with the sentence that a single train has for them."""
         if not len(self):
-            raise InputError("no train is given, expected at least one")
+            raise InputError("no train is given", key="train", expected="at least one")
         times, starts = self._firings.values, self._firings.starts
         counts = self._firings.counts
         with np.errstate(invalid="ignore"):

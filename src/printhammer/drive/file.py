@@ -49,7 +49,7 @@ from printhammer.drive.trains import Burst, Drive, PulseTrain, SineForce
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, Waveform
 from printhammer.drive.waveforms.shapes import SHAPES, Chain, Sampled, Switched
 from printhammer.errors import InputError, located
-from printhammer.support.constants import options, quantities, sentence, shown
+from printhammer.support.constants import invalid, options, quantities, shown
 from printhammer.support.files import read_text
 
 _PLAIN: Final = {"pulses", "bursts", "waveforms"}
@@ -91,7 +91,7 @@ def read_drive(
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         # tomllib raises a bare ValueError for a number of thousands of digits.
-        raise InputError(f"{name}: expected TOML ({' '.join(str(error).split())})") from None
+        raise InputError(f"{name}: expected TOML ({' '.join(str(error).split())})", file=name) from None
     return drive_of(data, waveform, name=name, folder=folder)
 
 
@@ -112,32 +112,40 @@ def save_drive(drive: Drive, path: str | Path) -> None:
     try:
         Path(path).write_text(drive.to_toml(), encoding="utf-8")
     except OSError as error:
-        raise InputError(f"{path}: the drive file cannot be written ({error.strerror})") from None
+        raise InputError(
+            f"{path}: the drive file cannot be written ({error.strerror})", file=path, key="drive"
+        ) from None
 
 
 def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Drive:
     _known(data, {"format", "overlap", "waveform", "waveforms", *_KEYS}, "")
     if data.get("format") != FORMAT or isinstance(data["format"], (bool, float)):
-        raise InputError(f"format = {shown(data.get('format'))} is expected to be {FORMAT}")
+        raise InputError.of(
+            "format", data.get("format"), FORMAT, written=shown(data.get("format")), said=" is expected to be"
+        )
     kinds = [kind for kind in _KEYS if kind in data]
     if len(kinds) != 1:
         several = " and ".join(f"[{kind}]" for kind in kinds) or "none"
         raise InputError(
-            f"{several} given, expected one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}"
+            f"{several} given",
+            key="drive",
+            expected=f"one of the tables {', '.join(f'[{kind}]' for kind in _KEYS)}",
         )
     kind = kinds[0]
     arguments = _arguments(_table(data[kind], kind), kind)
     for key, others in (("waveform", ("sine", "sequence")), ("waveforms", set(_KEYS) - {"sequence"})):
         if key in data and kind in others:
-            raise InputError(f"{key} is expected to be left out beside [{kind}]")
+            raise InputError(f"{key} is expected to be left out beside [{kind}]", key=key)
     if kind == "sine":
         if data.get("overlap", "add") != "add":
-            raise InputError("overlap is expected to be left out beside [sine]")
+            raise InputError("overlap is expected to be left out beside [sine]", key="overlap")
         _required(arguments, ("amplitude", "frequency"), kind)
         return _named(kind, SineForce, arguments)
     overlap = data.get("overlap", "add")
     if overlap not in ("add", "replace"):
-        raise InputError(f"overlap = {shown(overlap)} is expected to be 'add' or 'replace'")
+        raise InputError.of(
+            "overlap", overlap, "'add' or 'replace'", written=shown(overlap), said=" is expected to be"
+        )
     if kind == "sequence":
         _required(arguments, ("at", "waveforms"), kind)
         waveforms = _waveforms(arguments.pop("waveforms"), data, folder)
@@ -145,7 +153,7 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
     if kind == "times":
         _required(arguments, ("at",), kind)
     elif "rate" not in arguments and "period" not in arguments:
-        raise InputError(f"{kind}.rate is missing, expected a rate or a period")
+        raise InputError(f"{kind}.rate is missing", key=f"{kind}.rate", expected="a rate or a period")
     elif kind == "burst":
         _required(arguments, ("pulses",), kind)
     if "waveform" in data:
@@ -153,18 +161,18 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
     else:
         waveform = standard
     if waveform is None:
-        raise InputError("[waveform] is missing, and there is no hammer with a waveform")
+        raise InputError("[waveform] is missing, and there is no hammer with a waveform", key="[waveform]")
     return _named(kind, _MAKERS[kind], {"waveform": waveform, "overlap": overlap, **arguments})
 
 
 def _named(kind: str, maker: Callable[..., Drive], arguments: Mapping[str, Any]) -> Drive:
-    with located(kind):
+    with located(kind, key=kind):
         return maker(**arguments)
 
 
 def _table(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(f"{name} = {shown(value)} is expected to be a table")
+        raise InputError.of(name, value, "a table", written=shown(value), said=" is expected to be")
     return value
 
 
@@ -174,13 +182,18 @@ def _known(table: Mapping[str, Any], keys: set[str], name: str) -> None:
             where = f"{name}.{key}" if name else key
             where = where if where.isprintable() else shown(where)
             known = ", ".join(sorted(keys))
-            raise InputError(f"{where} = {shown(table[key])} is not known, expected one of {known}")
+            raise InputError(
+                f"{where} = {shown(table[key])} is not known",
+                key=where,
+                value=table[key],
+                expected=f"one of {known}",
+            )
 
 
 def _required(table: Mapping[str, Any], keys: tuple[str, ...], name: str) -> None:
     for key in keys:
         if key not in table:
-            raise InputError(f"{name}.{key} is missing")
+            raise InputError(f"{name}.{key} is missing", key=f"{name}.{key}")
 
 
 def _arguments(table: dict[str, Any], kind: str) -> dict[str, Any]:
@@ -203,20 +216,31 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
     from printhammer.units import split, to_si
 
     if isinstance(value, str):
-        with located(where):
+        with located(where, key=where):
             number, unit = split(value, units[0])
     elif isinstance(value, dict):
         _known(value, {"value", "unit"}, where)
         _required(value, ("value", "unit"), where)
         number, unit = value["value"], value["unit"]
         if not isinstance(unit, str):
-            raise InputError(f"{where}.unit = {shown(unit)} is expected to be a unit, such as {units[0]!r}")
+            raise InputError.of(
+                f"{where}.unit",
+                unit,
+                f"a unit, such as {units[0]!r}",
+                written=shown(unit),
+                said=" is expected to be",
+            )
     else:
-        raise InputError(f"{where} = {shown(value)} has no unit, expected a string such as '1 {units[0]}'")
+        raise InputError(
+            f"{where} = {shown(value)} has no unit",
+            key=where,
+            value=value,
+            expected=f"a string such as '1 {units[0]}'",
+        )
     for si in units[1:]:
         with suppress(InputError):
             return to_si(number, unit, si), si
-    with located(where):
+    with located(where, key=where):
         return to_si(number, unit, units[0]), units[0]
 
 
@@ -225,12 +249,16 @@ def _column(value: Any, si: str, where: str) -> list[float]:
     if isinstance(value, list):
         return [_quantity(entry, (si,), where)[0] for entry in value]
     if not isinstance(value, dict):
-        raise InputError(f"{where} = {shown(value)} is expected to be a list, or values with a unit")
+        raise InputError.of(
+            where, value, "a list, or values with a unit", written=shown(value), said=" is expected to be"
+        )
     _known(value, {"values", "unit"}, where)
     _required(value, ("values", "unit"), where)
     values, unit = value["values"], value["unit"]
     if not isinstance(values, list):
-        raise InputError(f"{where}.values = {shown(values)} is expected to be a list of numbers")
+        raise InputError.of(
+            f"{where}.values", values, "a list of numbers", written=shown(values), said=" is expected to be"
+        )
     return [_quantity({"value": entry, "unit": unit}, (si,), where)[0] for entry in values]
 
 
@@ -238,7 +266,9 @@ def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]
     """Return the waveforms of a sequence, which name the tables of a file."""
     tables = _table(data.get("waveforms", {}), "waveforms")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError(f"sequence.waveforms = {shown(names)} is expected to be a list of names")
+        raise InputError.of(
+            "sequence.waveforms", names, "a list of names", written=shown(names), said=" is expected to be"
+        )
     made = {
         name: _waveform(_table(table, f"waveforms.{name}"), folder, f"waveforms.{name}")
         for name, table in tables.items()
@@ -250,7 +280,9 @@ def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]
                 or "a table [waveforms.NAME] for each name"
             )
             raise InputError(
-                f"sequence.waveforms: {shown(name)} is no waveform of the file, expected {known}"
+                f"sequence.waveforms: {shown(name)} is no waveform of the file",
+                key="sequence.waveforms",
+                expected=known,
             )
     return [made[name] for name in names]
 
@@ -259,7 +291,13 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     shape = table.get("shape")
     known: dict[str, type[Waveform]] = {**SHAPES, Chain.shape: Chain, Switched.shape: Switched}
     if not isinstance(shape, str) or shape not in known:
-        raise InputError(f"{where}.shape = {shown(shape)} is expected to be one of {', '.join(known)}")
+        raise InputError.of(
+            f"{where}.shape",
+            shape,
+            f"one of {', '.join(known)}",
+            written=shown(shape),
+            said=" is expected to be",
+        )
     model = known[shape]
     data = {key: value for key, value in table.items() if key != "shape"}
     if model is Chain:
@@ -281,7 +319,7 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
     try:
         return model.model_validate(fields, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(sentence(error, model, f"{where}.")) from None
+        raise invalid(error, model, f"{where}.") from None
 
 
 def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
@@ -289,7 +327,13 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
     _known(data, {"parts"}, where)
     _required(data, ("parts",), where)
     if not isinstance(data["parts"], list) or not data["parts"]:
-        raise InputError(f"{where}.parts = {shown(data['parts'])} is expected to be a list of waveforms")
+        raise InputError.of(
+            f"{where}.parts",
+            data["parts"],
+            "a list of waveforms",
+            written=shown(data["parts"]),
+            said=" is expected to be",
+        )
     parts = []
     for number, entry in enumerate(data["parts"]):
         own = f"{where}.parts[{number}]"
@@ -299,7 +343,9 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
     try:
         return Chain(parts=parts)
     except InputError as error:
-        raise InputError(f"{where}.{error}") from None
+        fault = InputError(f"{where}.{error}", key=f"{where}.{error.key}", value=error.value)
+        fault.expected = error.expected
+        raise fault from None
 
 
 def _switched(data: dict[str, Any], where: str) -> Switched:
@@ -327,8 +373,10 @@ def _switched(data: dict[str, Any], where: str) -> Switched:
     try:
         return Switched.model_validate(fields)
     except ValidationError as error:
-        fault = sentence(error, Switched, f"{where}.")
-        raise InputError(fault if fault.startswith(where) else f"{where}.{fault}") from None
+        fault = invalid(error, Switched, f"{where}.")
+        if str(fault).startswith(where):
+            raise fault from None
+        raise InputError(f"{where}.{fault}", key=f"{where}.{fault.key}", value=fault.value) from None
 
 
 def _samples(data: dict[str, Any], where: str) -> Waveform:
@@ -337,11 +385,17 @@ def _samples(data: dict[str, Any], where: str) -> Waveform:
     _known(data, {"interpolation", "time", *si}, where)
     driven = [name for name in si if name in data]
     if "time" not in data or len(driven) != 1:
-        raise InputError(f"{where} is expected to have a file, or time and either current or force")
+        raise InputError(
+            f"{where} is expected to have a file, or time and either current or force", key=where
+        )
     interpolation = data.get("interpolation", "pchip")
     if interpolation not in ("pchip", "linear"):
-        raise InputError(
-            f"{where}.interpolation = {shown(interpolation)} is expected to be 'pchip' or 'linear'"
+        raise InputError.of(
+            f"{where}.interpolation",
+            interpolation,
+            "'pchip' or 'linear'",
+            written=shown(interpolation),
+            said=" is expected to be",
         )
     name = driven[0]
     times = _column(data["time"], "s", f"{where}.time")

@@ -28,7 +28,7 @@ def read_number(value: float | str, si: str, name: str) -> float:
     if isinstance(value, str):
         from printhammer.units import parse
 
-        with located(name):
+        with located(name, key=name):
             return parse(value, si)
     try:
         number = math.nan if isinstance(value, bool) else float(value)
@@ -36,7 +36,7 @@ def read_number(value: float | str, si: str, name: str) -> float:
         number = math.nan
     if not math.isfinite(number):
         what = "a finite number" if si == "1" else f"a finite number in {si} or a string with a unit"
-        raise InputError(f"{name} = {value!r} is expected to be {what}")
+        raise InputError.of(name, value, what, said=" is expected to be")
     return number
 
 
@@ -45,7 +45,7 @@ def read_positive(value: float | str, si: str, name: str) -> float:
     number = read_number(value, si, name)
     if number <= 0.0 or not math.isfinite(1.0 / number):
         unit = "" if si == "1" else f" {si}"
-        raise InputError(f"{name} = {value!r} is expected to be greater than 0{unit}")
+        raise InputError.of(name, value, f"greater than 0{unit}", said=" is expected to be")
     return number
 
 
@@ -62,7 +62,7 @@ def read_start(value: float | str) -> float:
     """Read the time of a first firing, s; errors as for `read_number`, or it is negative."""
     number = read_number(value, "s", "start")
     if number < 0.0:
-        raise InputError(f"start = {value!r} is expected to be 0 s or later")
+        raise InputError.of("start", value, "0 s or later", said=" is expected to be")
     return number
 
 
@@ -73,7 +73,9 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
     except TypeError:
         count = least - 1
     if not least <= count <= MOST_PULSES:
-        raise InputError(f"{name} = {value!r} is expected to be a whole number from {least} to {MOST_PULSES}")
+        raise InputError.of(
+            name, value, f"a whole number from {least} to {MOST_PULSES}", said=" is expected to be"
+        )
     return count
 
 
@@ -82,7 +84,7 @@ def read_array(values: npt.ArrayLike, name: str, what: str = "numbers") -> Float
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{name} = {values!r}, expected {what}") from None
+        raise InputError.of(name, values, what) from None
 
 
 def even_times(
@@ -100,7 +102,7 @@ def even_times(
         spacing = period_of_rate(often)
         return steps * spacing, ("rate", often), spacing
     if period is None:
-        raise InputError("a train of pulses is expected to have a rate or a period")
+        raise InputError("a train of pulses is expected to have a rate or a period", key="rate")
     spacing = read_positive(period, "s", "period")
     return steps * spacing, ("period", spacing), spacing
 
@@ -114,7 +116,7 @@ def read_times(at: Iterable[float | str]) -> FloatArray:
     except TypeError:
         entries = []
     if not entries:
-        raise InputError(f"at = {at!r} is expected to be a list of firing times")
+        raise InputError.of("at", at, "a list of firing times", said=" is expected to be")
     return np.array([read_number(entry, "s", "firing time") for entry in entries], dtype=np.float64)
 
 
@@ -122,15 +124,17 @@ def checked_times(times: npt.ArrayLike) -> FloatArray:
     """Check firing times, s, and return them read-only."""
     result = np.array(times, dtype=np.float64)
     if result.ndim != 1 or not 1 <= result.size <= MOST_PULSES:
-        raise InputError(f"{result.size} firing times are expected to be a list of 1 to {MOST_PULSES}")
+        raise InputError(
+            f"{result.size} firing times are expected to be a list of 1 to {MOST_PULSES}", key="firing times"
+        )
     if not np.isfinite(result).all():
-        raise InputError(f"firing time {result[~np.isfinite(result)][0]} is expected to be finite")
+        raise InputError(f"firing time {result[~np.isfinite(result)][0]} is expected to be finite", key="at")
     if result[0] < 0.0:
-        raise InputError(f"firing time {result[0]:.9g} s is expected to be 0 s or later")
+        raise InputError(f"firing time {result[0]:.9g} s is expected to be 0 s or later", key="at")
     bad = np.flatnonzero(np.diff(result) <= 0.0)
     if len(bad):
         k = int(bad[0]) + 1
         order = f"{result[k]:.9g} s (firing {k + 1}) follows {result[k - 1]:.9g} s"
-        raise InputError(f"firing times are expected to increase strictly, but {order}")
+        raise InputError(f"firing times are expected to increase strictly, but {order}", key="firing times")
     result.flags.writeable = False
     return result

@@ -59,7 +59,8 @@ class PulseSequence(Drive):
         times = read_times(at) + read_start(start)
         if times.size != len(fired):
             raise InputError(
-                f"{times.size} firing times are expected to be as many as the waveforms, {len(fired)}"
+                f"{times.size} firing times are expected to be as many as the waveforms, {len(fired)}",
+                key="firing times",
             )
         super().__init__(fired[0], times, overlap, None)
         self._place(fired)
@@ -205,18 +206,26 @@ def _checked(waveforms: Any) -> list[Waveform]:
     except TypeError:
         fired = []
     if not fired:
-        raise InputError(f"waveforms = {waveforms!r} is expected to be a list of waveforms, one a firing")
+        raise InputError.of(
+            "waveforms", waveforms, "a list of waveforms, one a firing", said=" is expected to be"
+        )
     seen: set[int] = set()
     for number, waveform in enumerate(fired):
         if id(waveform) in seen:
             continue
         seen.add(id(waveform))
         if not isinstance(waveform, Waveform):
-            raise InputError(f"waveforms[{number}] = {waveform!r} is expected to be a waveform")
+            raise InputError.of(f"waveforms[{number}]", waveform, "a waveform", said=" is expected to be")
         if not math.isfinite(waveform.support):
-            raise InputError(f"waveforms[{number}] is a {waveform.shape}, expected a waveform that ends")
+            raise InputError(
+                f"waveforms[{number}] is a {waveform.shape}",
+                key=f"waveforms[{number}]",
+                expected="a waveform that ends",
+            )
         if waveform.quantity != fired[0].quantity:
             raise InputError(
-                f"waveforms[{number}] is a {waveform.quantity}, expected a {fired[0].quantity} like the first"
+                f"waveforms[{number}] is a {waveform.quantity}",
+                key=f"waveforms[{number}]",
+                expected=f"a {fired[0].quantity} like the first",
             )
     return fired

@@ -47,12 +47,14 @@ class _Pulsed(Drive):
     @staticmethod
     def _refuse_endless(waveform: Waveform) -> None:
         if not math.isfinite(waveform.support):
-            raise InputError(f"a {waveform.shape} waveform is expected to end in a train of pulses")
+            raise InputError(
+                f"a {waveform.shape} waveform is expected to end in a train of pulses", key="waveform"
+            )
 
     def with_waveform(self, waveform: Waveform) -> Self:
         """Return a drive that fires another waveform at the same times."""
         if not isinstance(waveform, Waveform):
-            raise InputError(f"waveform = {waveform!r} is expected to be a waveform")
+            raise InputError.of("waveform", waveform, "a waveform", said=" is expected to be")
         self._refuse_endless(waveform)
         return self._with_waveform(waveform)
 
@@ -99,19 +101,25 @@ class PulseTrain(_Pulsed):
     ) -> None:
         ways = [name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None]
         if len(ways) > 1:
-            raise InputError(f"{ways[0]} and {ways[1]} are given, expected one of rate, period and at")
+            raise InputError(
+                f"{ways[0]} and {ways[1]} are given", key=ways[1], expected="one of rate, period and at"
+            )
         first = read_start(start)
         self._spacing: tuple[str, float] | None = None
         if at is not None:
             if pulses is not None:
-                raise InputError(
-                    f"pulses = {pulses!r} is expected to be left out where the firing times are given"
+                raise InputError.of(
+                    "pulses", pulses, "left out where the firing times are given", said=" is expected to be"
                 )
             super().__init__(waveform, read_times(at) + first, overlap, None)
             return
         count = read_count((PULSES if ways else 1) if pulses is None else pulses, "pulses")
         if not ways and count > 1:
-            raise InputError(f"pulses = {count} is expected to come with a rate, a period or firing times")
+            raise InputError(
+                f"pulses = {count} is expected to come with a rate, a period or firing times",
+                key="pulses",
+                value=count,
+            )
         steps, self._spacing, spacing = even_times(rate, period, count) if ways else (np.zeros(1), None, None)
         super().__init__(waveform, first + steps, overlap, spacing)
 
@@ -166,15 +174,18 @@ class Burst(_Pulsed):
         start: float | str = 0.0,
     ) -> None:
         if (rate is None) == (period is None):
-            raise InputError("a burst is expected to have either a rate or a period")
+            raise InputError("a burst is expected to have either a rate or a period", key="rate")
         count, repeats = read_count(pulses, "pulses"), read_count(bursts, "bursts")
         if count * repeats > MOST_PULSES:
             raise InputError(
-                f"{repeats} bursts of {count} pulses are expected to be at most {MOST_PULSES} firings"
+                f"{repeats} bursts of {count} pulses are expected to be at most {MOST_PULSES} firings",
+                key="pulses",
             )
         steps, self._spacing, spacing = even_times(rate, period, count)
         if gap is None and repeats > 1:
-            raise InputError(f"bursts = {repeats} is expected to come with a gap between them")
+            raise InputError(
+                f"bursts = {repeats} is expected to come with a gap between them", key="bursts", value=repeats
+            )
         self._gap = None if gap is None else read_positive(gap, "s", "gap")
         self._counts = (count, repeats)
         begin = read_start(start) + np.arange(repeats) * (steps[-1] + (self._gap or 0.0))

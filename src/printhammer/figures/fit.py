@@ -49,7 +49,9 @@ def plot(fit: Fit) -> Figure:
     against those of a normal distribution. Outliers that were left out are ringed.
     """
     if not len(fit.data):
-        raise InputError("the constants were computed without a table, expected a fit to data to draw")
+        raise InputError(
+            "the constants were computed without a table", key="table", expected="a fit to data to draw"
+        )
     figure = new_figure(5.6, 7.6)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.35, 1.0))
     top, below = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])

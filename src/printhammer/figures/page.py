@@ -151,7 +151,7 @@ def plot(page: Page, view: View = "page") -> Figure:
     if view == "zoom":
         return _zoom_alone(page)
     if view != "page":
-        raise InputError(f"view = {view!r}, expected one of {', '.join(VIEWS)}")
+        raise InputError.of("view", view, f"one of {', '.join(VIEWS)}")
     sheet, place = whole_sheet(page), zoomed_sheet(page)
     # Side by side where the paper is upright, else one below the other.
     beside = sheet.height > _UPRIGHT * sheet.width

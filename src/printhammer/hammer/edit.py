@@ -47,9 +47,11 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         selector = SELECTORS[section]
         kind = document.get(section, {}).get(selector, UNSAID.get(section, ""))
         if kind not in kinds_of(section):
-            raise InputError(f"the key {shown(key)} is not known, the hammer has no [{section}]")
+            raise InputError(f"the key {shown(key)} is not known, the hammer has no [{section}]", key=key)
         if name == selector:
-            raise InputError(f"{key} = {shown(value)}: expected a whole table for {section!r} instead")
+            raise InputError.of(
+                key, value, f"a whole table for {section!r} instead", written=shown(value), said=": expected"
+            )
         model = model_of(section, kind)
     else:
         model = None
@@ -59,7 +61,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         tables = [name for name in SELECTORS if isinstance(document.get(name), Mapping)]
         known = [*document, *(f"{table}.{entry}" for table in tables for entry in document[table])]
         expected = nearest(key, known, "one such as 'pack.stiffness'")
-        raise InputError(f"the key {shown(key)} is not known, expected {expected}")
+        raise InputError(f"the key {shown(key)} is not known", key=key, expected=expected)
     if note is None or value is None:
         return key, value
     # A bare number is in the unit of what it replaces, where the constant may have several.
@@ -79,13 +81,15 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
     if isinstance(value, Constant):
         return {"value": value.value, "unit": value.unit, "status": value.status, "source": value.source}
     if isinstance(value, str):
-        with located(key):
+        with located(key, key=key):
             number, unit = split(value, si_unit)
     else:
         try:
             number, unit = float(value), si_unit
         except (TypeError, ValueError, OverflowError):
-            raise InputError(f"{key} = {shown(value)}: expected a number in {si_unit} or text") from None
+            raise InputError.of(
+                key, value, f"a number in {si_unit} or text", written=shown(value), said=": expected"
+            ) from None
     return {"value": number, "unit": unit, "status": status, "source": source}
 
 
@@ -95,7 +99,13 @@ def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]
     content = dict(value) if isinstance(value, Mapping) else _fields(section, value)
     if content.get(selector, UNSAID.get(section)) not in kinds_of(section):
         known = ", ".join(kinds_of(section))
-        raise InputError(f"{section}.{selector} = {shown(content.get(selector))}: expected one of {known}")
+        raise InputError.of(
+            f"{section}.{selector}",
+            content.get(selector),
+            f"one of {known}",
+            written=shown(content.get(selector)),
+            said=": expected",
+        )
     result: dict[str, Any] = {}
     if selector in content:
         result[selector] = content.pop(selector)
@@ -111,9 +121,13 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
     selector = SELECTORS[section]
     kind = getattr(type(value), selector, None)
     if kind not in kinds_of(section) or type(value) is not model_of(section, kind):
-        raise InputError(f"{section} = {shown(value)}: expected a part, a table, or None")
+        raise InputError.of(
+            section, value, "a part, a table, or None", written=shown(value), said=": expected"
+        )
     if getattr(value, "content", dict)():
-        raise InputError(f"{section}: expected a table that names its file, not one read already")
+        raise InputError(
+            f"{section}: expected a table that names its file, not one read already", key=section
+        )
     from printhammer.drive.waveforms.base import UNITS
 
     driven: QuantityName = getattr(value, "quantity", "current")

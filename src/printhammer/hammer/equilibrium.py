@@ -79,7 +79,9 @@ def rest_state(hammer: HammerLike) -> float:
             if rest is None:
                 because = f"at zero current the backstop is crushed down to {force.low:.6g} m"
                 raise InputError(
-                    f"{_named(hammer)} has no rest state: {because}, expected it to hold the armature"
+                    f"{_named(hammer)} has no rest state: {because}",
+                    key="rest, value=state",
+                    expected="it to hold the armature",
                 )
             return rest
         if pressing == 0.0 and hammer.magnet is not None:
@@ -87,14 +89,21 @@ def rest_state(hammer: HammerLike) -> float:
             return position
         if hammer.magnet is not None:
             because = f"at the backstop the net force at zero current is {pressing:.6g} N"
-            raise InputError(f"{_named(hammer)} has no rest state: {because}, expected a negative force")
+            raise InputError(
+                f"{_named(hammer)} has no rest state: {because}",
+                key="rest, value=state",
+                expected="a negative force",
+            )
     stable = [
         root.x
         for root in _roots(force, 0.0)
         if _is_stable(root, force) and (root.x <= force.front or not force.memory)
     ]
     if not stable:
-        raise InputError(f"{_named(hammer)} has no rest state: it has no stable equilibrium at zero current")
+        raise InputError(
+            f"{_named(hammer)} has no rest state: it has no stable equilibrium at zero current",
+            key="rest, value=state",
+        )
     return min(stable, key=lambda x: abs(x - hammer.origin))
 
 
@@ -124,7 +133,9 @@ def equilibria(
     smallest, largest = _currents(hammer)
     if not smallest <= current <= largest:
         bounds = f"is expected to be from {smallest:g} to {largest:g} A"
-        raise InputError(f"current = {current!r} {bounds}, where the law of the magnet holds")
+        raise InputError(
+            f"current = {current!r} {bounds}, where the law of the magnet holds", key="current", value=current
+        )
     force = StaticForce(hammer)
     resting = [_described(force, root, current) for root in _same_rest(force, current, within)]
     if force.rigid and hammer.backstop is not None:
@@ -149,7 +160,9 @@ def release_current(hammer: HammerLike) -> float:
     """
     if hammer.backstop is None or hammer.magnet is None:
         missing = "magnet" if hammer.magnet is None else "backstop"
-        raise InputError(f"{_named(hammer)} has no release current: it has no {missing}")
+        raise InputError(
+            f"{_named(hammer)} has no release current: it has no {missing}", key="release, value=current"
+        )
     force = StaticForce(hammer)
     position = hammer.backstop.position
 
@@ -167,7 +180,7 @@ def release_current(hammer: HammerLike) -> float:
             lifting += sorted(crossed, key=abs)[:1]
     if not lifting:
         because = f"none from {low:g} to {high:g} A lifts the armature"
-        raise InputError(f"{_named(hammer)} has no release current: {because}")
+        raise InputError(f"{_named(hammer)} has no release current: {because}", key="release, value=current")
     return min(lifting, key=abs)
 
 
@@ -273,7 +286,9 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
     low, high = within if within is not None else (force.low, force.high)
     low, high = max(low, force.limits[0]), min(high, force.limits[1])
     if not low < high:
-        raise InputError(f"the range {low:g} to {high:g} m is empty, expected the lower end first")
+        raise InputError(
+            f"the range {low:g} to {high:g} m is empty", key="range", expected="the lower end first"
+        )
     crossings = roots(lambda x: force.total(x, current), _grid(force, low, high))
     if within is not None:
         return crossings

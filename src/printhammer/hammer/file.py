@@ -33,10 +33,10 @@ from printhammer.support.constants import (
     STATUSES,
     Constant,
     Quantity,
+    invalid,
     options,
     quantities,
     quantity,
-    sentence,
     shown,
 )
 
@@ -89,7 +89,9 @@ def read_document(text: str, where: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         # tomllib raises a bare ValueError for a number of thousands of digits.
-        raise InputError(f"{where}: expected a TOML file ({' '.join(str(error).split())})") from None
+        raise InputError(
+            f"{where}: expected a TOML file ({' '.join(str(error).split())})", file=where
+        ) from None
 
 
 def build(
@@ -144,17 +146,19 @@ def _build(
 ) -> Contents:
     _only(document, ("format", *TEXTS, *quantities(Body), *SELECTORS, UNCERTAINTY), "")
     if "format" not in document:
-        raise InputError(f"format is missing, expected format = {FORMAT}")
+        raise InputError("format is missing", key="format", expected=f"format = {FORMAT}")
     version = document["format"]
     if not isinstance(version, int) or isinstance(version, bool) or version != FORMAT:
-        raise InputError(f"format = {shown(version)}: expected {FORMAT}")
+        raise InputError.of("format", version, FORMAT, written=shown(version), said=": expected")
     texts: dict[str, str] = {}
     for name in TEXTS:
         texts[name] = document.get(name, "")
         if not isinstance(texts[name], str):
-            raise InputError(f"{name} = {shown(texts[name])}: expected text in quotes")
+            raise InputError.of(
+                name, texts[name], "text in quotes", written=shown(texts[name]), said=": expected"
+            )
     if not texts["name"].strip():
-        raise InputError("name is missing, expected a short name of the hammer")
+        raise InputError("name is missing", key="name", expected="a short name of the hammer")
     constants: dict[str, Constant] = {}
     top = {key: document[key] for key in quantities(Body) if key in document}
     body = _read(Body, top, "", constants, folder, before, known)
@@ -163,7 +167,9 @@ def _build(
         if section in document:
             table = document[section]
             if not isinstance(table, Mapping):
-                raise InputError(f"{section} = {shown(table)}: expected a table [{section}]")
+                raise InputError.of(
+                    section, table, f"a table [{section}]", written=shown(table), said=": expected"
+                )
             keys = [f"{section}.{name}" for name in table if name != selector]
             # An option may name a file, which is read again: it may have changed.
             if known is not None and table is before.get(section) and known.constants.keys() >= set(keys):
@@ -192,9 +198,19 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
     known = kinds_of(section)
     kind = table.get(selector, UNSAID.get(section))
     if kind is None:
-        raise InputError(f"{section}.{selector} is missing, expected one of {', '.join(known)}")
+        raise InputError(
+            f"{section}.{selector} is missing",
+            key=f"{section}.{selector}",
+            expected=f"one of {', '.join(known)}",
+        )
     if not isinstance(kind, str) or kind not in known:
-        raise InputError(f"{section}.{selector} = {shown(kind)}: expected one of {', '.join(known)}")
+        raise InputError.of(
+            f"{section}.{selector}",
+            kind,
+            f"one of {', '.join(known)}",
+            written=shown(kind),
+            said=": expected",
+        )
     return kind
 
 
@@ -204,7 +220,9 @@ def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
     for key in table:
         if key not in known:
             raise InputError(
-                f"the key {shown(prefix + key, quotes=False)} is not known, expected {nearest(key, known)}"
+                f"the key {shown(prefix + key, quotes=False)} is not known",
+                key=prefix + key,
+                expected=f"{nearest(key, known)}",
             )
 
 
@@ -243,33 +261,44 @@ def _read(
     try:
         return model.model_validate(fields, strict=True, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(sentence(error, model, prefix, written)) from None
+        raise invalid(error, model, prefix, written) from None
 
 
 def _constant(key: str, written: Any, note: Quantity) -> Constant:
     from printhammer.units import describe, to_si
 
     if not isinstance(written, Mapping):
-        raise InputError(
-            f"{key} = {shown(written)}: expected {describe(note.si)} as "
-            '{ value = ..., unit = "...", status = "...", source = "..." }'
+        raise InputError.of(
+            key,
+            written,
+            f'{describe(note.si)} as {{ value = ..., unit = "...", status = "...", source = "..." }}',
+            written=shown(written),
+            said=": expected",
         )
     _only(written, CONSTANT_KEYS, f"{key}.")
     value = written.get("value")
     for name in CONSTANT_KEYS:
         if name not in written:
             what = f"the constant {key} = {shown(value)}" if name != "value" else f"the constant {key}"
-            raise InputError(f"{what} has no {name}, expected {describe(note.si)} with {_WANTED[name]}")
+            raise InputError(
+                f"{what} has no {name}", key=what, expected=f"{describe(note.si)} with {_WANTED[name]}"
+            )
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
-        raise InputError(f"{key} = {shown(value)}: expected a finite number")
+        raise InputError.of(key, value, "a finite number", written=shown(value), said=": expected")
     texts = {name: written[name] for name in CONSTANT_KEYS[1:]}
     for name, text in texts.items():
         if not isinstance(text, str) or not text.strip():
-            raise InputError(f"{key}.{name} = {shown(text)}: expected {_WANTED[name]}")
+            raise InputError.of(f"{key}.{name}", text, _WANTED[name], written=shown(text), said=": expected")
     if texts["status"] not in STATUSES:
-        raise InputError(f"{key}.status = {shown(texts['status'])}: expected one of {', '.join(STATUSES)}")
+        raise InputError.of(
+            f"{key}.status",
+            texts["status"],
+            f"one of {', '.join(STATUSES)}",
+            written=shown(texts["status"]),
+            said=": expected",
+        )
     si_unit = si_unit_of(note, texts["unit"])
-    with located(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}"):
+    with located(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}", key=key):
         si = to_si(value, texts["unit"], si_unit)
     return Constant(
         key=key, value=value, **texts, si=si, meaning=note.meaning, symbol=note.symbol, si_unit=si_unit
@@ -311,7 +340,7 @@ def _check_order(contents: Contents) -> None:
 
     for (key, place), (after, end) in pairwise([*places.items(), *ends.items()]):
         if not place < end:
-            raise InputError(f"{written(key)}: expected a position before {written(after)}")
+            raise InputError(f"{written(key)}: expected a position before {written(after)}", key=written(key))
     magnet = contents.parts.get("magnet")
     if isinstance(magnet, MagnetPart):
         low, high = magnet.domain

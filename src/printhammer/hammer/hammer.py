@@ -60,14 +60,14 @@ def load(name_or_path: str | Path) -> Hammer:
     try:
         text = path.read_bytes().decode("utf-8")
     except UnicodeDecodeError:
-        raise InputError(f"{path}: expected a TOML file in UTF-8") from None
+        raise InputError(f"{path}: expected a TOML file in UTF-8", file=path) from None
     except FileNotFoundError:
         raise InputError(
-            f"{path}: there is no such file, expected a path or {nearest(str(path), shipped())}"
+            f"{path}: there is no such file", file=path, expected=f"a path or {nearest(str(path), shipped())}"
         ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: the hammer file cannot be read ({reason})") from None
+        raise InputError(f"{path}: the hammer file cannot be read ({reason})", file=path) from None
     return Hammer.from_toml(text, name=str(path), folder=path.parent)
 
 
@@ -326,7 +326,9 @@ class Hammer:
         except OSError as error:
             with suppress(OSError):
                 draft.unlink()
-            raise InputError(f"{target}: the hammer file cannot be written ({error.strerror})") from None
+            raise InputError(
+                f"{target}: the hammer file cannot be written ({error.strerror})", file=target
+            ) from None
 
     def _tables(self, target: Path) -> dict[str, bytes]:
         """Return the files named in the hammer file that are missing beside `target`."""
@@ -339,7 +341,7 @@ class Hammer:
             if not there.exists():
                 missing[name] = data
             elif there.read_bytes() != data:
-                raise InputError(f"{there}: the file is another table than that of {self.name}")
+                raise InputError(f"{there}: the file is another table than that of {self.name}", file=there)
         return missing
 
     @cached_property

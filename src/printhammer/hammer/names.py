@@ -112,4 +112,11 @@ def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
 
 def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
     """Return the error that says that a constant is not known, with the nearest name or all of them."""
-    return InputError(f"{where or 'constant'} = {shown(name)} is not known, expected {nearest(name, known)}")
+    file, _, key = where.rpartition(": ")
+    return InputError(
+        f"{where or 'constant'} = {shown(name)} is not known",
+        file=file or None,
+        key=key or "constant",
+        value=name,
+        expected=f"{nearest(name, known)}",
+    )

@@ -80,22 +80,30 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
         dimension, or the correlations are none.
     """
     if not isinstance(table, Mapping):
-        raise InputError(f"{UNCERTAINTY} = {shown(table)}: expected a table [{UNCERTAINTY}]")
+        raise InputError.of(
+            UNCERTAINTY, table, f"a table [{UNCERTAINTY}]", written=shown(table), said=": expected"
+        )
     unknown = [name for name in table if name not in ENTRIES]
     if unknown:
         raise InputError(
-            f"the key {UNCERTAINTY}.{unknown[0]} is not known, expected one of {', '.join(ENTRIES)}"
+            f"the key {UNCERTAINTY}.{unknown[0]} is not known",
+            key=f"{UNCERTAINTY}.{unknown[0]}",
+            expected=f"one of {', '.join(ENTRIES)}",
         )
     keys, errors, records = (_texts(table, name) for name in ("constants", "standard_errors", "records"))
     for row, key in enumerate(keys):
         if key not in constants or key in keys[:row]:
             why = "the hammer has no such constant" if key not in constants else "it is there twice"
             raise InputError(
-                f"{UNCERTAINTY}.constants: {key!r}, {why}, expected each constant of the hammer at most once"
+                f"{UNCERTAINTY}.constants: {key!r}, {why}",
+                key=f"{UNCERTAINTY}.constants",
+                expected="each constant of the hammer at most once",
             )
     if len(errors) != len(keys):
         raise InputError(
-            f"{UNCERTAINTY}.standard_errors has {len(errors)} entries, expected {len(keys)}, one a constant"
+            f"{UNCERTAINTY}.standard_errors has {len(errors)} entries",
+            key=f"{UNCERTAINTY}.standard_errors",
+            expected=f"{len(keys)}, one a constant",
         )
     sizes = np.array([_error(key, text, constants[key]) for key, text in zip(keys, errors, strict=True)])
     return Uncertainty(keys, _correlation(table, len(keys)) * np.outer(sizes, sizes), records)
@@ -104,17 +112,21 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
 def _texts(table: Mapping[str, Any], name: str) -> tuple[str, ...]:
     values = table.get(name, [])
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
-        raise InputError(f"{UNCERTAINTY}.{name} = {shown(values)}: expected a list of texts")
+        raise InputError.of(
+            f"{UNCERTAINTY}.{name}", values, "a list of texts", written=shown(values), said=": expected"
+        )
     return tuple(values)
 
 
 def _error(key: str, text: str, constant: Constant) -> float:
     from printhammer.units import parse
 
-    with located(f"{UNCERTAINTY}: the standard error of {key} = {text}"):
+    with located(f"{UNCERTAINTY}: the standard error of {key} = {text}", key=UNCERTAINTY):
         size = parse(text, constant.si_unit)
     if not 0.0 < size < float("inf"):
-        raise InputError(f"{UNCERTAINTY}: the standard error of {key} is {text}, expected more than 0")
+        raise InputError(
+            f"{UNCERTAINTY}: the standard error of {key} is {text}", key=UNCERTAINTY, expected="more than 0"
+        )
     return size
 
 
@@ -124,13 +136,23 @@ def _correlation(table: Mapping[str, Any], count: int) -> FloatArray:
     rows = table.get("correlation", [])
     wanted = f"expected {max(count - 1, 0)} rows of 1, 2, ... numbers, those of a covariance"
     if not isinstance(rows, list) or len(rows) not in (0, max(count - 1, 0)):
-        raise InputError(f"{UNCERTAINTY}.correlation = {shown(rows)}: {wanted}")
+        raise InputError(
+            f"{UNCERTAINTY}.correlation = {shown(rows)}: {wanted}",
+            key=f"{UNCERTAINTY}.correlation",
+            value=rows,
+        )
     for number, row in enumerate(rows, 1):
         if not _numbers(row, number):
-            raise InputError(f"{UNCERTAINTY}.correlation, row {number} = {shown(row)}: {wanted}")
+            raise InputError(
+                f"{UNCERTAINTY}.correlation, row {number} = {shown(row)}: {wanted}",
+                key=f"{UNCERTAINTY}.correlation",
+                value=row,
+            )
         matrix[number, :number] = matrix[:number, number] = row
     if count and not np.linalg.eigvalsh(matrix)[0] > _NEGATIVE:
-        raise InputError(f"{UNCERTAINTY}.correlation is that of no covariance, {wanted}")
+        raise InputError(
+            f"{UNCERTAINTY}.correlation is that of no covariance, {wanted}", key=f"{UNCERTAINTY}.correlation"
+        )
     return matrix
 
 

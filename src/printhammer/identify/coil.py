@@ -48,7 +48,10 @@ def check_driver(hammer: Hammer) -> None:
     """Refuse a hammer whose waveform is no voltage."""
     if hammer.waveform is None or hammer.waveform.unit != "V":
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] that is a voltage, expected the driver of its coil"
+            f"{hammer.path}: the hammer has no [waveform] that is a voltage",
+            file=hammer.path,
+            key="waveform",
+            expected="the driver of its coil",
         )
 
 
@@ -73,14 +76,20 @@ def probe_current(
     each = max(1, math.ceil(float(np.diff(knots).max()) / _FINEST - 1e-9)) if tau else 1
     count = each * (len(knots) - 1)
     if count > _MOST:
-        raise InputError(f"a record of {after[-1]:.6g} s is too long for the probe, expected a shorter one")
+        raise InputError(
+            f"a record of {after[-1]:.6g} s is too long for the probe", key="record", expected="a shorter one"
+        )
     fine = np.interp(np.arange(count + 1) / each, np.arange(len(knots)), knots)
     state = None
     if locked is not None:
         hammer, state = hammer.replace("mass", _LOCKED), (locked, 0.0)
     run = simulate(hammer, PulseTrain(waveform), duration=float(fine[-1]), state=state, points=2)
     if not run.ok:
-        raise InputError(f"{hammer.path}: the current did not reach its end: {run.message}")
+        raise InputError(
+            f"{hammer.path}: the current did not reach its end: {run.message}",
+            file=hammer.path,
+            key="current",
+        )
     current = lowpass_lines(fine, run.driven_at(fine), tau)[::each]
     shown[t >= 0.0] = current[len(knots) - len(after) :]
     return shown
@@ -147,7 +156,7 @@ def fit_coil(
     """
     names = list(dict.fromkeys(FREE if free is None else free))
     if not names:
-        raise InputError("no constants to find, expected one or more, such as coil.inductance")
+        raise InputError("no constants to find", key="free", expected="one or more, such as coil.inductance")
     place = None if locked is None else read_number(locked, "m", "locked")
     traces = [_read(path, hammer, place, bandwidth) for path in paths]
     hammer, start = _start(hammer, names, traces[0])
@@ -240,11 +249,25 @@ def _read(path: str | Path, hammer: Hammer, locked: float | None, bandwidth: flo
     bad = np.flatnonzero(np.diff(t) <= 0.0)
     if len(bad):
         line, value = table.lines[bad[0] + 1], t[bad[0] + 1]
-        raise InputError(f"{table.path}: line {line}: time {value:.9g} s, expected ascending times")
+        raise InputError(
+            f"{table.path}: line {line}: time {value:.9g} s",
+            file=table.path,
+            key="time",
+            expected="ascending times",
+        )
     if not t[-1] > 0.0:
-        raise InputError(f"{table.path}: no time after 0 s, expected a record from switching on")
+        raise InputError(
+            f"{table.path}: no time after 0 s",
+            file=table.path,
+            key="time",
+            expected="a record from switching on",
+        )
     if locked is None and "locked" in table.comments:
-        locked = read_number(table.comments["locked"], "m", f"{table.path}: the comment 'locked'")
+        text = table.comments["locked"]
+        try:
+            locked = read_number(text, "m", f"{table.path}: the comment 'locked'")
+        except InputError as error:
+            raise InputError(str(error), file=table.path, key="locked", value=text) from None
     width = bandwidth_of(table) if bandwidth is None else bandwidth
     if "voltage" in table.values:
         from printhammer.drive.waveforms.sampled import Sampled
@@ -267,7 +290,12 @@ def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, Floa
     t, current = trace.table.values["time"], np.abs(trace.table.values["current"])
     top = int(np.argmax(current))
     if not (current[top] > 0.0 and trace.waveform.peak > 0.0):
-        raise InputError(f"{trace.table.path}: there is no current or no voltage, expected a record of both")
+        raise InputError(
+            f"{trace.table.path}: there is no current or no voltage",
+            file=trace.table.path,
+            key="current",
+            expected="a record of both",
+        )
     resistance = trace.waveform.peak / float(current[top])
     rise = float(t[int(np.argmax(current > 0.5 * current[top]))])
     inductance = resistance * max(rise, float(np.diff(t).min())) / math.log(2.0)
@@ -279,7 +307,10 @@ def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, Floa
         _unit(hammer, name)
         if not _stated(hammer, name):
             raise InputError(
-                f"{hammer.path}: {name} is not more than 0, expected a value with which the fit begins"
+                f"{hammer.path}: {name} is not more than 0",
+                file=hammer.path,
+                key=name,
+                expected="a value with which the fit begins",
             )
     return hammer, np.array([hammer.constants[name].si for name in names])
 

@@ -57,21 +57,23 @@ def fit(
         missing.
     """
     if kind not in KINDS:
-        raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
+        raise InputError.of("kind", kind, f"one of {', '.join(KINDS)}")
     many = [path] if isinstance(path, str) or not hasattr(path, "__iter__") else list(path)
     if kind in ("motion", "coil"):
         from printhammer.identify.coil import fit_coil
         from printhammer.identify.shots.motion import fit_motion
 
         if hammer is None:
-            raise InputError("the hammer is missing, expected one with the constants known already")
+            raise InputError(
+                "the hammer is missing", key="hammer", expected="one with the constants known already"
+            )
         if kind == "coil":
             return fit_coil(many, hammer, **options)
         return fit_motion(many, hammer, **options)
     if kind == "magnet" and len(many) == 2 and options.get("spring") is None:
         many, options["spring"] = _magnet_and_spring(many)
     if len(many) != 1:
-        raise InputError(f"{len(many)} tables, expected one of the kind {kind!r}")
+        raise InputError(f"{len(many)} tables", key="tables", expected=f"one of the kind {kind!r}")
     if kind == "solenoid":
         from printhammer.identify.static.solenoid import fit_solenoid
 
@@ -92,7 +94,9 @@ def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
     ]
     if sum(with_current) != 1:
         names = " and ".join(str(path) for path in paths)
-        raise InputError(f"{names}: expected one table with the column 'current' and one without")
+        raise InputError(
+            f"{names}: expected one table with the column 'current' and one without", key="current"
+        )
     first = with_current.index(True)
     return [paths[first]], paths[1 - first]
 
@@ -143,13 +147,21 @@ def _fitted(kind: str, table: Any, options: dict[str, Any]) -> Fit:
         from printhammer.identify.static.spring import fit_spring
 
         if options["position"] is None:
-            raise InputError("the position of the backstop is missing, expected it, or a hammer that has one")
+            raise InputError(
+                "the position of the backstop is missing",
+                key="position",
+                expected="it, or a hammer that has one",
+            )
         return fit_spring(table, **options)
     if kind == "pack":
         from printhammer.identify.static.pack import fit_pack
 
         if options["thickness"] is None:
-            raise InputError("the thickness of the pack is missing, expected it, or a hammer that has one")
+            raise InputError(
+                "the thickness of the pack is missing",
+                key="thickness",
+                expected="it, or a hammer that has one",
+            )
         return fit_pack(table, **options)
     from printhammer.identify.static.backstop import fit_backstop
 

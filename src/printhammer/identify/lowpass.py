@@ -33,9 +33,14 @@ def bandwidth_of(table: Readings) -> float | None:
     if text in ("", "none", "unlimited"):
         return None
     where = f"{table.path}: the comment 'bandwidth'"
-    value = read_number(text, "Hz", where)
+    try:
+        value = read_number(text, "Hz", where)
+    except InputError as error:
+        raise InputError(str(error), file=table.path, key="bandwidth", value=text) from None
     if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{where}: {text}, expected a positive number")
+        raise InputError(
+            f"{where}: {text}", file=table.path, key="bandwidth", value=text, expected="a positive number"
+        )
     return value
 
 

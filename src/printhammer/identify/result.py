@@ -325,7 +325,10 @@ class Fit(Result):
             if part is None or part.law != self._laws[section]:
                 law = "is missing" if part is None else f"has the law {part.law!r}"
                 raise InputError(
-                    f"{hammer.path}: the {section} {law}, expected the law {self._laws[section]!r}"
+                    f"{hammer.path}: the {section} {law}",
+                    file=hammer.path,
+                    key=section,
+                    expected=f"the law {self._laws[section]!r}",
                 )
         for key, text in self.given.items():
             _agrees(hammer, key, text)
@@ -441,4 +444,10 @@ def _agrees(hammer: Hammer, key: str, text: str) -> None:
     value = parse(text, known.si_unit)
     if not math.isclose(value, known.si, rel_tol=1e-9, abs_tol=0.0):
         written = f"{key} = {known.value!r} {known.unit}"
-        raise InputError(f"{hammer.path}: {written}, expected {text}, which the fit took as known")
+        raise InputError(
+            f"{hammer.path}: {written}",
+            file=hammer.path,
+            key=key,
+            value=known.value,
+            expected=f"{text}, which the fit took as known",
+        )

@@ -71,33 +71,48 @@ def read_table(
     """
     source = Path(path)
     if not source.exists():
-        raise InputError(f"{source}: there is no such file, expected a table of measurements")
+        raise InputError(f"{source}: there is no such file", file=source, expected="a table of measurements")
     sheet = read_sheet(source, "the table")
     lines = sheet.rows
     must = ",".join(f"{name} [{si}]" for name, si in columns.items())
     may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
     wanted = f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
     if not lines:
-        raise InputError(f"{source}: the file has no heading, expected {wanted}")
+        raise InputError(f"{source}: the file has no heading", file=source, key="heading", expected=wanted)
     names, units = _heading(source, lines[0], {**columns, **optional}, text, wanted)
     missing = [name for name in columns if name not in names]
     if missing:
         raise InputError(
-            f"{source}: line {lines[0][0]}: the column {missing[0]!r} is missing, expected {wanted}"
+            f"{source}: line {lines[0][0]}: the column {missing[0]!r} is missing",
+            file=source,
+            key=missing[0],
+            expected=wanted,
         )
     if len(lines) < 2:
-        raise InputError(f"{source}: the table has no rows, expected them below the heading")
+        raise InputError(
+            f"{source}: the table has no rows", file=source, key="rows", expected="them below the heading"
+        )
     values: dict[str, FloatArray] = {name: np.empty(len(lines) - 1) for name in units}
     words: dict[str, list[str]] = {name: [] for name in names if name in text}
     for row, (number, cells) in enumerate(lines[1:]):
         if len(cells) != len(names):
-            raise InputError(f"{source}: line {number} has {len(cells)} cells, expected {len(names)}")
+            raise InputError(
+                f"{source}: line {number} has {len(cells)} cells",
+                file=source,
+                key=f"line {number}",
+                expected=f"{len(names)}",
+            )
         for name, cell in zip(names, cells, strict=True):
             where = f"{source}: line {number}, column {name!r}"
             if name in text:
                 word = cell.strip().lower()
                 if word not in text[name]:
-                    raise InputError(f"{where}: {cell.strip()!r}, expected {' or '.join(text[name])}")
+                    raise InputError(
+                        f"{where}: {cell.strip()!r}",
+                        file=where,
+                        value=cell,
+                        expected=f"{' or '.join(text[name])}",
+                    )
                 words[name].append(word)
             else:
                 values[name][row] = _number(cell, *units[name], where)
@@ -120,20 +135,33 @@ def _heading(
         name, unit = split_heading(cell)
         name = " ".join(name.lower().split())
         if name not in numbers and name not in text:
-            raise InputError(f"{where}: the column {cell.strip()!r} is not known, expected {wanted}")
+            raise InputError(
+                f"{where}: the column {cell.strip()!r} is not known",
+                file=where,
+                key=cell.strip(),
+                expected=wanted,
+            )
         if name in names:
-            raise InputError(f"{where}: the column {name!r} is given twice, expected it once")
+            raise InputError(
+                f"{where}: the column {name!r} is given twice", file=where, key=name, expected="it once"
+            )
         names.append(name)
         if name in text:
             if "[" in cell:
-                raise InputError(f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit")
+                raise InputError(
+                    f"{where}: heading {cell.strip()!r}: expected {name!r}, words have no unit",
+                    file=where,
+                    key=cell.strip(),
+                )
             continue
         if not unit:
             such = f"{name} [{numbers[name]}]"
             raise InputError(
-                f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}"
+                f"{where}: heading {cell.strip()!r} is expected to carry its unit, such as {such!r}",
+                file=where,
+                key=cell.strip(),
             )
-        with located(f"{where}: heading {cell.strip()!r}"):
+        with located(f"{where}: heading {cell.strip()!r}", file=where, key=cell.strip()):
             to_si(1.0, unit, numbers[name])
         units[name] = unit, numbers[name]
     return names, units
@@ -146,7 +174,9 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
         number = math.nan
     if not math.isfinite(number):
         raise InputError(
-            f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}"
+            f"{where}: {cell.strip()!r} is expected to be a finite number, {describe(si)} in {unit}",
+            file=where,
+            value=cell,
         )
     with located(where):
         value = to_si(number, unit, si)
@@ -154,7 +184,9 @@ def _number(cell: str, unit: str, si: str, where: str) -> float:
     tiny = float(np.finfo(np.float64).tiny)
     if abs(value) > LARGEST or (number != 0.0 and abs(value) < tiny):
         raise InputError(
-            f"{where}: {cell.strip()} {unit}, expected a measured value, 0 or one of a magnitude from"
-            f" {tiny:.2g} to {LARGEST:g} {si}"
+            f"{where}: {cell.strip()} {unit}",
+            file=where,
+            value=cell,
+            expected=f"a measured value, 0 or one of a magnitude from {tiny:.2g} to {LARGEST:g} {si}",
         )
     return value

@@ -100,7 +100,9 @@ def frequency_map(
     moments = _times(times, (count - 1) / float(grid[0]) + TAIL)
     if grid.size * moments.size > MOST_CELLS:
         raise InputError(
-            f"{grid.size} rates x {moments.size} times, expected at most {MOST_CELLS} displacements in a map"
+            f"{grid.size} rates x {moments.size} times",
+            key="rates",
+            expected=f"at most {MOST_CELLS} displacements in a map",
         )
     drives = PulseTrains.at_rates(fired, grid, count, overlap)
     ends = np.maximum(moments[-1], (count - 1) / grid + TAIL)
@@ -208,16 +210,20 @@ def _rates(rates: npt.ArrayLike | None) -> FloatArray:
     try:
         grid = np.atleast_1d(np.array(rates, dtype=np.float64))
     except (TypeError, ValueError):
-        raise InputError("rates: expected numbers, Hz") from None
+        raise InputError("rates: expected numbers, Hz", key="rates") from None
     if grid.ndim != 1 or grid.size == 0:
-        raise InputError(f"rates: an array of shape {grid.shape}, expected a list of at least one rate, Hz")
+        raise InputError(
+            f"rates: an array of shape {grid.shape}", key="rates", expected="a list of at least one rate, Hz"
+        )
     odd = grid[~(np.isfinite(grid) & (grid > 0.0))]
     if odd.size:
-        raise InputError(f"rates: {odd[0]:.9g} Hz, expected finite numbers greater than 0 Hz")
+        raise InputError(f"rates: {odd[0]:.9g} Hz", key="rates", expected="finite numbers greater than 0 Hz")
     falling = np.flatnonzero(np.diff(grid) <= 0.0)
     if falling.size:
         before, after = grid[falling[0] : falling[0] + 2]
-        raise InputError(f"rates: {after:.9g} Hz follows {before:.9g} Hz, expected ascending rates")
+        raise InputError(
+            f"rates: {after:.9g} Hz follows {before:.9g} Hz", key="rates", expected="ascending rates"
+        )
     return grid
 
 
@@ -227,13 +233,15 @@ def _times(times: npt.ArrayLike | None, end: float) -> FloatArray:
     if np.ndim(times) == 0:
         count: Any = times
         if isinstance(count, bool) or int(count) != count or count < 2:
-            raise InputError(f"times = {count!r}, expected a whole number of at least 2, or the times, s")
+            raise InputError.of("times", count, "a whole number of at least 2, or the times, s")
         if count > MOST_CELLS:
-            raise InputError(f"times = {count!r}, expected at most {MOST_CELLS}")
+            raise InputError.of("times", count, f"at most {MOST_CELLS}")
         return np.linspace(0.0, end, int(count))
     grid = np.array(times, dtype=np.float64)
     if grid.ndim != 1 or grid.size == 0 or not np.isfinite(grid).all():
-        raise InputError("times: expected a list of finite numbers, s")
+        raise InputError("times: expected a list of finite numbers, s", key="times")
     if grid[0] < 0.0 or (np.diff(grid) <= 0.0).any() or grid[-1] <= 0.0:
-        raise InputError("times: expected ascending times, s, not negative, the last one greater than 0 s")
+        raise InputError(
+            "times: expected ascending times, s, not negative, the last one greater than 0 s", key="times"
+        )
     return grid

@@ -71,7 +71,7 @@ class Cells:
             The unit is of another dimension, or a cell is no finite number, nor an allowed gap.
         """
         name = self.heading[index]
-        with located(f"{self.what}: column {name!r}"):
+        with located(f"{self.what}: column {name!r}", file=self.what, key=name):
             factor = to_si(1.0, unit, si)
         values = np.empty(len(self.rows))
         for k, row in enumerate(self.rows):
@@ -86,7 +86,10 @@ class Cells:
             if not math.isfinite(values[k]):
                 raise InputError(
                     f"{self.what}: line {self.lines[k]}, column {name!r}: {text!r} is expected to be a finite"
-                    " number"
+                    " number",
+                    file=self.what,
+                    key=name,
+                    value=text,
                 )
         return values * factor
 
@@ -122,19 +125,28 @@ def checked(
         The rate is not positive, a time is given twice, or fewer than two displacements are known.
     """
     if not (math.isfinite(rate) and rate > 0.0):
-        raise InputError(f"{what}: {places[0]}: rate {rate:.9g} Hz is expected to be greater than 0 Hz")
+        raise InputError(
+            f"{what}: {places[0]}: rate {rate:.9g} Hz is expected to be greater than 0 Hz",
+            file=what,
+            key="rate",
+            value=rate,
+        )
     order = np.argsort(times, kind="stable")
     at, x = times[order], displacement[order]
     twice = np.flatnonzero(np.diff(at) == 0.0)
     if twice.size:
         first, second = (places[order[twice[0] + k]] for k in (0, 1))
         raise InputError(
-            f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz is given before, in {first},"
-            " expected one displacement for each time"
+            f"{what}: {second}: time {at[twice[0]]:.9g} s at {rate:.9g} Hz is given before, in {first}",
+            file=what,
+            key="time",
+            expected="one displacement for each time",
         )
     known = int(np.isfinite(x).sum())
     if known < 2:
-        raise InputError(f"{what}: {known} displacements at {rate:.9g} Hz, expected at least 2")
+        raise InputError(
+            f"{what}: {known} displacements at {rate:.9g} Hz", file=what, key="rate", expected="at least 2"
+        )
     return RateRecord(rate, at, x)
 
 
@@ -154,7 +166,12 @@ def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[RateRecord]:
 def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateRecord]:
     columns = [k for k, (name, _unit) in enumerate(names) if name == "time"]
     if len(columns) != 1 or len(names) < 2:
-        raise InputError(f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}")
+        raise InputError(
+            f"{cells.what}: columns {', '.join(map(repr, cells.heading))}",
+            file=cells.what,
+            key="columns",
+            expected=_HEADINGS,
+        )
     times = cells.column(columns[0], "s", names[columns[0]][1])
     records: dict[float, RateRecord] = {}
     for k, (name, unit) in enumerate(names):
@@ -162,17 +179,25 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
             continue
         if name in _SI:
             raise InputError(
-                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}, expected {_HEADINGS}"
+                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}",
+                file=cells.what,
+                key="columns",
+                expected=_HEADINGS,
             )
         try:
             rate = parse(name, "Hz")
         except InputError as error:
             raise InputError(
-                f"{cells.what}: column {cells.heading[k]!r}: {error}; expected {_HEADINGS}"
+                f"{cells.what}: column {cells.heading[k]!r}: {error}; expected {_HEADINGS}",
+                file=cells.what,
+                key=cells.heading[k],
+                value=name,
             ) from None
         if rate in records:
             raise InputError(
-                f"{cells.what}: column {cells.heading[k]!r}: the rate {rate:.9g} Hz has two columns"
+                f"{cells.what}: column {cells.heading[k]!r}: the rate {rate:.9g} Hz has two columns",
+                file=cells.what,
+                key=cells.heading[k],
             )
         places = [f"line {line}, column {cells.heading[k]!r}" for line in cells.lines]
         x = cells.column(k, "m", unit, gaps=True)
@@ -184,7 +209,9 @@ def _named(what: str, cell: str) -> tuple[str, str]:
     """Split the cell of a heading into its name and its unit."""
     name, unit = split_heading(cell)
     if not unit:
-        raise InputError(f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'")
+        raise InputError(
+            f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'", file=what, key=cell
+        )
     return (name.lower() if name.lower() in _SI else name), unit
 
 
@@ -192,11 +219,21 @@ def _cells(path: Path) -> Cells:
     what = str(path)
     rows = read_sheet(path, "the measured map").rows
     if len(rows) < 2:
-        raise InputError(f"{what}: {len(rows)} rows, expected the heading {_HEADINGS}, and samples")
+        raise InputError(
+            f"{what}: {len(rows)} rows",
+            file=what,
+            key="rows",
+            expected=f"the heading {_HEADINGS}, and samples",
+        )
     heading = [cell.strip() for cell in rows[0][1]]
     for line, row in rows[1:]:
         if len(row) != len(heading):
-            raise InputError(f"{what}: line {line} has {len(row)} cells, expected {len(heading)}")
+            raise InputError(
+                f"{what}: line {line} has {len(row)} cells",
+                file=what,
+                key=f"line {line}",
+                expected=f"{len(heading)}",
+            )
     lines = np.array([line for line, _row in rows[1:]], dtype=np.int64)
     return Cells(what, heading, lines, [row for _line, row in rows[1:]])
 
@@ -253,13 +290,15 @@ def _magic(path: Path) -> bytes:
         with path.open("rb") as file:
             return file.read(4)
     except OSError as error:
-        raise InputError(f"{path}: the measured map cannot be read ({error.strerror or error})") from None
+        raise InputError(
+            f"{path}: the measured map cannot be read ({error.strerror or error})", file=path
+        ) from None
 
 
 def _checked_times(times: npt.ArrayLike) -> FloatArray:
     grid = np.array(times, dtype=np.float64).reshape(-1)
     if not grid.size or not np.isfinite(grid).all() or (np.diff(grid) <= 0.0).any():
-        raise InputError("times: expected ascending numbers, s")
+        raise InputError("times: expected ascending numbers, s", key="times")
     return grid
 
 
@@ -284,8 +323,10 @@ def _stored_records(path: Path) -> list[RateRecord]:
     over = dimensions["displacement"]
     if len(over) != 2 or "rate" not in over or dimensions["rate"] != ("rate",):
         raise InputError(
-            f"{what}: displacement lies over {', '.join(over) or 'nothing'}, expected rate and one more"
-            " dimension"
+            f"{what}: displacement lies over {', '.join(over) or 'nothing'}",
+            file=what,
+            key="displacement",
+            expected="rate and one more dimension",
         )
     if over[0] != "rate":
         x, over = x.T, over[::-1]
@@ -295,8 +336,10 @@ def _stored_records(path: Path) -> list[RateRecord]:
         times = times.T
     elif dimensions["time"] != over:
         raise InputError(
-            f"{what}: time lies over {', '.join(dimensions['time']) or 'nothing'}, expected {over[1]}, or"
-            f" rate and {over[1]}"
+            f"{what}: time lies over {', '.join(dimensions['time']) or 'nothing'}",
+            file=what,
+            key="time",
+            expected=f"{over[1]}, or rate and {over[1]}",
         )
     records: dict[float, RateRecord] = {}
     for row, rate in enumerate(rates):
@@ -304,8 +347,10 @@ def _stored_records(path: Path) -> list[RateRecord]:
         where = f"row {row + 1}"
         if not known.any() or float(rate) in records:
             raise InputError(
-                f"{what}: {where}: rate {rate:.9g} Hz has no times or is given twice, expected one record for"
-                " each rate"
+                f"{what}: {where}: rate {rate:.9g} Hz has no times or is given twice",
+                file=what,
+                key=where,
+                expected="one record for each rate",
             )
         places = [f"{where}, sample {k + 1}" for k in np.flatnonzero(known)]
         records[float(rate)] = checked(what, float(rate), times[row][known], x[row][known], places)
@@ -329,25 +374,31 @@ def _opened(path: Path) -> Any:
         return xr.open_dataset(path, decode_times=False, **options)
     except Exception as error:  # noqa: BLE001 - the backends raise what they like
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path}: the measured map cannot be read ({reason[:200]})") from None
+        raise InputError(f"{path}: the measured map cannot be read ({reason[:200]})", file=path) from None
 
 
 def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
     if name not in stored.variables:
         there = ", ".join(map(str, stored.variables)) or "nothing"
-        raise InputError(f"{what}: expected the variable {name}, there is {there}")
+        raise InputError(f"{what}: expected the variable {name}, there is {there}", file=what, key=name)
     unit = stored[name].attrs.get("units")
     if not isinstance(unit, str):
         raise InputError(
-            f"{what}: {name} is expected to carry its unit in the attribute units, such as {_SI[name]!r}"
+            f"{what}: {name} is expected to carry its unit in the attribute units, such as {_SI[name]!r}",
+            file=what,
+            key=name,
         )
     try:
         factor = to_si(1.0, unit, _SI[name])
         values = np.asarray(stored[name].values, dtype=np.float64) * factor
     except InputError as error:
-        raise InputError(f"{what}: {name}: {error}") from None
+        raise error.within(f"{what}: {name}", file=what, key=name) from None
     except (OSError, TypeError, ValueError):
-        raise InputError(f"{what}: {name} is expected to hold numbers that can be read") from None
+        raise InputError(
+            f"{what}: {name} is expected to hold numbers that can be read", file=what, key=name
+        ) from None
     if np.isinf(values).any():
-        raise InputError(f"{what}: {name} is expected to hold finite numbers, or nan for a gap")
+        raise InputError(
+            f"{what}: {name} is expected to hold finite numbers, or nan for a gap", file=what, key=name
+        )
     return values

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from printhammer.errors import InputError
 from printhammer.parts.functions import check_functions
-from printhammer.support.constants import sentence
+from printhammer.support.constants import invalid
 
 ROLES: tuple[str, ...] = ("magnet", "coil", "spring", "pack", "backstop", "damping")
 
@@ -44,7 +43,7 @@ class Part(BaseModel):
             try:
                 super().__init__(**data)
             except ValidationError as error:
-                raise InputError(sentence(error, type(self), f"{self.role}.")) from None
+                raise invalid(error, type(self), f"{self.role}.") from None
             check_functions(type(self))
 
         # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.

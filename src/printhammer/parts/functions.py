@@ -42,12 +42,16 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
         wanted, law = list(inspect.signature(model).parameters), getattr(module, name)
         if not callable(law) or not _takes(law, len(wanted)):
             has = f"{name}{inspect.signature(law)}" if callable(law) else f"{name} = {law!r}"
-            raise InputError(f"{where}: {has}, expected the function {name}({', '.join(wanted)})")
+            raise InputError(
+                f"{where}: {has}", file=where, key=name, expected=f"the function {name}({', '.join(wanted)})"
+            )
     forces = _FORCES[part.role]
     if complete and forces and not any(hasattr(module, name) for name in forces):
         raise InputError(
-            f"{where}: the {part.role} law {part.law!r} has no force, expected the function"
-            f" {' or '.join(forces)}"
+            f"{where}: the {part.role} law {part.law!r} has no force",
+            file=where,
+            key="force",
+            expected=f"the function {' or '.join(forces)}",
         )
 
 

@@ -34,23 +34,32 @@ def load_parts(path: str | Path) -> list[type[Part]]:
     source = Path(path).resolve()
     name = source.stem
     if not source.is_file():
-        raise InputError(f"{path}: no such file, expected a Python file that registers a part")
+        raise InputError(f"{path}: no such file", file=path, expected="a Python file that registers a part")
     if source.suffix != ".py" or not name.isidentifier():
-        raise InputError(f"{path}: expected a Python file whose name can be imported, such as my_spring.py")
+        raise InputError(
+            f"{path}: expected a Python file whose name can be imported, such as my_spring.py", file=path
+        )
     if str(source.parent) not in sys.path:
         sys.path.append(str(source.parent))
         invalidate_caches()
     known = find_spec(name)
     if known is None or known.origin is None or Path(known.origin).resolve() != source:
-        raise InputError(f"{path}: a module of the name {name!r} is there already, expected another name")
+        raise InputError(
+            f"{path}: a module of the name {name!r} is there already",
+            file=path,
+            key="module",
+            expected="another name",
+        )
     try:
         import_module(name)
     # Whatever the file raises.
     except Exception as error:
-        raise InputError(f"{path}: cannot be imported, {_sentence(error)}") from error
+        raise InputError(f"{path}: cannot be imported, {_sentence(error)}", file=path) from error
     parts = [part for part in PARTS.values() if part.__module__ == name]
     if not parts:
-        raise InputError(f"{path}: registers no part, expected a class marked with @register")
+        raise InputError(
+            f"{path}: registers no part", file=path, key="part", expected="a class marked with @register"
+        )
     for part in parts:
         check_functions(part, complete=True)
     return parts
@@ -64,7 +73,7 @@ def load_installed() -> None:
             entry.load()
         except Exception as error:
             where = f"the entry point {entry.name!r} = {entry.value!r} of {GROUP}"
-            raise InputError(f"{where} cannot be imported, {_sentence(error)}") from error
+            raise InputError(f"{where} cannot be imported, {_sentence(error)}", key=entry.name) from error
     for part in PARTS.values():
         check_functions(part, complete=True)
 

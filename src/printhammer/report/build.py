@@ -44,7 +44,8 @@ def check_place(out: str | Path) -> None:
     if there and not _is_report(folder):
         raise InputError(
             f"{there[0]}: expected a new folder or an earlier report, this file is of neither; --force writes"
-            " over it"
+            " over it",
+            file=there[0],
         )
 
 
@@ -89,7 +90,9 @@ def staged(out: str | Path) -> Iterator[Path]:
             _publish(draft, folder)
         except OSError as error:
             place = error.filename2 or error.filename or folder
-            raise InputError(f"{place}: the file cannot be replaced ({error.strerror or error})") from None
+            raise InputError(
+                f"{place}: the file cannot be replaced ({error.strerror or error})", file=place
+            ) from None
 
 
 def _publish(draft: Path, folder: Path) -> None:

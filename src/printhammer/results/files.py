@@ -87,7 +87,7 @@ def save(
     kind = target.suffix.lower()
     if kind not in endings:
         some = f"one of {', '.join(endings)}" if len(endings) > 1 else endings[0]
-        raise InputError(f"{target}: expected a name that ends in {some}")
+        raise InputError(f"{target}: expected a name that ends in {some}", file=target)
     need_for(target)
     if kind == ".nc":
         write_file(target, _netcdf(dataset()))
@@ -125,7 +125,7 @@ def reopen(path: str | Path) -> Reopened:
     source = Path(path)
     kind = source.suffix.lower()
     if kind not in ENDINGS:
-        raise InputError(f"{source}: expected a name that ends in one of {', '.join(ENDINGS)}")
+        raise InputError(f"{source}: expected a name that ends in one of {', '.join(ENDINGS)}", file=source)
     need_for(source)
     try:
         if kind in (".csv", ".parquet"):
@@ -136,7 +136,7 @@ def reopen(path: str | Path) -> Reopened:
         raise
     except Exception as error:  # noqa: BLE001 - the backends raise what they like
         reason = getattr(error, "strerror", None) or " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{source}: the result cannot be read ({reason[:200]})") from None
+        raise InputError(f"{source}: the result cannot be read ({reason[:200]})", file=source) from None
     return Reopened(source, dataset, frame_of(dataset))
 
 
@@ -280,7 +280,7 @@ def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
     if target.exists() and not (target / "zarr.json").is_file():
-        raise InputError(f"{target}: expected a new store, this is no Zarr store")
+        raise InputError(f"{target}: expected a new store, this is no Zarr store", file=target)
     draft: Path | None = None
     try:
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
@@ -294,7 +294,9 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
             target.rename(draft / "before")
         (draft / target.name).rename(target)
     except OSError as error:
-        raise InputError(f"{target}: the store cannot be written ({error.strerror or error})") from None
+        raise InputError(
+            f"{target}: the store cannot be written ({error.strerror or error})", file=target
+        ) from None
     finally:
         if draft is not None:
             if (draft / "before").exists() and not target.exists():
@@ -340,7 +342,9 @@ def _read_json(source: Path) -> xr.Dataset:
     content = json.loads(source.read_text("utf-8"))
     columns = content.pop(_COLUMNS, None) if isinstance(content, dict) else None
     if not isinstance(columns, dict):
-        raise InputError(f"{source}: expected a result of printhammer, with {_COLUMNS}")
+        raise InputError(
+            f"{source}: expected a result of printhammer, with {_COLUMNS}", file=source, key="columns"
+        )
     data: dict[bool, dict[str, Any]] = {True: {}, False: {}}
     for name, entry in columns.items():
         dims, values = entry.pop("dims"), np.array(entry.pop("values"), dtype=entry.pop("dtype"))
@@ -371,7 +375,9 @@ def _read_csv(source: Path) -> pd.DataFrame:
     sheet = read_sheet(source, "the result", gaps=True)
     lengths = {len(cells) for _line, cells in sheet.rows}
     if len(lengths) != 1:
-        raise InputError(f"{source}: expected a heading, and rows with as many cells")
+        raise InputError(
+            f"{source}: expected a heading, and rows with as many cells", file=source, key="rows"
+        )
     (_line, heads), *rows = sheet.rows
     table = pd.DataFrame({head: _typed([cells[k] for _line, cells in rows]) for k, head in enumerate(heads)})
     attributes = {key: _number(_decoded(value)) for key, value in sheet.comments.items()}

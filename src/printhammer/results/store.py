@@ -154,8 +154,10 @@ class Store:
         for name, asked in self._layout.identity.items():
             if there.get(name) != asked:
                 raise InputError(
-                    f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)},"
-                    f" expected {asked}, or another place for the results"
+                    f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)}",
+                    file=self.path,
+                    key=name,
+                    expected=f"{asked}, or another place for the results",
                 )
         self._handle = _locked(self.path, self.path)
 
@@ -199,7 +201,8 @@ class Store:
 
     def _refusal(self, error: OSError) -> InputError:
         return InputError(
-            f"{self.path}: the store cannot be written ({error.strerror or error}), what is done is kept"
+            f"{self.path}: the store cannot be written ({error.strerror or error}), what is done is kept",
+            file=self.path,
         )
 
 
@@ -267,12 +270,12 @@ def _root(path: Path) -> dict[str, Any]:
         _ = root["attributes"][_ARRAYS]
     except (FileNotFoundError, NotADirectoryError):
         if path.exists():
-            raise InputError(other) from None
-        raise InputError(f"{path}: there is no such store") from None
+            raise InputError(other, file=path) from None
+        raise InputError(f"{path}: there is no such store", file=path) from None
     except OSError as error:
-        raise InputError(f"{path}: the store cannot be read ({error.strerror or error})") from None
+        raise InputError(f"{path}: the store cannot be read ({error.strerror or error})", file=path) from None
     except (ValueError, KeyError, TypeError):
-        raise InputError(other) from None
+        raise InputError(other, file=path) from None
     return root
 
 
@@ -296,7 +299,7 @@ def _locked(folder: Path, named: Path) -> int:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(handle)
-        raise InputError(f"{named}: another process is at work on this store") from None
+        raise InputError(f"{named}: another process is at work on this store", file=named) from None
     except OSError:
         os.close(handle)
         raise

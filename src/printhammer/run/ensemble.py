@@ -181,7 +181,7 @@ class Ensemble:
         check_tolerance(tolerance)
         self.tolerance = tolerance
         if not max_steps > 0:
-            raise InputError(f"max_steps = {max_steps!r}, expected a positive number")
+            raise InputError.of("max_steps", max_steps, "a positive number")
         self.max_steps = max_steps
         many_hammers = [hammers] if isinstance(hammers, Hammer) else list(hammers)
         many_drives: Sequence[Drive]
@@ -201,10 +201,10 @@ class Ensemble:
         self.size = max(counts.values()) if min(counts.values()) > 0 else 0
         for name, count in counts.items():
             if count not in (1, self.size):
-                raise InputError(f"{name}: {count} are given, expected 1 or {self.size}")
+                raise InputError(f"{name}: {count} are given", key=name, expected=f"1 or {self.size}")
         wrong = ~(np.isfinite(moments) & (moments > 0.0))
         if wrong.any():
-            raise InputError(f"ends = {float(moments[wrong][0])!r} s, expected positive numbers")
+            raise InputError.of("ends", float(moments[wrong][0]), "positive numbers", unit="s")
         self.hammers: list[Hammer] = many_hammers * (self.size if len(many_hammers) == 1 else 1)
         one_for_all = len(many_drives) == 1 and self.size != 1
         self.drives: Sequence[Drive] = [many_drives[0]] * self.size if one_for_all else many_drives
@@ -225,9 +225,12 @@ class Ensemble:
             max(places, default=0) > 1 and any(drive.quantity != "voltage" for drive in fired)
         ):
             raise InputError(
-                f"states: an array of shape {rows.shape}, expected rows of displacement and velocity, or of"
-                " these with branch and memory; under a voltage then with the current, or with currents and"
-                " the voltage of the capacitor"
+                f"states: an array of shape {rows.shape}",
+                key="states",
+                expected=(
+                    "rows of displacement and velocity, or of these with branch and memory; under a"
+                    " voltage then with the current, or with currents and the voltage of the capacitor"
+                ),
             )
         full[:, [1, 2, *(3 + place for place in places)]] = rows
         hammers, hammer_of = self._own_hammers
@@ -238,7 +241,7 @@ class Ensemble:
             if row[2] >= 0.0:
                 check_branch(hammer, row)
         if not np.isfinite(full[:, 5:7]).all():
-            raise InputError("states: a current that is not a finite number, A")
+            raise InputError("states: a current that is not a finite number, A", key="states")
         return full
 
     def _checked_starts(self, begun: FloatArray) -> FloatArray:
@@ -246,7 +249,7 @@ class Ensemble:
         wrong = ~(np.isfinite(starts) & (starts >= 0.0) & (starts < self.ends))
         if wrong.any():
             start, end = float(starts[wrong][0]), float(self.ends[wrong][0])
-            raise InputError(f"starts = {start!r} s, expected a number from 0 to before the end at {end!r} s")
+            raise InputError.of("starts", start, f"a number from 0 to before the end at {end!r} s", unit="s")
         return starts
 
     @cached_property
@@ -296,7 +299,9 @@ class Ensemble:
         from printhammer.run.simulate import simulate
 
         if self.states[member, 0] > 0.0:
-            raise InputError(f"member {member} starts later than at time 0, which a motion cannot yet")
+            raise InputError(
+                f"member {member} starts later than at time 0, which a motion cannot yet", key="start"
+            )
         drive, state = self.drives[member], self.states[member, 1:].tolist()
         return simulate(
             self.hammers[member],
@@ -347,15 +352,16 @@ class Ensemble:
             With a status for each member; a run that could not go on is no exception.
         """
         if engine not in ENGINES:
-            raise InputError(f"engine = {engine!r}, expected one of {', '.join(ENGINES)}")
+            raise InputError.of("engine", engine, f"one of {', '.join(ENGINES)}")
         workers = thread_count(threads)
         grid = np.zeros(0) if times is None else _ascending(times, "times")
         if x is None:
             x = np.empty((self.size, grid.size), np.float32)
         elif x.shape != (self.size, grid.size) or x.dtype != np.float32 or not x.flags.c_contiguous:
             raise InputError(
-                f"x: an array of shape {x.shape} and type {x.dtype}, expected {(self.size, grid.size)} and"
-                " float32, without gaps"
+                f"x: an array of shape {x.shape} and type {x.dtype}",
+                key="x",
+                expected=f"{(self.size, grid.size)} and float32, without gaps",
             )
         moments = self._moments(strobes)
         jobs = [Job(group, bool(dots), bool(extra), moments, grid, x) for group in self.groups]
@@ -413,12 +419,12 @@ class Ensemble:
             return Ragged.empty(self.size)
         if isinstance(strobes, str):
             if strobes != "firings":
-                raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
+                raise InputError.of("strobes", strobes, '"firings" or an array for each member')
             return firings_of(self.drives)
         if not isinstance(strobes, Sequence | np.ndarray):
-            raise InputError(f'strobes = {strobes!r}, expected "firings" or an array for each member')
+            raise InputError.of("strobes", strobes, '"firings" or an array for each member')
         if len(strobes) != self.size:
-            raise InputError(f"strobes: {len(strobes)} arrays, expected {self.size}")
+            raise InputError(f"strobes: {len(strobes)} arrays", key="strobes", expected=f"{self.size}")
         return Ragged.of([_ascending(moment, "strobes") for moment in strobes])
 
 
@@ -428,7 +434,12 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
     for job, size in zip(jobs, sizes, strict=True):
         in_lanes = engine != "plain" and job.group.fits_lanes()
         if engine == "lanes" and not in_lanes:
-            raise InputError('engine = "lanes", expected "plain" or "auto": the parts do not allow lanes')
+            raise InputError(
+                'engine = "lanes"',
+                key="engine",
+                value="lanes",
+                expected='"plain" or "auto": the parts do not allow lanes',
+            )
         job.prepare(in_lanes)
         if in_lanes:
             works.append(job.lane_piece)
@@ -442,12 +453,14 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
 def _each(values: npt.ArrayLike, name: str) -> FloatArray:
     values_of = read_array(values, name)
     if values_of.ndim > 1:
-        raise InputError(f"{name}: an array of shape {values_of.shape}, expected one number for each member")
+        raise InputError(
+            f"{name}: an array of shape {values_of.shape}", key=name, expected="one number for each member"
+        )
     return np.atleast_1d(values_of)
 
 
 def _ascending(times: npt.ArrayLike, name: str) -> FloatArray:
     moments = read_array(times, name).reshape(-1)
     if not np.isfinite(moments).all() or (np.diff(moments) < 0.0).any() or (moments < 0.0).any():
-        raise InputError(f"{name}: expected ascending numbers, not negative")
+        raise InputError(f"{name}: expected ascending numbers, not negative", key=name)
     return moments

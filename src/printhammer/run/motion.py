@@ -220,8 +220,10 @@ class Motion(Result, fields=False):
         inside = (times >= self.start) & (times <= self.end)
         if not inside.all():
             raise InputError(
-                f"t = {times[~inside][0]:.9g} s lies outside the motion, expected a time from"
-                f" {self.start:.9g} s to {self.end:.9g} s"
+                f"t = {times[~inside][0]:.9g} s lies outside the motion",
+                key="t",
+                value=times[~inside][0],
+                expected=f"a time from {self.start:.9g} s to {self.end:.9g} s",
             )
         order = np.argsort(times, kind="stable")
         table = np.empty((times.size, self._problem.columns))
@@ -250,7 +252,11 @@ class Motion(Result, fields=False):
         x, v, mode = row[[0, 1, 9]].tolist()
         begun = state_to_begin(self.hammer, x, v, int(mode), float(node[4]))
         if begun is None:
-            raise InputError(f"t = {t:.9g} s: no run can begin where the pack has just released the armature")
+            raise InputError(
+                f"t = {t:.9g} s: no run can begin where the pack has just released the armature",
+                key="t",
+                value=t,
+            )
         return (*begun, *(row[[10, 14, 13]].tolist() if self._problem.laws.circuit else ()))
 
     def forces_at(self, t: npt.ArrayLike) -> Mapping[str, FloatArray]:
@@ -314,7 +320,9 @@ class Motion(Result, fields=False):
         """
         fired = self.drive.times
         if not 0 <= firing < len(fired):
-            raise InputError(f"firing = {firing}: the drive has firings 0 to {len(fired) - 1}")
+            raise InputError(
+                f"firing = {firing}: the drive has firings 0 to {len(fired) - 1}", key="firing", value=firing
+            )
         until = fired[firing + 1] if firing + 1 < len(fired) else np.inf
         times, x = self.maxima
         inside = (times > fired[firing]) & (times <= until)

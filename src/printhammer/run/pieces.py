@@ -105,10 +105,15 @@ def simulate_pieces(
     """
     times = drive.times
     if len(hammers) != len(times):
-        raise InputError(f"{len(hammers)} hammers, expected one for each of {len(times)} firings")
+        raise InputError(
+            f"{len(hammers)} hammers", key="hammers", expected=f"one for each of {len(times)} firings"
+        )
     if drive.quantity == "voltage":
         raise InputError(
-            f"{hammers[0].path}: a voltage drives the coil, expected a current or a force where paper varies"
+            f"{hammers[0].path}: a voltage drives the coil",
+            file=hammers[0].path,
+            key="waveform",
+            expected="a current or a force where paper varies",
         )
     fronts = [np.inf if hammer.front is None else hammer.front for hammer in hammers]
     ends = [*times[1:].tolist(), duration]

@@ -109,8 +109,8 @@ def fresh_carry(
 def check_tolerance(tolerance: object) -> None:
     """Refuse a tolerance with which the integrator does not work."""
     if not (isinstance(tolerance, float | int) and LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE):
-        raise InputError(
-            f"tolerance = {tolerance!r}, expected a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"
+        raise InputError.of(
+            "tolerance", tolerance, f"a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"
         )
 
 
@@ -146,7 +146,10 @@ def constants_of(hammer: Hammer) -> FloatArray:
         room = layout.ROOM.get(role, len(constants))
         if len(constants) > room:
             raise InputError(
-                f"{hammer.path}: {role} has {len(constants)} packed constants, expected at most {room}"
+                f"{hammer.path}: {role} has {len(constants)} packed constants",
+                file=hammer.path,
+                key=role,
+                expected=f"at most {room}",
             )
         array[layout.PLACES[role] : layout.PLACES[role] + len(constants)] = constants
     return array

@@ -165,17 +165,23 @@ class Regime(Declared):
             values = (period, rate, waveform, drive, overlap)
             named_beside = [name for name, value in zip(named, values, strict=True) if value is not None]
             if named_beside:
-                raise InputError(f"a regime is given, expected no {' or '.join(named_beside)} beside it")
+                raise InputError(
+                    "a regime is given", key="regime", expected=f"no {' or '.join(named_beside)} beside it"
+                )
             return hammer if phase is None else replace(hammer, phase=part)
         overlap = "add" if overlap is None else overlap
         if drive is not None:
             if period is not None or rate is not None or waveform is not None:
-                raise InputError("drive is given, expected no period, rate or waveform beside it")
+                raise InputError(
+                    "drive is given", key="drive", expected="no period, rate or waveform beside it"
+                )
             if drive.period is None or math.isfinite(drive.waveform.support):
-                raise InputError(f"drive = {drive!r}, expected an endless force with a period")
+                raise InputError.of("drive", drive, "an endless force with a period")
             return cls(hammer, float(drive.period), None, drive, overlap, part)
         if (period is None) == (rate is None):
-            raise InputError("period and rate: expected one of them, the time between firings or its inverse")
+            raise InputError(
+                "period and rate: expected one of them, the time between firings or its inverse", key="period"
+            )
         waveform_of(hammer, waveform)
         time = period_of_rate(rate) if rate is not None else read_positive(period or 0.0, "s", "period")
         regime = cls(hammer, time, waveform, None, overlap, part)
@@ -211,7 +217,8 @@ class Regime(Declared):
         if not self.is_planar:
             raise InputError(
                 "the state at a section is displacement and velocity: expected no shorted turn and no"
-                " capacitor as the supply, whose current and voltage belong to the state as well"
+                " capacitor as the supply, whose current and voltage belong to the state as well",
+                key="state",
             )
 
     @property
@@ -338,7 +345,7 @@ class Regime(Declared):
 
     def _with_force(self, **changed: float) -> Self:
         if not isinstance(self.drive, SineForce):
-            raise InputError(f"drive = {self.drive!r}, expected a SineForce, whose constants have names")
+            raise InputError.of("drive", self.drive, "a SineForce, whose constants have names")
         sine: Any = self.drive.waveform
         known = {"amplitude": sine.amplitude, "frequency": sine.frequency, "phase": sine.phase} | changed
         drive = SineForce(**known)
@@ -357,7 +364,9 @@ def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
     """Return a waveform to fire, by default that of a hammer; InputError where it has none."""
     fired = hammer.waveform if waveform is None else waveform
     if fired is None:
-        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+        raise InputError(
+            f"the hammer {hammer.name!r} has no waveform to fire", key="waveform", expected="a [waveform]"
+        )
     return fired
 
 
@@ -365,7 +374,7 @@ def read_phase(phase: float) -> float:
     """Read a part of the period."""
     part = read_number(phase, "1", "phase")
     if not 0.0 <= part < 1.0:
-        raise InputError(f"phase = {phase!r}, expected a part of the period from 0 up to but not including 1")
+        raise InputError.of("phase", phase, "a part of the period from 0 up to but not including 1")
     return part
 
 
@@ -397,14 +406,18 @@ def regimes_of(
         fired = [(None, None)]
     elif drives is None:
         if periods is None:
-            raise InputError("periods are missing, expected the times between the firings of each train, s")
+            raise InputError(
+                "periods are missing",
+                key="periods",
+                expected="the times between the firings of each train, s",
+            )
         fired = [(period, None) for period in (periods if np.ndim(periods) else [periods])]  # type: ignore[union-attr]
         if not fired:
-            raise InputError("periods: expected at least one time between firings, s")
+            raise InputError("periods: expected at least one time between firings, s", key="periods")
     count = max(len(many), len(fired)) if many and fired else 0
     for name, number in (("hammers", len(many)), ("periods" if drives is None else "drives", len(fired))):
         if number not in (1, count):
-            raise InputError(f"{name}: {number} are given, expected 1 or {count}")
+            raise InputError(f"{name}: {number} are given", key=name, expected=f"1 or {count}")
     return [
         Regime.of(
             many[i % len(many)],

@@ -51,11 +51,17 @@ class SchemeProblem(Problem):
         reading: schemes_1983.Reading = "look-ahead",
     ) -> None:
         if not (math.isfinite(scale) and scale > 0.0):
-            raise InputError(f"step_scale = {scale!r}, expected a positive number")
+            raise InputError.of("step_scale", scale, "a positive number")
         if hammer.damping is not None:
-            raise InputError(f"{hammer.path}: the schemes of 1983 expect a hammer without [damping]")
+            raise InputError(
+                f"{hammer.path}: the schemes of 1983 expect a hammer without [damping]",
+                file=hammer.path,
+                key="damping",
+            )
         if drive.quantity == "voltage":
-            raise InputError("the drive is a voltage, expected a current or a force for the schemes of 1983")
+            raise InputError(
+                "the drive is a voltage", key="drive", expected="a current or a force for the schemes of 1983"
+            )
         super().__init__(hammer, drive, state, 0.0, tolerance)
         self._scheme: schemes_1983.Scheme = scheme
         self._scale = scale

@@ -80,7 +80,7 @@ def simulate(
         With a status; a run that could not go on is no exception.
     """
     if scheme not in SCHEMES:
-        raise InputError(f"scheme = {scheme!r}, expected one of {', '.join(SCHEMES)}")
+        raise InputError.of("scheme", scheme, f"one of {', '.join(SCHEMES)}")
     check_tolerance(tolerance)
     end = end_of_run(drive, duration)
     beyond = state_beyond(hammer, state, drive.quantity)
@@ -132,14 +132,14 @@ def end_of_run(drive: Drive, duration: float | str | None) -> float:
     """
     if duration is None:
         if not math.isfinite(drive.end):
-            raise InputError("duration is missing, and the drive does not end")
+            raise InputError("duration is missing, and the drive does not end", key="duration")
         return (drive.end if drive.waveform.replaces else float(drive.times[-1])) + CYCLE
     if isinstance(duration, str):
         from printhammer.units import parse
 
         duration = parse(duration, "s")
     if not (math.isfinite(duration) and duration > 0.0):
-        raise InputError(f"duration = {duration!r} s, expected a positive number")
+        raise InputError.of("duration", duration, "a positive number", unit="s")
     return float(duration)
 
 
@@ -147,13 +147,13 @@ def _grid(problem: Problem, end: float, points: int | None, times: npt.ArrayLike
     if times is not None:
         grid = np.array(times, dtype=np.float64).reshape(-1)
         if grid.size == 0 or not np.isfinite(grid).all() or (np.diff(grid) < 0.0).any() or grid[0] < 0.0:
-            raise InputError("times: expected ascending numbers, not negative, at least one")
+            raise InputError("times: expected ascending numbers, not negative, at least one", key="times")
         return grid[grid <= end]
     if points is None:
         scale = problem.scales[0] / problem.scales[1]
         points = int(min(max(_PER_SCALE * end / scale, _FEWEST), _MOST))
     if points < 2:
-        raise InputError(f"points = {points}, expected at least 2")
+        raise InputError.of("points", points, "at least 2", written=str(points))
     return np.linspace(0.0, end, points)
 
 

@@ -65,24 +65,23 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
     if state is None:
         return hammer.rest, 0.0
     if len(state) != 2:
-        raise InputError(
-            f"state = {tuple(state)!r}, expected two numbers, displacement in m and velocity in m/s"
-        )
+        raise InputError.of("state", tuple(state), "two numbers, displacement in m and velocity in m/s")
     x, v = (float(number) for number in state)
     if not (math.isfinite(x) and math.isfinite(v)):
-        raise InputError(
-            f"state = {tuple(state)!r}, expected two finite numbers, displacement in m and velocity in m/s"
+        raise InputError.of(
+            "state", tuple(state), "two finite numbers, displacement in m and velocity in m/s"
         )
     if hammer.magnet is not None:
         low, high = hammer.magnet.domain
         if not low <= x <= high:
-            raise InputError(
-                f"state = {tuple(state)!r}, expected a displacement from {low:.9g} m to {high:.9g} m, where"
-                " the law of the magnet holds"
+            raise InputError.of(
+                "state",
+                tuple(state),
+                f"a displacement from {low:.9g} m to {high:.9g} m, where the law of the magnet holds",
             )
     rigid = hammer.backstop is not None and hammer.backstop.law == "rigid"
     if rigid and hammer.position is not None and x < hammer.position:
-        raise InputError(f"state = {tuple(state)!r}, expected a displacement not behind the rigid backstop")
+        raise InputError.of("state", tuple(state), "a displacement not behind the rigid backstop")
     return x, v
 
 
@@ -98,17 +97,27 @@ def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -
     numbers = tuple(float(number) for number in state or (0.0, 0.0))
     places = FORMS.get(len(numbers))
     if places is None or not all(math.isfinite(number) for number in numbers[:6]):
-        raise InputError(f"state = {numbers!r}, expected two finite numbers, {STATE}")
+        raise InputError.of("state", numbers, f"two finite numbers, {STATE}")
     beyond = Beyond(**{Beyond._fields[k]: number for k, number in zip(places, numbers[2:], strict=True)})
     if beyond.branch >= 0.0:
         check_branch(hammer, (*numbers[:2], *beyond[:2]))
     if len(numbers) in (3, 5, 7) and quantity != "voltage":
         raise InputError(
-            f"state = {numbers!r} under a drive by {quantity}: the current belongs to the state under a"
-            " voltage only, expected displacement in m and velocity in m/s"
+            (
+                f"state = {numbers!r} under a drive by {quantity}: the current belongs to the state"
+                " under a voltage only"
+            ),
+            key="state",
+            value=numbers,
+            expected="displacement in m and velocity in m/s",
         )
     if beyond.turn and not getattr(hammer.coil, "turn_resistance", None):
-        raise InputError(f"state = {numbers!r}: the coil has no shorted turn, expected no current in it")
+        raise InputError(
+            f"state = {numbers!r}: the coil has no shorted turn",
+            key="state",
+            value=numbers,
+            expected="no current in it",
+        )
     return beyond
 
 
@@ -141,13 +150,23 @@ def check_branch(hammer: Hammer, state: Sequence[float]) -> None:
     x, _v, branch, memory = (float(number) for number in state[:4])
     if branch not in _BRANCHES or hammer.front is None:
         known = ", ".join(f"{code} ({name})" for code, name in _BRANCHES.items())
-        raise InputError(f"state with branch = {branch:g}, expected a pack and one of {known}")
+        raise InputError(
+            f"state with branch = {branch:g}",
+            key="branch",
+            value=branch,
+            expected=f"a pack and one of {known}",
+        )
     if not x > hammer.front:
         raise InputError(
-            f"state with x = {x:.9g} m on a branch in the pack, expected more than its front,"
-            f" {hammer.front:.9g} m"
+            f"state with x = {x:.9g} m on a branch in the pack",
+            key="x",
+            value=x,
+            expected=f"more than its front, {hammer.front:.9g} m",
         )
     if branch != LOADING and not memory >= x:
         raise InputError(
-            f"state with memory = {memory:.9g} m, expected a displacement not less than x = {x:.9g} m"
+            f"state with memory = {memory:.9g} m",
+            key="memory",
+            value=memory,
+            expected=f"a displacement not less than x = {x:.9g} m",
         )

@@ -34,7 +34,9 @@ def supply_of(drive: Drive) -> Supply:
     """Return the supply of a drive by voltage."""
     supplies = {waveform.supply() for waveform in waveforms_of(drive)}
     if len(supplies) > 1:
-        raise InputError("the waveforms of the drive are on different supplies, expected one supply")
+        raise InputError(
+            "the waveforms of the drive are on different supplies", key="waveforms", expected="one supply"
+        )
     return supplies.pop()
 
 
@@ -49,13 +51,17 @@ def winding_of(hammer: Hammer) -> Winding:
     coil = hammer.coil
     if not isinstance(coil, Winding) or coil.resistance is None:
         raise InputError(
-            f"{hammer.path}: coil.resistance is missing, expected the resistance of the coil that the voltage"
-            " drives"
+            f"{hammer.path}: coil.resistance is missing",
+            file=hammer.path,
+            key="coil.resistance",
+            expected="the resistance of the coil that the voltage drives",
         )
     if coil.back_emf and hammer.magnet is not None and not hammer.magnet.has_linkage:
         raise InputError(
-            f"{hammer.path}: the magnet law {hammer.magnet.law!r} links no flux, expected one that does or"
-            " coil.back_emf = false"
+            f"{hammer.path}: the magnet law {hammer.magnet.law!r} links no flux",
+            file=hammer.path,
+            key="magnet",
+            expected="one that does or coil.back_emf = false",
         )
     return coil
 
@@ -118,9 +124,16 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
             current = voltage * min(_SHORT, waveform.support) / slope if slope > 0.0 else voltage
         hold = getattr(waveform, "hold_upper", None)
         if hold is not None and hold > current:
-            raise InputError(
-                f"hold_upper = {hold:g} A: expected less than {current:.4g} A, the most that {voltage:g} V"
-                f" drives through {resistance:.4g} ohm"
+            raise InputError.of(
+                "hold_upper",
+                hold,
+                (
+                    f"less than {current:.4g} A, the most that {voltage:g} V drives through {resistance:.4g}"
+                    " ohm"
+                ),
+                written=f"{hold:g}",
+                unit="A",
+                said=": expected",
             )
         upper = getattr(waveform, "upper", None)
         largest = max(largest, current if upper is None else min(upper, current))
@@ -162,7 +175,15 @@ def check_linkage(hammer: Hammer, current: float) -> None:
             slope = inductance(hammer, x, share * current)
             if slope <= 0.0:
                 least = coil.inductance - slope
-                raise InputError(
-                    f"{hammer.path}: coil.inductance = {coil.inductance:g} H: expected more than"
-                    f" {least:.4g} H, so that the flux linkage rises with the current at x = {x:.4g} m"
+                raise InputError.of(
+                    "coil.inductance",
+                    coil.inductance,
+                    (
+                        f"more than {least:.4g} H, so that the flux linkage rises with the current at"
+                        f" x = {x:.4g} m"
+                    ),
+                    file=hammer.path,
+                    written=f"{coil.inductance:g}",
+                    unit="H",
+                    said=": expected",
                 )

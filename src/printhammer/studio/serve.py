@@ -98,7 +98,7 @@ def _listen(host: str, port: int | None) -> socket.socket:
         except InputError:
             port = 0
     if not 0 <= port <= 65535:
-        raise InputError(f"port = {port}, expected a number from 0 to 65535")
+        raise InputError.of("port", port, "a number from 0 to 65535", written=str(port))
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -106,5 +106,7 @@ def _listen(host: str, port: int | None) -> socket.socket:
         listening.listen(64)
     except OSError as error:
         listening.close()
-        raise InputError(f"port = {port}: it cannot be used ({error.strerror})") from None
+        raise InputError(
+            f"port = {port}: it cannot be used ({error.strerror})", key="port", value=port
+        ) from None
     return listening

@@ -69,7 +69,9 @@ class Patience:
         if self._newer():
             raise GivenUp
         if self.spent + more > self._seconds:
-            raise InputError(f"{self._what} would take more than {self._seconds:g} s for this hammer")
+            raise InputError(
+                f"{self._what} would take more than {self._seconds:g} s for this hammer", key="seconds"
+            )
 
     def progress(self, _done: int, _all: int) -> None:
         """Do as `check`, where progress is told."""
@@ -98,9 +100,11 @@ def try_out(
     most = most or bounds.MOST_MAP_STEPS
     motion = limited_run(state.changed, drive, end, most, tolerance)
     if motion.status == STEP_LIMIT:
-        raise InputError(f"{what} would take more than {most} steps for this hammer, expected fewer")
+        raise InputError(
+            f"{what} would take more than {most} steps for this hammer", key=what, expected="fewer"
+        )
     if through and motion.status != "ok":
-        raise InputError(f"{what}: {motion.message}")
+        raise InputError(f"{what}: {motion.message}", key=what)
     return motion
 
 

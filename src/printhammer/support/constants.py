@@ -139,10 +139,10 @@ def shown(value: object, *, quotes: bool = True) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def sentence(
+def invalid(
     error: ValidationError, model: type[BaseModel], prefix: str = "", written: Mapping[str, str] | None = None
-) -> str:
-    """Tell the first fault of a pydantic validation in one sentence.
+) -> InputError:
+    """Return the first fault of a pydantic validation as an error.
 
     Parameters
     ----------
@@ -157,23 +157,32 @@ def sentence(
 
     Returns
     -------
-    str
-        Key, value and what was expected; the sentence of an `InputError` that a validator raised, as it is.
+    InputError
+        With key, value and what was expected; one that a validator raised, as it is.
     """
     fault = error.errors(include_url=False)[0]
     cause = fault.get("ctx", {}).get("error")
-    if isinstance(cause, InputError):
-        return str(cause)
     name = ".".join(str(step) for step in fault["loc"])
+    file, _, section = prefix.rpartition(": ")
+    if isinstance(cause, InputError):
+        if cause.file is None and cause.key is None:
+            cause.key = section + name or None
+        return cause
     if not name:
-        return f"{prefix.rstrip('.')}: {fault['msg'].removeprefix('Value error, ')}".removeprefix(": ")
-    key, kind, note = prefix + name, fault["type"], quantities(model).get(name)
+        place, said = prefix.rstrip("."), fault["msg"].removeprefix("Value error, ")
+        return InputError(
+            f"{place}: {said}".removeprefix(": "), file=file or None, key=section.rstrip(".") or None
+        )
+    key, kind, note = section + name, fault["type"], quantities(model).get(name)
     wanted = expected(note) if note else fault["msg"].removeprefix("Input should be ")
     if kind == "bool_type":
         wanted = "true or false"
     if kind == "missing":
-        return f"{key} is missing, expected {note.meaning} ({note.si})" if note else f"{key} is missing"
-    text = (written or {}).get(name) or shown(fault["input"])
+        ending = f", expected {note.meaning} ({note.si})" if note else ""
+        return InputError(f"{prefix}{name} is missing{ending}", file=file or None, key=key)
+    value = fault["input"]
+    text = (written or {}).get(name) or shown(value)
     if kind == "extra_forbidden":
-        return f"{key} = {text} is not known, expected one of {', '.join(model.model_fields)}"
-    return f"{key} = {text}: expected {wanted}"
+        message = f"{prefix}{name} = {text} is not known, expected one of {', '.join(model.model_fields)}"
+        return InputError(message, file=file or None, key=key, value=value)
+    return InputError.of(key, value, wanted, file=file or None, written=text, said=": expected")

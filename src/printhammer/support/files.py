@@ -35,7 +35,9 @@ def write_file(path: str | Path, content: str | bytes) -> None:
         if draft is not None:
             with suppress(OSError):
                 Path(draft).unlink()
-        raise InputError(f"{target}: the file cannot be written ({error.strerror or error})") from None
+        raise InputError(
+            f"{target}: the file cannot be written ({error.strerror or error})", file=target
+        ) from None
 
 
 def make_folder(path: str | Path) -> Path:
@@ -47,7 +49,7 @@ def make_folder(path: str | Path) -> Path:
             pass
     except OSError as error:
         raise InputError(
-            f"{folder}: expected a folder that can be written to ({error.strerror or error})"
+            f"{folder}: expected a folder that can be written to ({error.strerror or error})", file=folder
         ) from None
     return folder
 
@@ -65,19 +67,19 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
     for path in outputs:
         place = path.resolve()
         if place in read:
-            raise InputError(f"{path}: expected another file to write, this one is read")
+            raise InputError(f"{path}: expected another file to write, this one is read", file=path)
         if place in named:
-            raise InputError(f"{path}: expected a file of its own, this one is written twice")
+            raise InputError(f"{path}: expected a file of its own, this one is written twice", file=path)
         named.add(place)
         store = place.suffix.lower() == ".zarr"
         # A Zarr store is a folder, and written over as a whole.
         if place.is_dir() and not (store and (place / "zarr.json").is_file()):
             wanted = "a new store, this is no Zarr store" if store else "a file to write, this is a folder"
-            raise InputError(f"{path}: expected {wanted}")
+            raise InputError(f"{path}: expected {wanted}", file=path)
         if not place.parent.is_dir():
-            raise InputError(f"{path}: expected a file in a folder that exists")
+            raise InputError(f"{path}: expected a file in a folder that exists", file=path)
         if not os.access(place.parent, os.W_OK):
-            raise InputError(f"{path}: expected a file in a folder that can be written to")
+            raise InputError(f"{path}: expected a file in a folder that can be written to", file=path)
 
 
 def read_text(path: Path, what: str, *, wanted: str = "", encoding: str = "utf-8") -> str:
@@ -91,7 +93,7 @@ def read_text(path: Path, what: str, *, wanted: str = "", encoding: str = "utf-8
     try:
         return path.read_text(encoding)
     except UnicodeDecodeError:
-        raise InputError(f"{path}: {wanted or f'{what} is expected to be UTF-8 text'}") from None
+        raise InputError(f"{path}: {wanted or f'{what} is expected to be UTF-8 text'}", file=path) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: {what} cannot be read ({reason})") from None
+        raise InputError(f"{path}: {what} cannot be read ({reason})", file=path) from None

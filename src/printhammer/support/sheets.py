@@ -53,7 +53,9 @@ def sheet_of(text: str, where: str, *, gaps: bool = False, delimiter: str = ",")
                 rows.append((reader.line_num, row))  # noqa: PERF401
     except csv.Error as error:
         raise InputError(
-            f"{where}: line {reader.line_num}: expected comma-separated values ({error})"
+            f"{where}: line {reader.line_num}: expected comma-separated values ({error})",
+            file=where,
+            key=f"line {reader.line_num}",
         ) from None
     return Sheet(where, rows, comments)
 
@@ -72,7 +74,9 @@ def finite(cell: str, where: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{where}: {cell.strip()!r} is expected to be a finite number")
+        raise InputError(
+            f"{where}: {cell.strip()!r} is expected to be a finite number", file=where, value=cell
+        )
     return number
 
 

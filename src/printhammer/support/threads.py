@@ -32,7 +32,7 @@ def thread_count(threads: int | None) -> int:
             return len(os.sched_getaffinity(0))
         return os.cpu_count() or 1
     if threads < 1:
-        raise InputError(f"threads = {threads}, expected at least 1")
+        raise InputError.of("threads", threads, "at least 1", written=str(threads))
     return int(threads)
 
 

@@ -87,12 +87,14 @@ def read_axis(
     values = _values(table, here, note.si, grid, geometric)
     for value in values:
         if not _inside(value, note):
-            raise InputError(f"{here}: {value!r} {note.si} is out of bounds, expected {expected(note)}")
+            raise InputError(
+                f"{here}: {value!r} {note.si} is out of bounds", key=here, expected=f"{expected(note)}"
+            )
     if target == "drive" and field in COUNTS:
         if not grid:
-            raise InputError(f"{here}: a count cannot be drawn, expected an axis of a grid")
+            raise InputError(f"{here}: a count cannot be drawn", key=here, expected="an axis of a grid")
         if not all(value.is_integer() for value in values):
-            raise InputError(f"{here}: expected whole numbers")
+            raise InputError(f"{here}: expected whole numbers", key=here)
     name = table.key.removeprefix("drive.").replace(".", "_").replace(" ", "_")
     return Axis(table.key, name, target, field, note, np.array(values), geometric)
 
@@ -128,7 +130,10 @@ def _resolved(
     known += [name for name in hammer.constants if fired or not name.startswith("waveform.")]
     hint = nearest(key, known, "one such as 'pack.stiffness', 'drive.rate' or 'state.x'")
     raise InputError(
-        f"{where}.key = {shown(key)} names no constant of {hammer.name} or its drive, expected {hint}"
+        f"{where}.key = {shown(key)} names no constant of {hammer.name} or its drive",
+        key=f"{where}.key",
+        value=key,
+        expected=hint,
     )
 
 
@@ -152,34 +157,45 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
     ends = (table.low, table.high)
     if table.values is not None:
         if not grid:
-            raise InputError(f"{here}: values are given, a Latin hypercube is expected to have low and high")
+            raise InputError(
+                f"{here}: values are given, a Latin hypercube is expected to have low and high", key=here
+            )
         if any(value is not None for value in (*ends, table.count)) or geometric:
-            raise InputError(f"{here}: values are given, expected no range beside them")
+            raise InputError(f"{here}: values are given", key=here, expected="no range beside them")
         values = read_quantities(table.values, si, f"{here}.values")
         if len(set(values)) < len(values):
-            raise InputError(f"{here}.values: expected different values")
+            raise InputError(f"{here}.values: expected different values", key=f"{here}.values")
         return values
     for name, value in (("low", table.low), ("high", table.high), ("count", table.count if grid else 1)):
         if value is None:
-            raise InputError(f"{here}.{name} is missing, expected values, or low, high and count")
+            raise InputError(
+                f"{here}.{name} is missing", key=f"{here}.{name}", expected="values, or low, high and count"
+            )
     if not grid and table.count is not None:
-        raise InputError(f"{here}.count is given, a Latin hypercube is expected to have members instead")
+        raise InputError(
+            f"{here}.count is given, a Latin hypercube is expected to have members instead",
+            key=f"{here}.count",
+        )
     low, high = (
         read_quantity(end, si, f"{here}.{name}") for end, name in zip(ends, ("low", "high"), strict=True)
     )
     if low == high or not math.isfinite(high - low):
-        raise InputError(f"{here}: the range from {low!r} to {high!r} {si} is empty, expected two ends")
+        raise InputError(
+            f"{here}: the range from {low!r} to {high!r} {si} is empty", key=here, expected="two ends"
+        )
     if geometric and not (low > 0.0 and high > 0.0):
-        raise InputError(f"{here}: a geometric range is expected to lie above 0 {si}")
+        raise InputError(f"{here}: a geometric range is expected to lie above 0 {si}", key=here)
     if not grid:
         return [low, high]
     count = table.count or 1
     if count < 2:
-        raise InputError(f"{here}.count = {count}: expected at least 2 values of a range")
+        raise InputError.of(
+            f"{here}.count", count, "at least 2 values of a range", written=str(count), said=": expected"
+        )
     divide = np.geomspace if geometric else np.linspace
     grid_values = [float(value) for value in divide(low, high, count)]
     if len(set(grid_values)) < count:
-        raise InputError(f"{here}: the range is too narrow for {count} different values")
+        raise InputError(f"{here}: the range is too narrow for {count} different values", key=here)
     return grid_values
 
 

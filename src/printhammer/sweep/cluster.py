@@ -66,7 +66,7 @@ def run_dask(
             write(index, tasks.alone(plan.rows(plan.blocks.members(index))))
             tell(0.0)
     except _GoneError:
-        raise InputError("the dask scheduler is gone, what is done is kept") from None
+        raise InputError("the dask scheduler is gone, what is done is kept", key="scheduler") from None
     finally:
         tasks.cancel()
 
@@ -187,7 +187,9 @@ class _Tasks:
             raise _GoneError
         self._idle = 0.0 if self._threads() else self._idle + _INTERVAL
         if self._idle >= NO_WORKERS:
-            raise InputError(f"the cluster has had no worker for {NO_WORKERS:g} s, what is done is kept")
+            raise InputError(
+                f"the cluster has had no worker for {NO_WORKERS:g} s, what is done is kept", key="worker"
+            )
 
 
 def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results | str:
@@ -228,7 +230,9 @@ def client_of(dask: Any) -> Iterator[Any]:
             client = distributed.Client(dask, timeout=ANSWER, set_as_default=False)
         except (OSError, TimeoutError, ValueError, TypeError, AttributeError) as error:
             reason = str(error).partition("\n")[0] or type(error).__name__
-            raise InputError(f"{dask}: no dask scheduler answers there ({reason})") from None
+            raise InputError(
+                f"{dask}: no dask scheduler answers there ({reason})", key="dask", value=dask
+            ) from None
         try:
             yield client
         finally:

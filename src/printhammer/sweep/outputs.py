@@ -159,14 +159,20 @@ def read_outputs(table: OutputsTable, firings: int) -> Outputs:
         start = read_quantity(table.displacement.start, "s", f"{where}.start")
         end = read_quantity(table.displacement.end, "s", f"{where}.end")
         if not 0.0 <= start < end or table.displacement.count < 2:
-            raise InputError(f"{where}: expected at least 2 times from 0 s on, the end after the start")
+            raise InputError(
+                f"{where}: expected at least 2 times from 0 s on, the end after the start",
+                file=where,
+                key=where,
+            )
         times = np.linspace(start, end, table.displacement.count)
         arrays.append(DISPLACEMENT)
     scalars = {output.name: output for output in (*OF_DOTS, *OF_MOTION)}
     arrays += _chosen(table.scalars, scalars, "scalars")
     if len(arrays) == len(ALWAYS):
         raise InputError(
-            "outputs: nothing is asked for, expected dots, strobes, final, displacement or scalars"
+            "outputs: nothing is asked for",
+            key="outputs",
+            expected="dots, strobes, final, displacement or scalars",
         )
     return Outputs(tuple(arrays), firings, times)
 
@@ -177,7 +183,9 @@ def _chosen(names: Sequence[str] | str, known: Mapping[str, Output], where: str)
     for name in names:
         if name not in known:
             hint = nearest(name, known, f'some of {", ".join(known)}, or "all"')
-            raise InputError(f"outputs.{where}: {shown(name)} is not known, expected {hint}")
+            raise InputError(
+                f"outputs.{where}: {shown(name)} is not known", key=f"outputs.{where}", expected=hint
+            )
     if len(set(names)) < len(names):
-        raise InputError(f"outputs.{where}: expected different names")
+        raise InputError(f"outputs.{where}: expected different names", key=f"outputs.{where}")
     return [known[name] for name in names]

@@ -275,7 +275,11 @@ def make_plan(spec: Spec) -> Plan:
         dims, shape = (MEMBER,), (spec.members or 0,)
     members = math.prod(shape)
     if members > _MOST_MEMBERS:
-        raise InputError(f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}")
+        raise InputError(
+            f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}",
+            file=spec.where,
+            key="members",
+        )
     whole = Plan(spec, shape, dims, Blocks.of(shape, members))
     most = spec.chunk
     if most is None:
@@ -290,12 +294,12 @@ def make_plan(spec: Spec) -> Plan:
 def _try(plan: Plan) -> None:
     """Refuse a sweep that cannot work: neither its first, middle nor last member can be made."""
     maker = Maker(plan.spec.base)
-    first: InputError | None = None
+    faults: list[InputError] = []
     for row in plan.rows([0, plan.members // 2, plan.members - 1]):
         try:
             maker.member(row)
         except InputError as error:
-            first = first or error
+            faults.append(error)
         else:
             return
-    raise InputError(f"{plan.spec.where}: {first}")
+    raise faults[0].within(plan.spec.where)

@@ -90,9 +90,9 @@ def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
     try:
         return _spec(tomllib.loads(text), text, where, folder)
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise error.within(where) from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where}: expected TOML ({' '.join(str(error).split())})") from None
+        raise InputError(f"{where}: expected TOML ({' '.join(str(error).split())})", file=where) from None
 
 
 def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
@@ -103,7 +103,7 @@ def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
             wanted = (
                 "is given, a grid is expected to have none" if grid else "is missing, expected a whole number"
             )
-            raise InputError(f"{name} {wanted}")
+            raise InputError(f"{name} {wanted}", key=name)
     hammer = load(table.hammer if table.hammer in shipped() else folder / table.hammer)
     hammer = _replaced(hammer, table.constants)
     drive, place = _drive_tables(table.drive, folder)
@@ -116,13 +116,19 @@ def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
     )
     for i, axis in enumerate(axes):
         if any(axis.name == other.name for other in axes[:i]):
-            raise InputError(f"axis[{i}].key = {axis.key!r}: expected another key, this one has an axis")
+            raise InputError.of(
+                f"axis[{i}].key", axis.key, "another key, this one has an axis", said=": expected"
+            )
         if axis.key in table.constants:
-            raise InputError(f"constants: {axis.key!r} is replaced by an axis, expected one or the other")
+            raise InputError(
+                f"constants: {axis.key!r} is replaced by an axis",
+                key="constants",
+                expected="one or the other",
+            )
     x, v = table.state.x, table.state.v
     duration = None if table.duration is None else read_quantity(table.duration, "s", "duration")
     if duration is not None and not duration > 0.0:
-        raise InputError(f"duration = {duration!r} s: expected more than 0 s")
+        raise InputError.of("duration", duration, "more than 0 s", unit="s", said=": expected")
     base = Base(
         hammer=hammer,
         drive=drive,
@@ -148,7 +154,7 @@ def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
     for key, value in constants.items():
         note = quantity_of(hammer, key)
         if note is None:
-            raise InputError(f"constants: {shown(key)} names no constant of {hammer.name}")
+            raise InputError(f"constants: {shown(key)} names no constant of {hammer.name}", key="constants")
         changes[key] = read_quantity(value, note.si, f"constants.{key}")
     return hammer.replace(changes, source="constants of a sweep") if changes else hammer
 
@@ -161,9 +167,11 @@ def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str,
     try:
         return tomllib.loads(path.read_text(encoding="utf-8")), path.parent
     except OSError as error:
-        raise InputError(f"{path}: the drive file cannot be read ({error.strerror or error})") from None
+        raise InputError(
+            f"{path}: the drive file cannot be read ({error.strerror or error})", file=path, key="drive"
+        ) from None
     except ValueError as error:
-        raise InputError(f"{path}: expected TOML ({' '.join(str(error).split())})") from None
+        raise InputError(f"{path}: expected TOML ({' '.join(str(error).split())})", file=path) from None
 
 
 def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
@@ -171,24 +179,30 @@ def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
     kinds = [name for name in KINDS if name in base.drive]
     if len(kinds) != 1 or not isinstance(base.drive[kinds[0]], Mapping):
         tables = ", ".join(f"[drive.{name}]" for name in KINDS)
-        raise InputError(f"drive: expected exactly one of the tables {tables}")
+        raise InputError(f"drive: expected exactly one of the tables {tables}", key="drive")
     timing = base.drive[kinds[0]]
     for axis in base.axes:
         if kinds == ["sequence"] and axis.key.startswith("waveform."):
             raise InputError(
-                f"the axis {axis.key!r} changes what [drive.sequence] does not fire, expected one of its"
-                " waveforms, such as 'waveforms.NAME.amplitude'"
+                f"the axis {axis.key!r} changes what [drive.sequence] does not fire",
+                key=axis.key,
+                expected="one of its waveforms, such as 'waveforms.NAME.amplitude'",
             )
         if axis.target == "drive" and axis.field in timing:
-            raise InputError(f"drive.{kinds[0]}.{axis.field} is given beside the axis {axis.key!r}")
+            raise InputError(
+                f"drive.{kinds[0]}.{axis.field} is given beside the axis {axis.key!r}",
+                key=f"drive.{kinds[0]}.{axis.field}",
+            )
         if axis.target == "at":
             at = timing.get("at")
             if not isinstance(at, list) or int(axis.field) >= len(at):
                 raise InputError(
-                    f"the axis {axis.key!r} names no firing, expected drive.times.at with as many"
+                    f"the axis {axis.key!r} names no firing",
+                    key=axis.key,
+                    expected="drive.times.at with as many",
                 )
     if base.duration is None and kinds == ["sine"]:
-        raise InputError("duration is missing, and the drive does not end")
+        raise InputError("duration is missing, and the drive does not end", key="duration")
     if own is None or any(axis.target == "waveform" for axis in base.axes):
         return base
     rest = {name: table for name, table in base.drive.items() if name != "waveform"}

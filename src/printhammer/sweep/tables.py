@@ -51,7 +51,7 @@ ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
 
 def read_quantity(written: Any, si: str, where: str) -> float:
     """Read one quantity into SI: "1.2 kHz" or { value = 1.2, unit = "kHz" }; a bare number if it is pure."""
-    with located(where):
+    with located(where, key=where):
         if isinstance(written, str):
             return parse(written, si)
         if isinstance(written, Mapping):
@@ -60,7 +60,10 @@ def read_quantity(written: Any, si: str, where: str) -> float:
         if si == "1":
             return to_si(written, "1", "1")
     raise InputError(
-        f"{where} = {shown(written)} has no unit, expected {describe(si)} as text such as '1 {si}'"
+        f"{where} = {shown(written)} has no unit",
+        key=where,
+        value=written,
+        expected=f"{describe(si)} as text such as '1 {si}'",
     )
 
 
@@ -68,21 +71,25 @@ def read_quantities(written: Any, si: str, where: str) -> list[float]:
     """Read several quantities into SI: a list of what `read_quantity` takes, or values with one unit."""
     values: Iterable[Any] = written if isinstance(written, list) else ()
     if isinstance(written, Mapping):
-        with located(where):
+        with located(where, key=where):
             column, unit = _columns(written, ("values", "unit"))
         values = [{"value": value, "unit": unit} for value in column] if isinstance(column, list) else ()
     numbers = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
     if not numbers:
-        raise InputError(f"{where} = {shown(written)}: expected a list of quantities, at least one")
+        raise InputError.of(
+            where, written, "a list of quantities, at least one", written=shown(written), said=": expected"
+        )
     return numbers
 
 
 def _columns(table: Mapping[str, Any], names: tuple[str, str]) -> tuple[Any, str]:
     if set(table) != set(names):
-        raise InputError(f"{shown(dict(table))} is expected to have {names[0]} and {names[1]}")
+        raise InputError(
+            f"{shown(dict(table))} is expected to have {names[0]} and {names[1]}", value=dict(table)
+        )
     unit = table[names[1]]
     if not isinstance(unit, str):
-        raise InputError(f"the unit {shown(unit)} is expected to be text")
+        raise InputError(f"the unit {shown(unit)} is expected to be text", key="unit", value=unit)
     return table[names[0]], unit
 
 
@@ -160,7 +167,7 @@ def read_tables(document: dict[str, Any]) -> SpecTable:
     try:
         return SpecTable.model_validate(document)
     except ValidationError as error:
-        raise InputError(_sentence(error)) from None
+        raise _fault(error) from None
 
 
 def schema() -> dict[str, Any]:
@@ -173,19 +180,23 @@ def schema() -> dict[str, Any]:
     }
 
 
-def _sentence(error: ValidationError) -> str:
-    """Tell the first fault: key, value and what was expected."""
+def _fault(error: ValidationError) -> InputError:
+    """Return the first fault as an error: key, value and what was expected."""
     fault = error.errors(include_url=False)[0]
     key, table = _place(fault["loc"])
     if fault["type"] == "missing":
         field = table.model_fields.get(str(fault["loc"][-1]))
-        return f"{key} is missing, expected {(field.description if field else None) or 'a value'}"
+        wanted = (field.description if field else None) or "a value"
+        return InputError(f"{key} is missing", key=key, expected=wanted)
     if fault["type"] == "extra_forbidden":
         known = ", ".join(table.model_fields)
-        return f"the key {shown(key, quotes=False)} is not known, expected one of {known}"
+        return InputError(
+            f"the key {shown(key, quotes=False)} is not known", key=key, expected=f"one of {known}"
+        )
     wanted = fault["msg"].removeprefix("Input should be ")
     wanted = {"bool_type": "true or false", "string_type": "text in quotes"}.get(fault["type"], wanted)
-    return f"{key} = {shown(fault['input'])}: expected {wanted}"
+    value = fault["input"]
+    return InputError.of(key, value, wanted, written=shown(value), said=": expected")
 
 
 def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:

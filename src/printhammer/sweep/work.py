@@ -57,7 +57,11 @@ def run_chunk(
     and then with the share done; what it raises ends the work.
     """
     if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
-        raise InputError(f"{base.hammer.path}: a table that it names has changed since the sweep began")
+        raise InputError(
+            f"{base.hammer.path}: a table that it names has changed since the sweep began",
+            file=base.hammer.path,
+            key="table",
+        )
     results = outputs.empty(len(rows))
     results["status"][:] = NO_HAMMER
     results["reached"][:] = np.nan

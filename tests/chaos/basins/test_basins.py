@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import basin_entropy
@@ -214,19 +215,19 @@ def test_a_dataset_and_files_hold_everything(two: Basins, tmp_path: Path) -> Non
     table = pd.read_csv(tmp_path / "basins.csv", comment="#")
     assert table["label"].tolist() == two.labels.reshape(-1).tolist()
     assert set(two.to_dataframe()["attractor"]) == {"period-1"}
-    with pytest.raises(ph.InputError, match=r"basins\.txt"):
+    with refused(None, file="basins.txt"):
         two.save(tmp_path / "basins.txt")
     assert dataclasses.is_dataclass(two)
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({}, "period and rate"),
-        ({"period": 1e-3, "rate": 1e3}, "period and rate"),
-        ({"period": 1e-3, "x": (1e-5, 2e-5)}, "x = "),
-        ({"period": 1e-3, "x": (2e-5, 1e-5, 4)}, "x = "),
-        ({"period": 1e-3, "x": (1e-5, 2e-5, 0)}, "x: number"),
+        ({}, "period"),
+        ({"period": 1e-3, "rate": 1e3}, "period"),
+        ({"period": 1e-3, "x": (1e-5, 2e-5)}, "x"),
+        ({"period": 1e-3, "x": (2e-5, 1e-5, 4)}, "x"),
+        ({"period": 1e-3, "x": (1e-5, 2e-5, 0)}, "x: number of values"),
         ({"period": 1e-3, "v": (-1.0, "1 kg", 4)}, "v"),
         ({"period": 1e-3, "firings": 3}, "firings"),
         ({"period": 1e-3, "rounds": 0}, "rounds"),
@@ -234,18 +235,17 @@ def test_a_dataset_and_files_hold_everything(two: Basins, tmp_path: Path) -> Non
         ({"period": 1e-3, "x": (1e-5, 2e-5, 10_000), "v": (-1.0, 1.0, 10_000)}, "cells"),
     ],
 )
-def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said) as caught:
+def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         ph.basins(hammer, **options)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("labels", "box", "said"),
+    ("labels", "box", "key"),
     [(np.ones((2, 2)), 1, "labels"), (np.ones(4, int), 1, "labels"), (np.ones((2, 4), int), 3, "box")],
 )
-def test_entropy_of_what_is_no_plane_is_refused(labels: np.ndarray, box: int, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_entropy_of_what_is_no_plane_is_refused(labels: np.ndarray, box: int, key: str) -> None:
+    with refused(key):
         basin_entropy(labels, box=box)
 
 

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos.basins.quench import QuenchMap, TwoPulseDrive, two_pulse_drives
@@ -166,12 +167,12 @@ def test_a_dataset_and_files_hold_everything(found: QuenchMap, tmp_path: Path) -
     assert len(rows) == found.struck.size
     assert rows["struck"].tolist() == found.struck.reshape(-1).tolist()
     assert "flight_time [s]" in found.to_dataframe()
-    with pytest.raises(ph.InputError, match=r"quench\.txt"):
+    with refused(None, file="quench.txt"):
         found.save(tmp_path / "quench.txt")
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
         ({"gaps": (0.0, 1e-3, 4)}, "gaps"),
         ({"gaps": (2e-3, 1e-3, 4)}, "gaps"),
@@ -183,18 +184,17 @@ def test_a_dataset_and_files_hold_everything(found: QuenchMap, tmp_path: Path) -
         ({"gaps": (1e-4, 1e-3, 10_000), "widths": (1e-4, 1e-3, 10_000)}, "cells"),
     ],
 )
-def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said) as caught:
+def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         ph.quench_map(hammer, **options)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_hammer_that_cannot_be_mapped_is_refused(hammer: "ph.Hammer") -> None:
-    for bare, said in (
-        (hammer.replace("waveform", None), "no waveform"),
-        (hammer.replace("pack", None), "no pack"),
+    for bare, key in (
+        (hammer.replace("waveform", None), "waveform"),
+        (hammer.replace("pack", None), "pack"),
     ):
-        with pytest.raises(ph.InputError, match=said):
+        with refused(key):
             ph.quench_map(bare)
     assert math.isfinite(ph.quench_map(hammer, gaps=(6e-4, 7e-4, 2), widths=(3e-4, 4e-4, 2)).single_force)
 

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 from tests.hammers import CRUDE
 
 import printhammer as ph
@@ -332,7 +333,7 @@ def test_without_a_strange_train_the_route_says_so() -> None:
     assert rising.first is None
     assert falling.periods == [1, 2, 1]
     assert "no strange train comes" in rising.sentence
-    with pytest.raises(ph.InputError, match="direction = 'up'"):
+    with refused("direction"):
         found.windows("up")
 
 
@@ -367,20 +368,20 @@ def test_a_dataset_and_files_hold_everything(hammer: "ph.Hammer", tmp_path: Path
     assert len(table) == 4
     assert table["verdict"].tolist() == found.verdicts.reshape(-1).tolist()
     assert list(found.to_dataframe())[:3] == ["direction", "period [s]", "verdict"]
-    with pytest.raises(ph.InputError, match=r"diagram\.txt"):
+    with refused(None, file="diagram.txt"):
         found.save(tmp_path / "diagram.txt")
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({}, "periods, rates and parameter"),
-        ({"periods": [1e-3], "rates": [1e3]}, "periods, rates and parameter"),
-        ({"parameter": "mass", "period": 1e-3}, "parameter and values"),
-        ({"parameter": "masse", "values": [1e-3], "period": 1e-3}, "masse"),
-        ({"parameter": "mass", "values": [1e-4]}, "period and rate"),
-        ({"periods": [1e-3], "period": 1e-3}, "period and rate"),
-        ({"periods": [1e-3, 1e-3]}, "period: 0.001 follows 0.001"),
+        ({}, "parameter"),
+        ({"periods": [1e-3], "rates": [1e3]}, "parameter"),
+        ({"parameter": "mass", "period": 1e-3}, "parameter"),
+        ({"parameter": "masse", "values": [1e-3], "period": 1e-3}, "constant"),
+        ({"parameter": "mass", "values": [1e-4]}, "period"),
+        ({"periods": [1e-3], "period": 1e-3}, "period"),
+        ({"periods": [1e-3, 1e-3]}, "period"),
         ({"periods": []}, "period"),
         ({"periods": ["soon"]}, "period"),
         ({"periods": [-1e-3]}, "period"),
@@ -395,10 +396,9 @@ def test_a_dataset_and_files_hold_everything(hammer: "ph.Hammer", tmp_path: Path
         ({"parameter": "mass", "values": [-1.0], "period": 1e-3}, "mass"),
     ],
 )
-def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said) as caught:
+def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         ph.bifurcation(hammer, **options)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.slow
@@ -418,5 +418,5 @@ def test_a_hammer_of_other_parts_and_a_force(hammer: "ph.Hammer") -> None:
     np.testing.assert_allclose(found.x[0, 1], 2.0 * found.x[0, 0], rtol=1e-5, atol=1e-9)
     assert found.parameter == "drive.amplitude"
     assert dataclasses.is_dataclass(found)
-    with pytest.raises(ph.InputError, match="no waveform"):
+    with refused("waveform"):
         ph.bifurcation(hammer.replace("waveform", None), periods=[1e-3])

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.errors import refused
 from tests.strobe_maps import strobe_map
 
 import printhammer as ph
@@ -118,34 +119,34 @@ def test_dataset_and_files(branch: Branch, tmp_path: Path) -> None:
     read_back = json.loads((tmp_path / "b.json").read_text("utf-8"))
     assert read_back["stable_ranges"] == [list(pair) for pair in branch.stable_ranges]
     assert read_back["columns"]["v"]["values"] == branch.v.tolist()
-    with pytest.raises(ph.InputError, match="ends in"):
+    with refused(None, file="b.txt"):
         branch.save(tmp_path / "b.txt")
 
 
 @pytest.mark.parametrize(
-    ("parameter", "bounds", "how", "words"),
+    ("parameter", "bounds", "how", "key"),
     [
-        ("pack.nothing", (1.0, 2.0), {"period": SLOW}, "'pack.nothing' is not known"),
-        ("period", (2.0, 1.0), {"period": SLOW}, "ascending"),
-        ("period", (1.0,), {"period": SLOW}, "the least and the largest"),
+        ("pack.nothing", (1.0, 2.0), {"period": SLOW}, "constant"),
+        ("period", (2.0, 1.0), {"period": SLOW}, "bounds"),
+        ("period", (1.0,), {"period": SLOW}, "bounds"),
         ("period", ("1 m", "2 m"), {"period": SLOW}, "period"),
-        ("period", (1e-3, 2e-3), {"period": SLOW}, "expected one within the bounds"),
-        ("period", RANGE, {}, "period and rate"),
+        ("period", (1e-3, 2e-3), {"period": SLOW}, "period"),
+        ("period", RANGE, {}, "period"),
         ("period", RANGE, {"period": SLOW, "most": 0}, "most"),
         ("period", RANGE, {"period": SLOW, "phase": 1.0}, "phase"),
         ("period", RANGE, {"period": SLOW, "tolerance": 1.0}, "tolerance"),
-        ("period", RANGE, {"period": SLOW, "state": (1e9, 0.0)}, "no fixed point"),
+        ("period", RANGE, {"period": SLOW, "state": (1e9, 0.0)}, "parameter"),
     ],
 )
 def test_bad_input(
-    hammer: "ph.Hammer", parameter: str, bounds: tuple[float, float], how: dict[str, float], words: str
+    hammer: "ph.Hammer", parameter: str, bounds: tuple[float, float], how: dict[str, float], key: str
 ) -> None:
-    with pytest.raises(ph.InputError, match=words):
+    with refused(key):
         ph.continuation(hammer, parameter, bounds, **how)
 
 
 def test_an_orbit_brings_its_own_train(branch: Branch) -> None:
-    with pytest.raises(ph.InputError, match="an orbit is given"):
+    with refused("orbit"):
         ph.continuation(branch.orbit(0), "period", RANGE, period=SLOW)
 
 
@@ -276,30 +277,28 @@ def test_an_interrupted_search_hands_over_what_was_followed(hammer: "ph.Hammer")
 
 
 @pytest.mark.parametrize(
-    ("rates", "how", "words"),
+    ("rates", "how", "key"),
     [
-        ((2.0, 1.0), {}, "ascending"),
-        ((1.0,), {}, "the least and the largest"),
+        ((2.0, 1.0), {}, "rates"),
+        ((1.0,), {}, "rates"),
         (("1 kHz", "2 m"), {}, "rates"),
         ((1e3, 2e3), {"seeds": 0}, "seeds"),
         ((1e3, 2e3), {"doublings": -1}, "doublings"),
         ((1e3, 2e3), {"longest": 0}, "longest"),
     ],
 )
-def test_bad_regimes(
-    hammer: "ph.Hammer", rates: tuple[float, float], how: dict[str, int], words: str
-) -> None:
-    with pytest.raises(ph.InputError, match=words):
+def test_bad_regimes(hammer: "ph.Hammer", rates: tuple[float, float], how: dict[str, int], key: str) -> None:
+    with refused(key):
         ph.regimes(hammer, rates, **how)
 
 
 def test_bad_charts(branch: Branch) -> None:
     own = branch.regime.hammer.constants["backstop.damping"].si
-    with pytest.raises(ph.InputError, match="another constant"):
+    with refused("second"):
         ph.stability_chart(branch, "period", RANGE)
-    with pytest.raises(ph.InputError, match="around the hammer's own"):
+    with refused("bounds"):
         ph.stability_chart(branch, "backstop.damping", (2.0 * own, 3.0 * own))
-    with pytest.raises(ph.InputError, match="grid"):
+    with refused("grid"):
         ph.stability_chart(branch, "backstop.damping", (0.5 * own, 2.0 * own), grid=(-1, 1))
 
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import Lyapunov
-from printhammer.errors import InputError
 
 FORCE = ph.SineForce(0.3, 1.0 / (2.0 * math.pi), phase="90 deg")
 
@@ -33,9 +33,9 @@ def test_means_and_scatter_of_stretches(train: Lyapunov) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lengths", "said"),
-    [((), "ascending"), ((2, 1), "ascending"), ((0,), "lengths"), ((500,), "fewer than 10 stretches of 500")],
+    ("lengths", "key"),
+    [((), "lengths"), ((2, 1), "lengths"), ((0,), "lengths"), ((500,), "lengths")],
 )
-def test_what_is_refused(train: Lyapunov, lengths: tuple[int, ...], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_what_is_refused(train: Lyapunov, lengths: tuple[int, ...], key: str) -> None:
+    with refused(key):
         ph.finite_time(train, lengths=lengths)

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import Lyapunov, LyapunovChart, lyapunovs, strobes
@@ -61,7 +62,7 @@ def test_running_estimates_end_at_the_whole(found: Lyapunov) -> None:
     for count, mean in zip(counts, means, strict=True):
         np.testing.assert_allclose(mean, found.factors[begin : begin + count].mean(axis=0), rtol=1e-12)
     for wrong in ([0], [121], [math.nan]):
-        with pytest.raises(ph.InputError, match="counts"):
+        with refused("counts"):
             found.running(wrong)
 
 
@@ -167,28 +168,28 @@ def test_json_holds_what_is_infinite_or_not_known(found: Lyapunov, tmp_path: Pat
     columns = json.loads((tmp_path / "odd.json").read_text("utf-8"))["columns"]
     assert columns["exponents"]["values"] == [["-inf", "-inf"]]
     assert columns["dimension"]["values"] == [None]
-    with pytest.raises(ph.InputError, match=r"odd\.txt"):
+    with refused(None, file="odd.txt"):
         odd.save(tmp_path / "odd.txt")
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "key"),
     [
-        (ph.lyapunov, "period and rate"),
-        (lambda h: ph.lyapunov(h, period=1e-3, rate=1e3), "period and rate"),
-        (lambda h: ph.lyapunov(h, period=1e-3, drive=ph.SineForce(1.0, 100.0)), "drive is given"),
+        (ph.lyapunov, "period"),
+        (lambda h: ph.lyapunov(h, period=1e-3, rate=1e3), "period"),
+        (lambda h: ph.lyapunov(h, period=1e-3, drive=ph.SineForce(1.0, 100.0)), "drive"),
         (lambda h: ph.lyapunov(h, period="1 kg"), "period"),
         (lambda h: ph.lyapunov(h, period=1e-3, firings=0), "firings"),
         (lambda h: ph.lyapunov(h, period=1e-3, transient=-1), "transient"),
         (lambda h: ph.lyapunov(h, period=1e-3, tolerance=1.0, **FEW), "tolerance"),
         (lambda h: ph.lyapunov(h.replace("waveform", None), period=1e-3), "waveform"),
-        (lambda h: lyapunovs(h, []), "at least one"),
-        (lambda h: lyapunovs([h, h], [1e-3] * 3), "hammers: 2"),
-        (lambda h: LyapunovChart.of([]), "at least one"),
+        (lambda h: lyapunovs(h, []), "periods"),
+        (lambda h: lyapunovs([h, h], [1e-3] * 3), "hammers"),
+        (lambda h: LyapunovChart.of([]), "periods"),
     ],
 )
-def test_bad_input(hammer: "ph.Hammer", call: Callable[["ph.Hammer"], object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input(hammer: "ph.Hammer", call: Callable[["ph.Hammer"], object], key: str) -> None:
+    with refused(key):
         call(hammer)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import strobes
@@ -133,19 +134,19 @@ def test_points_of_trains(hammer: "ph.Hammer") -> None:
 def test_a_run_that_stopped_is_refused(hammer: "ph.Hammer") -> None:
     short = hammer.replace("magnet.range_max", "250 um")
     (points,) = strobes(short, ["1 ms"], points=20, verdict=False)
-    with pytest.raises(ph.InputError, match="range left"):
+    with refused("states"):
         recurrence(points)
 
 
 @pytest.mark.parametrize(
-    ("states", "options", "said"),
+    ("states", "options", "key"),
     [
-        ([1.0], {}, "1 are given"),
-        (np.zeros(MOST + 1), {}, str(MOST)),
-        (np.zeros((4, 2, 2)), {}, "shape"),
-        ([0.0, math.nan], {}, "finite"),
-        (["a", "b"], {}, "expected numbers"),
-        ([0.0, 1.0], {"threshold": 1.0, "rate": 0.1}, "one of them"),
+        ([1.0], {}, "states"),
+        (np.zeros(MOST + 1), {}, "states"),
+        (np.zeros((4, 2, 2)), {}, "states"),
+        ([0.0, math.nan], {}, "states"),
+        (["a", "b"], {}, "states"),
+        ([0.0, 1.0], {"threshold": 1.0, "rate": 0.1}, "threshold"),
         ([0.0, 1.0], {"threshold": -1.0}, "threshold"),
         ([0.0, 1.0], {"rate": 0.0}, "rate"),
         ([0.0, 1.0], {"rate": 1.5}, "rate"),
@@ -155,6 +156,6 @@ def test_a_run_that_stopped_is_refused(hammer: "ph.Hammer") -> None:
         ([0.0, 1.0], {"shortest": 0}, "shortest"),
     ],
 )
-def test_bad_input(states: object, options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input(states: object, options: dict[str, object], key: str) -> None:
+    with refused(key):
         recurrence(states, **options)

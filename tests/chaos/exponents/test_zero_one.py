@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import strobes
@@ -192,20 +193,20 @@ def test_a_run_that_stopped_is_undecided(hammer: "ph.Hammer") -> None:
 
 
 @pytest.mark.parametrize(
-    ("series", "options", "said"),
+    ("series", "options", "key"),
     [
-        (np.zeros(FEWEST - 1), {}, "at least 100"),
-        (np.zeros((FEWEST, 2)), {}, "shape"),
-        ([math.nan] * FEWEST, {}, "number 1 is nan"),
-        (["a"] * FEWEST, {}, "expected numbers"),
+        (np.zeros(FEWEST - 1), {}, "series"),
+        (np.zeros((FEWEST, 2)), {}, "series"),
+        ([math.nan] * FEWEST, {}, "series"),
+        (["a"] * FEWEST, {}, "series"),
         (np.zeros(FEWEST), {"resolution": -1.0}, "resolution"),
         (np.zeros(FEWEST), {"resolution": math.inf}, "resolution"),
         (np.zeros(FEWEST), {"angles": 0}, "angles"),
         (np.zeros(FEWEST), {"seed": -1}, "seed"),
     ],
 )
-def test_bad_input(series: object, options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input(series: object, options: dict[str, object], key: str) -> None:
+    with refused(key):
         zero_one(series, **options)
 
 

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos.impacts import autocorrelation, impact_train
@@ -68,18 +69,18 @@ def test_impacts_of_a_hammer(hammer: "ph.Hammer") -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "options", "said"),
+    ("times", "options", "key"),
     [
-        (np.arange(8.0), {}, "at least 9"),
-        (np.zeros(20), {}, "ascending"),
-        (np.full(20, math.nan), {}, "ascending"),
-        (np.zeros((20, 2)), {}, "at least"),
-        (["a"] * 20, {}, "expected times"),
+        (np.arange(8.0), {}, "touches"),
+        (np.zeros(20), {}, "touches"),
+        (np.full(20, math.nan), {}, "touches"),
+        (np.zeros((20, 2)), {}, "touches"),
+        (["a"] * 20, {}, "touches"),
         (np.arange(20.0), {"window": 0.0}, "window"),
         (np.arange(20.0), {"bins": 0}, "bins"),
         (np.arange(20.0), {"lags": 0}, "lags"),
     ],
 )
-def test_bad_input(times: object, options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input(times: object, options: dict[str, object], key: str) -> None:
+    with refused(key):
         impact_train(times, **options)

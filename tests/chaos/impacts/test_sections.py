@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import Section, sections
@@ -92,21 +93,21 @@ def test_a_dataset_holds_units_and_provenance(hammer: "ph.Hammer") -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "said"),
+    ("call", "key"),
     [
-        (ph.section, "period and rate"),
-        (lambda h: ph.section(h, period=1e-3, drive=ph.SineForce(1.0, 100.0)), "drive is given"),
-        (lambda h: ph.section(h, period=1e-3, surface="floor"), "floor"),
-        (lambda h: ph.section(h.replace("backstop", None), period=1e-3, state=(1e-4, 0.0)), "no backstop"),
+        (ph.section, "period"),
+        (lambda h: ph.section(h, period=1e-3, drive=ph.SineForce(1.0, 100.0)), "drive"),
+        (lambda h: ph.section(h, period=1e-3, surface="floor"), "surface"),
+        (lambda h: ph.section(h.replace("backstop", None), period=1e-3, state=(1e-4, 0.0)), "surface"),
         (lambda h: ph.section(h, period=1e-3, touches=0), "touches"),
         (lambda h: ph.section(h, period=1e-3, transient=-1), "transient"),
         (lambda h: ph.section(h, period=1e-3, firings=0), "firings"),
         (lambda h: ph.section(h, period=1e-3, transient=9_999_999), "firings"),
         (lambda h: ph.section(h, period=1e-3, tolerance=0.0), "tolerance"),
         (lambda h: ph.section(h.replace("waveform", None), period=1e-3), "waveform"),
-        (lambda h: sections([h, h], [1e-3] * 3), "hammers: 2"),
+        (lambda h: sections([h, h], [1e-3] * 3), "hammers"),
     ],
 )
-def test_bad_input(hammer: "ph.Hammer", call: Callable[["ph.Hammer"], object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input(hammer: "ph.Hammer", call: Callable[["ph.Hammer"], object], key: str) -> None:
+    with refused(key):
         call(hammer)

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 from tests.chaos import samples
+from tests.errors import refused
 from tests.hammers import CRUDE
 from tests.strobe_maps import strobe_map
 
@@ -239,7 +240,7 @@ def test_no_orbit_near_has_a_status(hammer: ph.Hammer) -> None:
     assert np.isnan(none.x).all()
     with pytest.raises(ValueError, match="in the pack"):
         none.motion()
-    with pytest.raises(ph.InputError, match="in the pack"):
+    with refused("orbit"):
         none.plot()
 
 
@@ -260,7 +261,7 @@ def test_files(found: Orbits, tmp_path: Path) -> None:
         assert chart.attrs["hammer_fingerprint"] == found.regime.hammer.fingerprint
     kept = json.loads(paths["json"].read_text("utf-8"))
     assert [KINDS[code] for code in kept["columns"]["kind"]["values"]] == [one.kind for one in found]
-    with pytest.raises(ph.InputError, match=r"orbits\.txt"):
+    with refused(None, file="orbits.txt"):
         found.save(tmp_path / "orbits.txt")
     one = found[0].to_dataset()
     assert one["x"].dims == ("firing",)
@@ -268,12 +269,12 @@ def test_files(found: Orbits, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({}, "period and rate"),
-        ({"period": 1e-3, "rate": 1e3}, "period and rate"),
+        ({}, "period"),
+        ({"period": 1e-3, "rate": 1e3}, "period"),
         ({"period": 1e-3, "longest": 0}, "longest"),
-        ({"period": 1e-3, "longest": 65}, "longest = 65, expected at most 64"),
+        ({"period": 1e-3, "longest": 65}, "longest"),
         ({"period": 1e-3, "longest": 1.5}, "longest"),
         ({"period": 1e-3, "starts": 0}, "starts"),
         ({"period": 1e-3, "guesses": "many"}, "guesses"),
@@ -281,16 +282,16 @@ def test_files(found: Orbits, tmp_path: Path) -> None:
         ({"period": 1e-3, "threads": 0}, "threads"),
     ],
 )
-def test_bad_input(hammer: ph.Hammer, options: dict, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input(hammer: ph.Hammer, options: dict, key: str) -> None:
+    with refused(key):
         ph.orbits(hammer, **options)
 
 
 def test_bad_input_of_one(hammer: ph.Hammer) -> None:
     regime = Regime.of(hammer, period=PERIOD)
-    with pytest.raises(ph.InputError, match="state"):
+    with refused("state"):
         orbit(regime, (1.0,))
-    with pytest.raises(ph.InputError, match="firings"):
+    with refused("firings"):
         orbit(regime, (1e-4, 0.0), firings=65)
-    with pytest.raises(ph.InputError, match="phase"):
+    with refused("phase"):
         orbit(regime, (1e-4, 0.0), phase=1.0)

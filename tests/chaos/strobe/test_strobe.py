@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.chaos import Strobe, strobes
@@ -207,10 +208,10 @@ def test_a_dataset_has_units_and_where_it_comes_from(hammer: "ph.Hammer", tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({}, "period and rate"),
-        ({"period": 1e-3, "rate": 1e3}, "period and rate"),
+        ({}, "period"),
+        ({"period": 1e-3, "rate": 1e3}, "period"),
         ({"period": -1e-3}, "period"),
         ({"period": "1 kg"}, "period"),
         ({"rate": 0.0}, "rate"),
@@ -224,24 +225,24 @@ def test_a_dataset_has_units_and_where_it_comes_from(hammer: "ph.Hammer", tmp_pa
         ({"drive": ph.SineForce(1.0, 1e3), "period": 1e-3}, "drive"),
     ],
 )
-def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=rf"^{said}[^\n]*$"):
+def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         ph.strobe(hammer, **options)
 
 
 def test_what_does_not_fit_together_is_refused(hammer: "ph.Hammer") -> None:
-    with pytest.raises(ph.InputError, match="has no waveform"):
+    with refused("waveform"):
         ph.strobe(hammer.replace("waveform", None), period=1e-3)
     for pulses in (1, 3):
-        with pytest.raises(ph.InputError, match="expected an endless force"):
+        with refused("drive"):
             ph.strobe(hammer, drive=ph.PulseTrain(hammer.waveform, period=1e-3, pulses=pulses))
-    with pytest.raises(ph.InputError, match=r"^hammers: 2 are given, expected 1 or 3"):
+    with refused("hammers"):
         strobes([hammer, hammer], [1e-3, 1.1e-3, 1.2e-3])
-    with pytest.raises(ph.InputError, match=r"^periods"):
+    with refused("periods"):
         strobes(hammer)
-    with pytest.raises(ph.InputError, match=r"^periods"):
+    with refused("periods"):
         strobes(hammer, [])
-    with pytest.raises(ph.InputError, match=r"^firings"):
+    with refused("firings"):
         strobes(hammer, [1e-3], firings=(5, 5))
 
 

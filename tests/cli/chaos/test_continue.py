@@ -104,8 +104,8 @@ def test_a_chart(cli: Callable, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ((), "--from is missing"),
-        (("--from", "1 ms"), "--to is missing"),
+        ((), "--from"),
+        (("--from", "1 ms"), "--to"),
         (("--from", "700 Hz", "--to", "800 Hz"), "--period and --rate"),
         (
             ("--from", "700 Hz", "--to", "800 Hz", "--period", "1 ms", "--rate", "1 kHz"),
@@ -115,12 +115,12 @@ def test_a_chart(cli: Callable, tmp_path: Path) -> None:
         (("--from", "1 ms", "--to", "2 ms", "--regimes", "--parameter", "period"), "--parameter"),
         (("--from", "800 Hz", "--to", "700 Hz", "--rate", "750 Hz"), "ascending"),
         (("--from", "700 Hz", "--to", "800 Hz", "--rate", "2 kHz"), "within the bounds"),
-        (("--from", "1", "--to", "2", "--rate", "1 kHz", "--parameter", "nothing"), "'nothing' is not known"),
+        (("--from", "1", "--to", "2", "--rate", "1 kHz", "--parameter", "nothing"), "'nothing'"),
         ((*SLOW, "--state", "1 um"), "--state"),
         ((*SLOW, "--state", "1 um, 1 um"), "--state"),
         ((*SLOW, "--doublings", "-1"), "doublings"),
-        ((*SLOW, "--second", "mass"), "--second-from is missing"),
-        ((*SLOW, "--second", "mass", "--second-from", "1 g"), "--second-to is missing"),
+        ((*SLOW, "--second", "mass"), "--second-from"),
+        ((*SLOW, "--second", "mass", "--second-from", "1 g"), "--second-to"),
         ((*SLOW, "--second", "mass", "--out", "chart.txt"), "--out chart.txt"),
         ((*SLOW, "--show", "nothing", "--out", "branch.png"), "--show = 'nothing'"),
     ],

@@ -27,7 +27,7 @@ def test_from_a_hammer_over_its_current_back_to_a_hammer(
     assert fitted.uncertainty is not None
     assert fitted.uncertainty.error("coil.inductance") < 1e-5
     for options, said in (
-        ((), "the hammer is missing, expected --hammer"),
+        ((), "the hammer"),
         (("--hammer", "guess.toml", "--also", "magnet.saturation_flux"), "magnet.saturation_flux"),
         (("--hammer", "guess.toml", "--locked", "2 V"), "--locked"),
     ):

@@ -91,7 +91,7 @@ def test_a_run_that_stops_is_told(cli: Callable, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("Hi",), "--rate is missing"),
+        (("Hi",), "--rate"),
         (("Hi", "--rate", "0 Hz"), "--rate = '0 Hz'"),
         (("Hi", "--rate", "fast"), "--rate"),
         (("Hi", "--rate", "1 ms"), "--rate"),

@@ -62,7 +62,7 @@ def test_what_is_gained_and_lost(cli: Callable, quick: Path, tmp_path: Path) -> 
         ("--rate 1kHz --rates '1 kHz, 2 kHz, 3'", "expected one of them"),
         ("--rates '1 kHz, 2 kHz'", "expected two rates and a number"),
         ("--rates '2 kHz, 1 kHz, 3'", "expected the lower rate first"),
-        ("--rate 1kHz --history 9", "history = 9, expected a whole number from 1 to 4"),
+        ("--rate 1kHz --history 9", "history = 9"),
         ("--rate 1kHz --reach 0", "reach"),
         ("--rate 1kHz --largest-current 0.1A", "the waveform peaks at"),
         ("--along 'gap 0 um, 10 um, 2'", "expected one rate"),

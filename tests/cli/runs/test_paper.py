@@ -67,7 +67,7 @@ def test_corrupt_results_end_with_status_2(cli, tmp_path: Path, monkeypatch: pyt
     outcome = cli("paper", "--out", tmp_path / "paper")
     assert outcome.status == 2
     assert outcome.err.startswith("printhammer: ")
-    assert "base_rates.json: format = 2: expected 1" in outcome.err
+    assert "base_rates.json: format = 2" in outcome.err
     assert not (tmp_path / "paper").exists()
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.duty import FEEDS, DotHeat, ThermalCoil, dot_heat, steady, time_to
@@ -130,14 +131,14 @@ def test_what_is_no_coil_is_refused(wrong: dict[str, object], said: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("ambient", "rate", "said"),
+    ("ambient", "rate", "key"),
     [
-        ([25.0, 50.0], [700.0, 1127.0], "to fall as the ambient temperature rises"),
-        ([25.0, 25.0], [700.0, 690.0], "two ambient temperatures or more"),
-        ([25.0], [700.0, 690.0], "1 ambient temperatures, 2 rates and 1 voltages, expected as many"),
-        ([25.0, 50.0], [700.0, 0.0], "rate = 0.0 is expected to be greater than 0 Hz"),
+        ([25.0, 50.0], [700.0, 1127.0], "rates"),
+        ([25.0, 25.0], [700.0, 690.0], "rates"),
+        ([25.0], [700.0, 690.0], "rates"),
+        ([25.0, 50.0], [700.0, 0.0], "rate"),
     ],
 )
-def test_rates_without_a_limit_are_refused(ambient: list[float], rate: list[float], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_rates_without_a_limit_are_refused(ambient: list[float], rate: list[float], key: str) -> None:
+    with refused(key):
         ph.thermal_limit(ambient, rate)

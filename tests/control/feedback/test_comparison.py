@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from tests import hammers
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.cli.main import main
@@ -159,7 +160,7 @@ def test_the_comparison(controller: Controller, monkeypatch: pytest.MonkeyPatch,
     found.save(tmp_path / "found.nc")
     with xr.open_dataset(tmp_path / "found.nc", engine="scipy") as read:
         assert np.array_equal(read["arrival"].values, found.arrival, equal_nan=True)
-    with pytest.raises(ph.InputError, match=r"ends in one of \.nc"):
+    with refused(None, file="found.txt"):
         found.save(tmp_path / "found.txt")
     again = read_drive(found.run.motion.drive.to_toml())
     assert again == found.run.motion.drive
@@ -236,13 +237,13 @@ def test_feedback_drives_a_page_and_a_report(
 
 def test_hammers_that_cannot_be_driven_are_refused() -> None:
     bare = hammers.made_of(spring=hammers.preload(-4.0), pack=hammers.power())
-    with pytest.raises(ph.InputError, match="waveform"):
+    with refused("waveform"):
         ph.feedback(bare, 1e3)
 
 
 @pytest.mark.parametrize("gaps", [[], [0.0], [-1e-3, 1e-3], [float("nan")], [[1e-3]]])
 def test_bad_gaps_are_refused(gaps: list[float]) -> None:
-    with pytest.raises(ph.InputError, match="gaps"):
+    with refused("gaps"):
         ph.feedback(hammers.crude(), 1e3, gaps=gaps)
 
 

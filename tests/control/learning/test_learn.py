@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
@@ -183,7 +184,7 @@ def test_the_table_is_for_its_unit_only(tmp_path: Path) -> None:
         assert (table.serial, table.driver) == ("A17", "switch")
         assert table.to_csv() == result.table.to_csv()
         for serial in (None, "B2"):
-            with pytest.raises(ph.InputError, match="learned on unit 'A17'"):
+            with refused("unit"):
                 table.strategy(nominal(), serial=serial)
         for serial in ("A17", "any"):
             drive = table.strategy(nominal(), serial=serial)(nominal(), [(0, 1, 3)], RATE)[0]
@@ -206,19 +207,19 @@ def test_another_driver_prints_the_same_dot_at_the_same_time(driver: str) -> Non
 
 def test_bad_arguments_are_refused() -> None:
     hammer = nominal()
-    for options, sentence in (
-        ({"driver": "bellows"}, "driver = 'bellows', expected own, switch or bridge"),
-        ({"members": 3}, "members = 3, expected 100 to 5000"),
-        ({"forgetting": 0.0}, "forgetting = 0.0, expected a number above 0 and below 1"),
-        ({"doubt": -0.1}, "doubt = -0.1, expected a number from 0 to 1"),
-        ({"serial": ""}, "serial = '', expected a text"),
+    for options, key in (
+        ({"driver": "bellows"}, "driver"),
+        ({"members": 3}, "members"),
+        ({"forgetting": 0.0}, "forgetting"),
+        ({"doubt": -0.1}, "doubt"),
+        ({"serial": ""}, "serial"),
         ({"rate": "-3 Hz"}, "rate"),
     ):
-        with pytest.raises(ph.InputError, match=sentence):
+        with refused(key):
             ph.learn(hammer, **{"rate": RATE, **options})  # type: ignore[arg-type]
-    with pytest.raises(ph.InputError, match="no width of the pulse makes a dot of"):
+    with refused("width"):
         driven_by(hammer, "switch", 0.2)
-    with pytest.raises(ph.InputError, match="expected a current"):
+    with refused("waveform"):
         driven_by(
             crude().replace("waveform", {"shape": "half-sine", "amplitude": "9 N", "width": 3e-4}),
             "switch",

@@ -12,6 +12,7 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from tests import hammers
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.least_work import search
@@ -92,7 +93,7 @@ def test_supply_scales_the_current(burst: LeastWork) -> None:
     assert found.status.tolist() == ["ok", "ok"]
     assert found.weakest[1] == pytest.approx(burst.forces.min(), rel=1e-6)
     assert found.weakest[0] < found.weakest[1]
-    with pytest.raises(ph.InputError, match="above -1"):
+    with refused("changes"):
         burst.under_supply([-1.0])
 
 
@@ -108,7 +109,7 @@ def test_files(burst: LeastWork, tmp_path: Path) -> None:
     assert table["current [A]"].tolist() == burst.nodes[1]
     record = Sampled(file=str(tmp_path / "current.csv"), interpolation="linear")
     assert record.times == pytest.approx(np.array(burst.nodes[0]), rel=1e-12, abs=1e-18)
-    with pytest.raises(ph.InputError, match="ends in one of"):
+    with refused(None, file="burst.txt"):
         burst.save(tmp_path / "burst.txt")
 
 
@@ -135,31 +136,31 @@ def test_no_current_found_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
-        ({"rate": 0.0}, "rate = 0.0"),
+        ({"rate": 0.0}, "rate"),
         ({"rate": "3 mm"}, "rate"),
-        ({"dots": 0}, "dots = 0"),
-        ({"dots": 1001}, "at most 1000"),
-        ({"force": -1.0}, "force = -1.0"),
-        ({"force": 2.5}, "force = 2.5"),
+        ({"dots": 0}, "dots"),
+        ({"dots": 1001}, "dots"),
+        ({"force": -1.0}, "force"),
+        ({"force": 2.5}, "force"),
         ({"largest": "0 A"}, "largest"),
-        ({"slew": -3.0}, "slew = -3.0"),
+        ({"slew": -3.0}, "slew"),
         ({"spacing": "0 us"}, "spacing"),
-        ({"least": "noise"}, "least = 'noise'"),
-        ({"shape": "round"}, "shape = 'round'"),
+        ({"least": "noise"}, "least"),
+        ({"shape": "round"}, "shape"),
     ],
 )
-def test_bad_input_is_one_sentence(options: dict[str, Any], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_input_is_one_sentence(options: dict[str, Any], key: str) -> None:
+    with refused(key):
         ph.least_work(hammers.crude(), **options)
 
 
 def test_hammers_that_cannot_swing_are_refused() -> None:
-    with pytest.raises(ph.InputError, match="no magnet"):
+    with refused("magnet"):
         ph.least_work(hammers.shelf())
     jump = Rectangle(amplitude=2.0, width=3e-4, rise=0.0, decay=0.0)
-    with pytest.raises(ph.InputError, match="jumps"):
+    with refused("waveform"):
         ph.least_work(hammers.crude().replace("waveform", jump))
 
 
@@ -251,7 +252,7 @@ def test_works_against_the_rate(monkeypatch: pytest.MonkeyPatch, unsearched: Non
     figure = found.plot()
     assert np.asarray(figure.axes[0].lines[0].get_ydata())[0] == alone.positive_ratio
     for wrong in ([], "400 Hz"):
-        with pytest.raises(ph.InputError, match="at least one rate"):
+        with refused("rates"):
             least_work_rates(hammers.crude(), wrong)
 
 
@@ -263,7 +264,7 @@ def test_pulses_of_the_hammer_swing_too() -> None:
     assert {type(waveform) for waveform in found.drive.waveforms} == {type(found.hammer.waveform)}
     assert 1.0 <= found.net_ratio < 1.1
     assert found.positive_ratio >= found.bound_ratio
-    with pytest.raises(ph.InputError, match="no nodes"):
+    with refused("shape", "pulses"):
         _ = found.nodes
 
 
@@ -297,9 +298,9 @@ def test_pulses_without_a_width_are_refused(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(Group, "fits_lanes", lambda _group: False)
     record = Sampled.from_samples([0.0, 1e-4, 3e-4, 4e-4], [0.0, 2.0, 2.0, 0.0])
     task: Any = SimpleNamespace(hammer=hammers.crude(), largest=2.0)
-    with pytest.raises(ph.InputError, match="no width to be sought"):
+    with refused("waveform"):
         PulsePlan(task, record, 1e-3, 1e-4, 1e-3, 1e-3, 5e-5)
-    with pytest.raises(ph.InputError, match="no width keeps"):
+    with refused("width"):
         ph.least_work(
             hammers.crude().replace("waveform", HalfSine(amplitude=4.0, width=4e-4)), shape="pulses"
         )

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.impact_estimator import ImpactEstimator, Sampling
@@ -88,9 +89,9 @@ def test_the_study_is_a_sensor_with_an_offset_of_each_unit(wire: ph.Hammer) -> N
     plain = ph.ImpactSensor(noise=sensor.noise, seed=3)
     shown = sensor.read(flights, forces, 0, 0).time - plain.read(flights, forces, 0, 0).time
     np.testing.assert_allclose(shown, shown[0], atol=1e-15)
-    with pytest.raises(ph.InputError, match="2 ways to sample were studied, expected one"):
+    with refused("index"):
         ph.impact_time(wire, noise=["5 mA", "9 mA"], dots=2, units=2).sensor()
-    with pytest.raises(ph.InputError, match=r"offset = -1\.0"):
+    with refused("offset"):
         ph.ImpactSensor(offset=-1.0)
 
 
@@ -100,31 +101,29 @@ def test_few_bits_are_as_bad_as_noise(wire: ph.Hammer) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "key"),
     [
-        ({"signal": "voltage"}, "the voltage shows no impact, since the supply or a diode holds it"),
-        ({"noise": ["2 A"]}, "the impact changes the current by .* expected less noise than 2 A"),
-        ({"noise": ["-1 mA"]}, "noise = -0.001 is expected to be a number not below 0"),
-        ({"sampling_rate": ["20 kHz"]}, "samples fall on the contact"),
-        ({"bits": [0]}, "bits = 0"),
-        ({"bits": [30]}, "bits = 30, expected a whole number from 1 to 24"),
-        ({"dots": 1}, "dots = 1 and units = 20"),
-        ({"signal": "charge"}, "signal = 'charge', expected current or voltage"),
+        ({"signal": "voltage"}, "signal"),
+        ({"noise": ["2 A"]}, "signal"),
+        ({"noise": ["-1 mA"]}, "noise"),
+        ({"sampling_rate": ["20 kHz"]}, "sampling_rate"),
+        ({"bits": [0]}, "bits"),
+        ({"bits": [30]}, "bits"),
+        ({"dots": 1}, "dots"),
+        ({"signal": "charge"}, "signal"),
     ],
 )
-def test_what_cannot_be_used(wire: ph.Hammer, wrong: dict[str, Any], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_what_cannot_be_used(wire: ph.Hammer, wrong: dict[str, Any], key: str) -> None:
+    with refused(key):
         ph.impact_time(wire, **wrong)
 
 
 def test_a_pulse_that_is_over_before_the_impact_says_so(permanent: ph.Hammer) -> None:
     fast = permanent.replace({"waveform.decay": "zener", "waveform.decay_voltage": 300.0})
-    with pytest.raises(
-        ph.InputError, match=r"the current shows no impact, since 0 mA of 1.98e\+03 mA are left"
-    ):
+    with refused("signal"):
         ph.impact_time(fast)
 
 
 def test_a_current_without_a_circuit_tells_nothing() -> None:
-    with pytest.raises(ph.InputError, match="the waveform is a current, expected the voltage of a driver"):
+    with refused("waveform"):
         ph.impact_time(ph.load("hendriks-1983"))

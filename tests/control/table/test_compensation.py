@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from tests.control.table.by_hand import by_hand
+from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
@@ -37,57 +38,56 @@ def test_where_one_rate_brakes_and_the_other_does_not_the_nearer_one_holds() -> 
 
 @pytest.mark.parametrize("rate", [799.0, 1001.0])
 def test_rates_beyond_the_table(rate: float) -> None:
-    with pytest.raises(ph.InputError, match="is made for 800 Hz to 1000 Hz"):
+    with refused("rate"):
         by_hand().at(rate)
 
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, "0 Hz", float("nan")])
 def test_no_rates(rate: float | str) -> None:
-    with pytest.raises(ph.InputError, match="rate = "):
+    with refused("rate"):
         by_hand().at(rate)
 
 
 def test_another_hammer_is_refused_in_one_sentence() -> None:
     other = crude().replace("mass", 1.01 * crude().mass)
-    with pytest.raises(ph.InputError, match="made for another hammer") as told:
+    with refused("hammer"):
         by_hand().drive(other, (0, 1), 900.0)
-    assert "\n" not in str(told.value)
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "sentence"),
+    ("name", "value", "key"),
     [
-        ("width", 0.0, "width = 0.0 s, expected a positive number"),
-        ("width", np.nan, "width = nan s, expected a number"),
-        ("advance", np.inf, "advance = inf s, expected a number"),
-        ("brake_width", -1e-6, "brake_width = -1e-06 s, expected a number not below 0"),
-        ("advance", 0.9e-3, "expected a firing after its pulses have ended"),
+        ("width", 0.0, "width"),
+        ("width", np.nan, "width"),
+        ("advance", np.inf, "advance"),
+        ("brake_width", -1e-6, "brake_width"),
+        ("advance", 0.9e-3, "advance"),
     ],
 )
-def test_entries_that_cannot_be_fired(name: str, value: float, sentence: str) -> None:
+def test_entries_that_cannot_be_fired(name: str, value: float, key: str) -> None:
     values = getattr(by_hand(), name).copy()
     values[1, 3] = value
-    with pytest.raises(ph.InputError, match=sentence):
+    with refused(key):
         by_hand(**{name: values})
 
 
 def test_a_brake_pulse_that_begins_too_early() -> None:
     brake, delay = by_hand().brake_width.copy(), by_hand().brake_delay.copy()
     brake[0, 3], delay[0, 3] = 20e-6, 100e-6
-    with pytest.raises(ph.InputError, match="expected a brake pulse after that of the dot before"):
+    with refused("brake_delay"):
         by_hand(brake_width=brake, brake_delay=delay)
 
 
 @pytest.mark.parametrize(
-    ("rates", "sentence"), [([1000.0, 800.0], "ascending"), ([0.0, 800.0], "positive"), ([], "at least one")]
+    ("rates", "key"), [([1000.0, 800.0], "rates"), ([0.0, 800.0], "rates"), ([], "rates")]
 )
-def test_rates_that_make_no_table(rates: list[float], sentence: str) -> None:
-    with pytest.raises(ph.InputError, match=f"rates: .*{sentence}"):
+def test_rates_that_make_no_table(rates: list[float], key: str) -> None:
+    with refused(key):
         by_hand(rates=np.array(rates))
 
 
 def test_arrays_of_another_shape() -> None:
-    with pytest.raises(ph.InputError, match=r"width: an array of shape \(2, 4\), expected \(2, 9\)"):
+    with refused("width"):
         by_hand(width=by_hand().width[:, :4])
 
 
@@ -121,7 +121,7 @@ def test_a_brake_pulse_comes_after_the_slot_of_the_dot_before() -> None:
 def test_pulses_above_the_largest_current_are_refused() -> None:
     hammer = crude()
     assert hammer.waveform is not None
-    with pytest.raises(ph.InputError, match=r"the waveform peaks at .* A, expected at most 0\.5 A"):
+    with refused("waveform"):
         by_hand(largest_current=0.5).strategy(hammer)
 
 
@@ -145,7 +145,7 @@ def test_fading_is_that_of_the_decay() -> None:
 
 def test_hammers_that_no_table_is_for() -> None:
     bare = ph.Hammer.build(crude().mass)
-    with pytest.raises(ph.InputError, match=r"no \[waveform\]"):
+    with refused("waveform"):
         ph.tune(bare)
-    with pytest.raises(ph.InputError, match="the waveform peaks at"):
+    with refused("waveform"):
         ph.tune(crude(), largest_current="0.5 A")

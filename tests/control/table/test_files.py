@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.control.table.by_hand import by_hand
+from tests.errors import refused
 
-import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable, load_table
 from printhammer.control.table.drive import COLUMNS, histories, number_of
 from printhammer.control.table.formats import read_table
@@ -56,104 +56,104 @@ def test_read_back_to_the_last_bit(gaps: int, reach: int, late: float, form: Any
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "sentence"),
+    ("before", "after", "key"),
     [
         (
             "# printhammer compensation table, format 1",
             "# format 7",
-            "first line = .*expected '# printhammer",
+            "first, value=line",
         ),
-        ("# gaps = 2", "# gaps = 9", "history = 9, expected a whole number from 1 to 4"),
-        ("# gaps = 2", "# gapes = 2", "'gapes' is not known"),
-        ("# reach = 2", "# reach = two", "reach = 'two': expected a text or a number"),
-        ("# reach = 2", '# reach = "2"', "reach = '2', expected a whole number"),
-        ("# reach = 2\n", "", "reach is missing"),
-        ("# reach = 2", "# reach = 2\n# reach = 2", "reach is given twice"),
-        ("largest_current = 2.0", "largest_current = -1", "largest_current = -1 A, expected a positive"),
-        ("rate [Hz],gap 1", "rate [kHz],gap 1", "columns = .*expected rate \\[Hz\\]"),
-        ("800.0,rest,rest", "-800.0,rest,rest", "row 1: rate = -800.0 Hz, expected a positive number"),
-        ("800.0,rest,rest", "fast,rest,rest", "row 1: rate = 'fast', expected a number"),
-        ("800.0,1,rest", "800.0,7,rest", "row 2: gap = '7', expected 'rest' or a whole number from 1 to 2"),
-        ("800.0,1,rest", "800.0,rest,1", "row 2: gaps = rest-1, expected only rest after a rest"),
-        ("800.0,1,rest", "800.0,rest,rest", "row 2: the history rest-rest is given twice"),
-        ("800.0,1,rest,", "800.0,1,rest,1.0,", "row 2: 9 cells, expected 8"),
+        ("# gaps = 2", "# gaps = 9", "history"),
+        ("# gaps = 2", "# gapes = 2", "gapes"),
+        ("# reach = 2", "# reach = two", "reach"),
+        ("# reach = 2", '# reach = "2"', "reach"),
+        ("# reach = 2\n", "", "reach"),
+        ("# reach = 2", "# reach = 2\n# reach = 2", "reach"),
+        ("largest_current = 2.0", "largest_current = -1", "largest_current"),
+        ("rate [Hz],gap 1", "rate [kHz],gap 1", "columns"),
+        ("800.0,rest,rest", "-800.0,rest,rest", "rate"),
+        ("800.0,rest,rest", "fast,rest,rest", "rate"),
+        ("800.0,1,rest", "800.0,7,rest", "row 2: gap"),
+        ("800.0,1,rest", "800.0,rest,1", "row 2: gaps"),
+        ("800.0,1,rest", "800.0,rest,rest", "history"),
+        ("800.0,1,rest,", "800.0,1,rest,1.0,", "row"),
     ],
 )
-def test_bad_csv(before: str, after: str, sentence: str) -> None:
+def test_bad_csv(before: str, after: str, key: str) -> None:
     text = by_hand().to_csv()
     assert before in text
-    with pytest.raises(ph.InputError, match=f"^{sentence}"):
+    with refused(key):
         read_table(text.replace(before, after, 1), ".csv")
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "sentence"),
+    ("key", "value", "wrong_key"),
     [
-        ("hammer", 5, "hammer = 5, expected a text"),
-        ("reach", None, "reach = None, expected a whole number"),
-        ("columns", {}, "columns: rate is missing"),
-        ("columns", 3, "columns = 3, expected the arrays of a table"),
+        ("hammer", 5, "hammer"),
+        ("reach", None, "reach"),
+        ("columns", {}, "rate"),
+        ("columns", 3, "columns"),
     ],
 )
-def test_bad_json_of_a_result(key: str, value: object, sentence: str, tmp_path: Path) -> None:
+def test_bad_json_of_a_result(key: str, value: object, wrong_key: str, tmp_path: Path) -> None:
     path = tmp_path / "table.json"
     by_hand().save(path)
     path.write_text(json.dumps({**json.loads(path.read_text()), key: value}))
-    with pytest.raises(ph.InputError, match=sentence):
+    with refused(wrong_key):
         load_table(path)
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "sentence"),
+    ("name", "value", "key"),
     [
-        ("width", 3, "columns: width = 3, expected an array"),
-        ("width", {"values": [[1.0]]}, "columns: width: expected 2 rows of 7 numbers"),
-        ("width", {"values": [["wide"] * 7, [1.0] * 7]}, "entry 1: width = 'wide', expected a number"),
-        ("history", {"values": ["rest-1"] * 7}, "only rest after a rest"),
-        ("surprise", {"values": []}, "'surprise' is not known"),
+        ("width", 3, "width"),
+        ("width", {"values": [[1.0]]}, "columns"),
+        ("width", {"values": [["wide"] * 7, [1.0] * 7]}, "width"),
+        ("history", {"values": ["rest-1"] * 7}, "row 1: gaps"),
+        ("surprise", {"values": []}, "surprise"),
     ],
 )
-def test_bad_arrays_in_json(name: str, value: object, sentence: str, tmp_path: Path) -> None:
+def test_bad_arrays_in_json(name: str, value: object, key: str, tmp_path: Path) -> None:
     path = tmp_path / "table.json"
     by_hand().save(path)
     data = json.loads(path.read_text())
     data["columns"][name] = value
     path.write_text(json.dumps(data))
-    with pytest.raises(ph.InputError, match=sentence):
+    with refused(key):
         load_table(path)
 
 
 def test_a_missing_row() -> None:
     lines = by_hand().to_csv().splitlines(keepends=True)
     (row,) = (line for line in lines if line.startswith("800.0,1,1,"))
-    with pytest.raises(ph.InputError, match="the history 1-1 at 800 Hz is missing"):
+    with refused("history"):
         read_table("".join(line for line in lines if line != row), ".csv")
 
 
 def test_a_table_without_rows() -> None:
     lines = by_hand().to_csv().splitlines(keepends=True)
-    with pytest.raises(ph.InputError, match="the table has no rows"):
+    with refused("rows"):
         read_table("".join(line for line in lines if not line[0].isdigit()), ".csv")
 
 
-@pytest.mark.parametrize("text", ["{", "[]", "null"])
-def test_no_json_table(text: str) -> None:
-    with pytest.raises(ph.InputError, match="expected"):
+@pytest.mark.parametrize(("text", "key"), [("{", "table"), ("[]", "columns"), ("null", "columns")])
+def test_no_json_table(text: str, key: str) -> None:
+    with refused(key):
         read_table(text, ".json")
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match=r"ends in \.csv or \.json"):
+    with refused(None, file="table.h"):
         load_table(tmp_path / "table.h")
-    with pytest.raises(ph.InputError, match="cannot be read"):
+    with refused(None, file="table.csv"):
         load_table(tmp_path / "table.csv")
     (tmp_path / "table.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ph.InputError, match="UTF-8"):
+    with refused(None, file="table.csv"):
         load_table(tmp_path / "table.csv")
 
 
 def test_a_name_that_is_no_table(tmp_path: Path) -> None:
-    with pytest.raises(ph.InputError, match=r"expected a name that ends in one of \.csv, \.json, \.h, \.nc"):
+    with refused(None, file="table.txt"):
         by_hand().save(tmp_path / "table.txt")
 
 

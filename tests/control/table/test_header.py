@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.control.table.by_hand import by_hand
+from tests.errors import refused
 
-import printhammer as ph
 from printhammer.control.table.drive import COLUMNS
 
 TICKS = ("1 ns", "1 us", "5 us")
@@ -61,10 +61,8 @@ def test_short_times_take_half_the_bytes() -> None:
 def test_a_budget_and_a_tick_are_kept_to() -> None:
     table = by_hand()
     assert table.to_header("1 us", budget=table.size("1 us"))
-    with pytest.raises(
-        ph.InputError, match=r"budget = 10 bytes: the table takes \d+, expected a larger budget"
-    ):
+    with refused("budget"):
         table.to_header("1 us", budget=10)
     for tick in ("0.5 ns", 1.5e-9, "-1 us"):
-        with pytest.raises(ph.InputError, match="tick = "):
+        with refused("tick"):
             table.size(tick)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.pulses import of_width
@@ -35,7 +36,7 @@ def test_the_bound_is_one_of_the_current_in_the_coil(hammer: ph.Hammer) -> None:
     pulse, widest = print_pulse(hammer, 2.0)
     motion = ph.simulate(hammer, ph.PulseTrain(of_width(pulse, widest)), duration=1e-3, points=4001)
     assert motion.current.max() == pytest.approx(1.998, abs=1e-3)
-    with pytest.raises(ph.InputError, match=r"the waveform peaks at 1\.983 A, expected at most 1\.5 A"):
+    with refused("waveform"):
         ph.tune(hammer, rate=RATE, largest_current=1.5)
 
 
@@ -57,5 +58,5 @@ def test_a_chain_of_drivers_is_one_output_stage(hammer: ph.Hammer) -> None:
     parts = Chain(parts=((0.0, rail), (1e-4, rail)))
     both = [ph.simulate(hammer, drive, duration=5e-4, points=51) for drive in (train, ph.PulseTrain(parts))]
     np.testing.assert_allclose(both[0].current, both[1].current, atol=1e-9)
-    with pytest.raises(ph.InputError, match=r"expected a time not before parts\[0\] is over"):
+    with refused("parts[1]"):
         Chain(parts=((0.0, rail), (9e-5, rail)))

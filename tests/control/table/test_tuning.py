@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
@@ -82,26 +83,26 @@ def test_the_current_keeps_to_its_bound_also_with_brake_pulses() -> None:
 
 
 def test_a_rate_at_which_nothing_prints() -> None:
-    with pytest.raises(ph.InputError, match="rate = 6000 Hz: no pulse prints every dot"):
+    with refused("rate"):
         ph.tune(quick(), rate="6 kHz", history=1)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
+    ("arguments", "key"),
     [
-        ({"rate": 0.0}, "rate = "),
+        ({"rate": 0.0}, "rate"),
         ({"rate": "1 mm"}, "rate"),
-        ({"rate": 800.0, "rates": [900.0]}, "expected one of them"),
-        ({"rates": []}, "expected a list of rates"),
-        ({"rates": "800 Hz"}, "expected a list of rates"),
-        ({"rates": [900.0, 800.0]}, "ascending"),
-        ({"rate": 800.0, "history": 5}, "history = 5, expected a whole number from 1 to 4"),
+        ({"rate": 800.0, "rates": [900.0]}, "rates"),
+        ({"rates": []}, "rates"),
+        ({"rates": "800 Hz"}, "rates"),
+        ({"rates": [900.0, 800.0]}, "rates"),
+        ({"rate": 800.0, "history": 5}, "history"),
         ({"rate": 800.0, "reach": 0}, "reach"),
         ({"rate": 800.0, "largest_current": 0.0}, "largest_current"),
     ],
 )
-def test_bad_arguments(arguments: dict[str, object], sentence: str) -> None:
-    with pytest.raises(ph.InputError, match=sentence):
+def test_bad_arguments(arguments: dict[str, object], key: str) -> None:
+    with refused(key):
         ph.tune(quick(), **arguments)  # type: ignore[arg-type]
 
 
@@ -131,7 +132,7 @@ def test_what_is_judged_by_default(table: CompensationTable) -> None:
 
 
 def test_a_report_of_nothing(table: CompensationTable) -> None:
-    with pytest.raises(ph.InputError, match="expected at least one"):
+    with refused("rates"):
         ph.judge_table(quick(), table, perturbations=())
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
@@ -107,26 +108,26 @@ def test_a_paper_file_has_units(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "key"),
     [
         ('front = "3 s"', "front"),
-        ("front = -1e-6", "front = -1e-06 is expected to be a number not below 0"),
-        ('stiffness = "50 %"', "stiffness = 0.5 is expected .* below 1/3"),
-        ("seed = 1.5", "seed = 1.5 is expected to be a whole number"),
-        ("moisture = 3", "moisture is not known, expected stiffness, front, length, seed"),
-        ("front = ", "expected TOML"),
+        ("front = -1e-6", "front"),
+        ('stiffness = "50 %"', "stiffness"),
+        ("seed = 1.5", "seed"),
+        ("moisture = 3", "moisture"),
+        ("front = ", None),
     ],
 )
-def test_a_bad_paper_file_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+def test_a_bad_paper_file_is_refused(tmp_path: Path, text: str, key: str | None) -> None:
     path = tmp_path / "paper.toml"
     path.write_text(text)
-    with pytest.raises(ph.InputError, match=rf"paper\.toml.*{sentence}"):
+    with refused(key):
         ph.Paper.load(path)
 
 
 def test_hammers_on_which_paper_cannot_vary_are_refused() -> None:
-    with pytest.raises(ph.InputError, match=r"expected a hammer with pack\.stiffness"):
+    with refused("pack.stiffness"):
         ph.Paper().hammers(crude().replace("pack", None), 3, PITCH)
     drive = ph.PulseTrain(crude().waveform, rate=900.0, pulses=3)
-    with pytest.raises(ph.InputError, match="2 hammers, expected one for each of 3 firings"):
+    with refused("hammers"):
         simulate_pieces([crude()] * 2, drive, 5e-3, 1e-9)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
-import printhammer as ph
 from printhammer.printing.dots.judging import Limits, limits_named
 from printhammer.printing.dots.strategy import (
     LEAD_IN,
@@ -59,19 +59,18 @@ def test_slots_are_a_period_apart() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "key"),
     [
-        (lambda: de_bruijn(0), "order = 0"),
-        (lambda: de_bruijn(17), "order = 17"),
-        (lambda: Limits(force=-0.1), "force = -0.1"),
-        (lambda: Limits(arrival=float("nan")), "arrival = nan"),
-        (lambda: limits_named("letter"), "'letter'"),
+        (lambda: de_bruijn(0), "order"),
+        (lambda: de_bruijn(17), "order"),
+        (lambda: Limits(force=-0.1), "limits.force"),
+        (lambda: Limits(arrival=float("nan")), "limits.arrival"),
+        (lambda: limits_named("letter"), "limits"),
     ],
 )
-def test_what_makes_no_sense_is_refused(make: object, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said) as caught:
+def test_what_makes_no_sense_is_refused(make: object, key: str) -> None:
+    with refused(key):
         make()
-    assert "\n" not in str(caught.value)
 
 
 def test_the_spreads_of_the_paper_are_halved_to_either_side() -> None:

@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.errors import refused
 from tests.hammers import hertz, made_of, power, preload
 
 import printhammer as ph
@@ -187,7 +188,7 @@ def test_a_strategy_that_fires_early_moves_the_dots(hammer: ph.Hammer) -> None:
 
 
 def test_a_strategy_that_gives_too_few_drives_is_refused(hammer: ph.Hammer) -> None:
-    with pytest.raises(ph.InputError, match="the strategy gives 0 drives, expected 9"):
+    with refused("strategy"):
         print_page(hammer, noise(), RATE, strategy=lambda *_given: [])
 
 
@@ -236,39 +237,38 @@ def test_limits_and_heads_are_those_asked_for(hammer: ph.Hammer) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "options", "said"),
+    ("arguments", "options", "key"),
     [
         (("Hi", 0.0), {}, "rate"),
         (("Hi", "-1 kHz"), {}, "rate"),
         (("Hi", "1 kg"), {}, "rate"),
         (("Hi", "nan"), {}, "rate"),
-        (("", 1000.0), {}, "text = ''"),
-        (("é", 1000.0), {}, "'é'"),
-        ((5, 1000.0), {}, "5 is expected to be a pattern or a text"),
-        (("Hi", 1000.0), {"head": head_of(24)}, "head: 24 wires, expected 9"),
+        (("", 1000.0), {}, "text"),
+        (("é", 1000.0), {}, "text"),
+        ((5, 1000.0), {}, "pattern"),
+        (("Hi", 1000.0), {"head": head_of(24)}, "head"),
         (("Hi", 1000.0), {"tolerance": 1.0}, "tolerance"),
     ],
 )
 def test_what_makes_no_page_is_refused(
-    hammer: ph.Hammer, arguments: tuple[object, object], options: dict[str, object], said: str
+    hammer: ph.Hammer, arguments: tuple[object, object], options: dict[str, object], key: str
 ) -> None:
-    with pytest.raises(ph.InputError, match=said) as caught:
+    with refused(key):
         ph.print_page(hammer, *arguments, **options)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_hammer_that_prints_nothing_is_refused(hammer: ph.Hammer) -> None:
-    for bare in (hammer.replace("waveform", None), hammer.replace("pack", None)):
-        with pytest.raises(ph.InputError, match=r"no pack|no \[waveform\]"):
-            print_page(bare, "Hi", RATE)
-    with pytest.raises(ph.InputError, match="makes no dot"):
+    for part in ("waveform", "pack"):
+        with refused(part):
+            print_page(hammer.replace(part, None), "Hi", RATE)
+    with refused("pulse"):
         print_page(hammer.replace("waveform.amplitude", "10 mA"), "Hi", RATE)
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), True])
 def test_a_head_of_impossible_size_is_refused(value: float) -> None:
     for name in ("pitch", "wire_diameter", "density"):
-        with pytest.raises(ph.InputError, match=f"head: {name} = "):
+        with refused(name, value):
             head_of(9, **{name: value})
 
 
@@ -289,7 +289,7 @@ def test_a_dataset_and_files_hold_every_dot(page: Page, tmp_path: Path) -> None:
     assert len(rows) == page.line.size
     np.testing.assert_allclose(rows["flight_time [s]"], page.flight_time, rtol=1e-15)
     assert "placement_error [m]" in page.to_dataframe()
-    with pytest.raises(ph.InputError, match=r"page\.txt"):
+    with refused(None, file="page.txt"):
         page.save(tmp_path / "page.txt")
 
 

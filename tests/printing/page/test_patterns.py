@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.printing.page.lettering import ADVANCE, broken, glyphs, lettered
@@ -97,31 +98,32 @@ def test_the_default_font_of_more_wires_is_monospaced() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "options", "said"),
+    ("text", "options", "key"),
     [
-        ("", {}, "text = ''"),
-        (" \n\t ", {}, "text = "),
-        ("naïve café", {}, "nine-wire has no 'ï', 'é'"),
-        ("a\tb", {}, r"'\\t'"),
-        ("".join(chr(code) for code in range(0x400, 0x420)), {}, "and 24 more"),
-        ("漢a字", {"wires": 24}, "DejaVuSansMono has no '漢', '字'"),
-        ("a", {"columns": 0}, "columns = 0"),
-        ("a", {"wires": 0}, "wires = 0"),
-        ("a", {"wires": 10_000}, "wires = 10000"),
-        ("a", {"wires": 24, "font": "nowhere.ttf"}, "nowhere.ttf"),
-        ("a", {"wires": 1, "font": FONTS / "DejaVuSans.ttf"}, "1 wires are too few"),
+        ("", {}, "text"),
+        (" \n\t ", {}, "text"),
+        ("naïve café", {}, "text"),
+        ("a\tb", {}, "text"),
+        ("".join(chr(code) for code in range(0x400, 0x420)), {}, "text"),
+        ("漢a字", {"wires": 24}, "text"),
+        ("a", {"columns": 0}, "columns"),
+        ("a", {"wires": 0}, "wires"),
+        ("a", {"wires": 10_000}, "wires"),
+        ("a", {"wires": 24, "font": "nowhere.ttf"}, None),
+        ("a", {"wires": 1, "font": FONTS / "DejaVuSans.ttf"}, "wires"),
     ],
 )
-def test_a_text_that_cannot_be_printed_is_refused(text: str, options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said) as caught:
+def test_a_text_that_cannot_be_printed_is_refused(
+    text: str, options: dict[str, object], key: str | None
+) -> None:
+    with refused(key):
         Pattern.from_text(text, **options)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_file_that_is_no_font_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "font.ttf"
     path.write_bytes(b"not a font")
-    with pytest.raises(ph.InputError, match=r"font\.ttf: expected a TrueType font"):
+    with refused(None, file="font.ttf"):
         Pattern.from_text("a", 18, font=path)
 
 
@@ -158,33 +160,32 @@ GOOD = 'format = 1\nname = "x"\nwires = 2\nrows = ["#.", ".#"]\n'
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "key"),
     [
-        ("format = 1", "format = 2", "format = 2"),
-        ("format = 1", "format = true", "format = True"),
-        ("format = 1\n", "", "format is missing"),
-        ("wires = 2\n", "", "wires is missing"),
-        ("wires = 2", "wires = 3", "multiple of wires = 3"),
-        ("wires = 2", "wires = 0", "wires = 0"),
-        ("wires = 2", "wires = true", "wires = True"),
-        ("wires = 2", 'wires = "2"', "wires = "),
-        ('name = "x"', 'name = ""', "name = "),
-        ('name = "x"', "name = 3", "name = 3"),
-        ("rows = [", "colour = 1\nrows = [", "colour is not known"),
-        ('"#."', '"#"', "row 2 has 2 slots, expected 1"),
-        ('"#."', '"#x"', "'x' in row 1"),
-        ('"#."', "5", "rows = "),
-        ('["#.", ".#"]', "[]", "rows = "),
-        ('["#.", ".#"]', '["..", ".."]', "no dot is wanted"),
-        ("rows", "rows\n", "TOML"),
+        ("format = 1", "format = 2", "format"),
+        ("format = 1", "format = true", "format"),
+        ("format = 1\n", "", "format"),
+        ("wires = 2\n", "", "wires"),
+        ("wires = 2", "wires = 3", "rows"),
+        ("wires = 2", "wires = 0", "wires"),
+        ("wires = 2", "wires = true", "wires"),
+        ("wires = 2", 'wires = "2"', "wires"),
+        ('name = "x"', 'name = ""', "name"),
+        ('name = "x"', "name = 3", "name"),
+        ("rows = [", "colour = 1\nrows = [", "colour"),
+        ('"#."', '"#"', "rows"),
+        ('"#."', '"#x"', "rows"),
+        ('"#."', "5", "rows"),
+        ('["#.", ".#"]', "[]", "rows"),
+        ('["#.", ".#"]', '["..", ".."]', "dots"),
+        ("rows", "rows\n", None),
     ],
 )
-def test_a_bad_pattern_file_is_refused(tmp_path: Path, old: str, new: str, said: str) -> None:
+def test_a_bad_pattern_file_is_refused(tmp_path: Path, old: str, new: str, key: str | None) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(GOOD.replace(old, new), "utf-8")
-    with pytest.raises(ph.InputError, match=said) as caught:
+    with refused(key):
         Pattern.load(path)
-    assert "\n" not in str(caught.value)
 
 
 @given(st.integers(0, len(GOOD) - 1), st.characters(codec="utf-8"))
@@ -198,23 +199,23 @@ def test_a_changed_pattern_file_is_read_or_refused_in_a_sentence(place: int, mar
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "key"),
     [
-        ("a.toml", b"\xff\xfe", "UTF-8"),
-        ("a.txt", b"", "ends in one of .toml"),
-        ("a.png", b"no picture", "bitmap"),
-        ("a.pbm", b"P4\n10", "bitmap"),
-        ("missing.png", None, "No such file"),
-        ("missing.toml", None, "No such file"),
+        ("a.toml", b"\xff\xfe", None),
+        ("a.txt", b"", None),
+        ("a.png", b"no picture", None),
+        ("a.pbm", b"P4\n10", None),
+        ("missing.png", None, None),
+        ("missing.toml", None, None),
     ],
 )
 def test_a_file_that_is_no_pattern_is_refused(
-    tmp_path: Path, name: str, content: bytes | None, said: str
+    tmp_path: Path, name: str, content: bytes | None, key: str | None
 ) -> None:
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(ph.InputError, match=said) as caught:
+    with refused(key) as caught:
         Pattern.load(path)
     assert str(path) in str(caught.value)
 
@@ -223,21 +224,21 @@ def test_the_number_of_wires_of_a_file_is_checked(tmp_path: Path) -> None:
     path = tmp_path / "two.toml"
     path.write_text(GOOD, "utf-8")
     assert Pattern.load(path, 2).wires == 2
-    with pytest.raises(ph.InputError, match=r"wires = 2, expected 9"):
+    with refused("wires"):
         Pattern.load(path, 9)
 
 
 def test_what_cannot_be_written_is_refused_and_what_is_there_stays(tmp_path: Path) -> None:
     path = tmp_path / "kept.gif"
     path.write_text("kept", "utf-8")
-    with pytest.raises(ph.InputError, match=r"kept\.gif: expected a name that ends in"):
+    with refused(None, file="kept.gif"):
         Pattern.from_text("a").save(path)
     assert path.read_text("utf-8") == "kept"
 
 
 def test_arrays_that_are_no_pattern_are_refused() -> None:
     for dots in (np.zeros((9, 5)), np.ones(5), np.ones((1, 2000, 2)), np.ones((2, 1, 1, 1))):
-        with pytest.raises(ph.InputError, match="pattern 'x'"):
+        with refused("dots"):
             Pattern("x", dots)
     pattern = Pattern("x", np.ones((9, 5)))
     assert (pattern.lines, pattern.wires, pattern.slots, pattern.wanted) == (1, 9, 5, 45)

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.printing.dots.judging import FAULTS, Limits
@@ -120,7 +121,7 @@ def test_files_hold_the_dots(found: Quality, tmp_path: Path) -> None:
     assert kept["mean_power_W"] == found.mean_power
     assert {"rate_Hz", "missing", "force_peak_to_peak_N", "work_per_dot_J", "engraved_tolerance"} <= set(kept)
     assert "mean_heat_W" not in kept
-    with pytest.raises(ph.InputError, match=r"dots\.txt"):
+    with refused(None, file="dots.txt"):
         found.save(tmp_path / "dots.txt")
     assert not (tmp_path / "dots.txt").exists()
 
@@ -132,33 +133,33 @@ def test_patterns_are_read_alike_as_text_and_as_truth_values(slots: list[bool]) 
 
 
 @pytest.mark.parametrize(
-    ("given_", "said"),
+    ("given_", "key"),
     [
-        ("", "pattern = ''"),
-        ("12", "pattern = '12'"),
-        ("000", "at least one dot"),
-        (0, "pattern = 0"),
-        (20_001, "pattern = 20001"),
-        (True, "truth values in one row"),
-        ([0, 1], "truth values in one row"),
-        (np.ones((2, 2), bool), "truth values in one row"),
+        ("", "pattern"),
+        ("12", "pattern"),
+        ("000", "pattern"),
+        (0, "pattern"),
+        (20_001, "pattern"),
+        (True, "pattern"),
+        ([0, 1], "pattern"),
+        (np.ones((2, 2), bool), "pattern"),
     ],
 )
-def test_bad_patterns_are_refused(given_: object, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_patterns_are_refused(given_: object, key: str) -> None:
+    with refused(key):
         pattern_of(given_)
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [({"rate": 0.0}, "rate"), ({"rate": "1 ms"}, "rate"), ({"rate": 900.0, "pitch": "-1 mm"}, "pitch")],
 )
-def test_bad_numbers_are_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_numbers_are_refused(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         quality(hammer, **options)
 
 
 def test_a_hammer_without_pack_or_waveform_is_refused(hammer: "ph.Hammer") -> None:
     for part in ("pack", "waveform"):
-        with pytest.raises(ph.InputError, match=f"no \\[?{part}"):
+        with refused(part):
             quality(hammer.replace(part, None), RATE)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import made_of, preload
 
 import printhammer as ph
@@ -126,9 +127,9 @@ def test_a_strategy_may_fire_ahead(hammer: "ph.Hammer") -> None:
 
 def test_a_strategy_whose_drives_do_not_fit_is_refused(hammer: "ph.Hammer") -> None:
     one = ph.PulseTrain(hammer.waveform, start=FIRST_SLOT)
-    with pytest.raises(ph.InputError, match="expected 255"):
+    with refused("strategy"):
         safe_rate(hammer, lambda *_: [one], first=100.0, last=100.0)
-    with pytest.raises(ph.InputError, match="1 firings for the slots"):
+    with refused("strategy"):
         safe_rate(hammer, lambda _h, patterns, _r: [one] * len(patterns), first=100.0, last=100.0)
 
 
@@ -171,7 +172,7 @@ def test_single_pulses_are_those_of_single_motions(hammer: "ph.Hammer") -> None:
     single = nominal(hammer)
     assert found[0].force == pytest.approx(single.force, rel=1e-8)
     assert found[0].flight_time == pytest.approx(single.flight_time, rel=1e-9)
-    with pytest.raises(ph.InputError, match="makes no dot"):
+    with refused("pulse"):
         nominal(weak)
 
 
@@ -181,31 +182,31 @@ def test_the_grid_ends_where_it_is_told() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
         ({"first": 0.0}, "first"),
-        ({"last": 50.0}, "last = 50.0"),
+        ({"last": 50.0}, "last"),
         ({"step": "1 ms"}, "step"),
-        ({"step": 1e-3}, "rates, expected at most"),
+        ({"step": 1e-3}, "rates"),
     ],
 )
-def test_bad_grids_are_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_bad_grids_are_refused(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         safe_rate(hammer, **options)
 
 
 @pytest.mark.parametrize(
-    ("by", "said"),
+    ("by", "key"),
     [
-        (Perturbation(current=-1.0), "current = -1.0"),
-        (Perturbation(travel=math.inf), "travel = inf"),
-        (Perturbation(current=0.1), "law 'inverse-root'"),
-        (Perturbation(travel=1e-6), "with a pack"),
-        (Perturbation(damping=0.1), "expected a backstop"),
+        (Perturbation(current=-1.0), "current"),
+        (Perturbation(travel=math.inf), "travel"),
+        (Perturbation(current=0.1), "magnet"),
+        (Perturbation(travel=1e-6), "travel"),
+        (Perturbation(damping=0.1), "damping"),
     ],
 )
-def test_perturbations_that_make_no_sense_are_refused(by: Perturbation, said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_perturbations_that_make_no_sense_are_refused(by: Perturbation, key: str) -> None:
+    with refused(key):
         perturbed(made_of(spring=preload(-1.0)), by)
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.printing.dots.judging import Limits
@@ -98,19 +99,19 @@ def test_judged_by_the_design_a_stronger_hammer_fails(hammer: "ph.Hammer") -> No
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "key"),
     [
         ({"number": 0}, "number"),
-        ({"number": 10**6}, "number = 1000000"),
-        ({"spreads": -0.1}, "spread of "),
-        ({"spreads": 1.0}, "spread of "),
-        ({"spreads": 0.0}, "at least one constant"),
-        ({"spreads": {"magnet.Xm": 0.1}}, "'magnet.Xm'"),
+        ({"number": 10**6}, "number"),
+        ({"spreads": -0.1}, "spread of mass"),
+        ({"spreads": 1.0}, "spread of mass"),
+        ({"spreads": 0.0}, "spreads"),
+        ({"spreads": {"magnet.Xm": 0.1}}, "spread"),
         ({"judged_by": "nobody"}, "judged_by"),
-        ({"seed": -1}, "seed = -1"),
+        ({"seed": -1}, "seed"),
         ({"rate": -1.0}, "rate"),
     ],
 )
-def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], said: str) -> None:
-    with pytest.raises(ph.InputError, match=said):
+def test_what_makes_no_sense_is_refused(hammer: "ph.Hammer", options: dict[str, object], key: str) -> None:
+    with refused(key):
         tolerance_yield(hammer, **{"rate": 300.0, "number": 2, **options})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
@@ -55,16 +56,16 @@ def test_sigma_points_are_one_deviation_off() -> None:
 
 
 def test_bad_numbers_are_refused() -> None:
-    with pytest.raises(ph.InputError, match=r"variability: current = 0.5 .* below 1/3"):
+    with refused("current"):
         Variability(current=0.5)
-    with pytest.raises(ph.InputError, match="variability: travel = -1"):
+    with refused("travel"):
         Variability(travel=-1.0)
-    with pytest.raises(ph.InputError, match="variability of travel"):
+    with refused("travel"):
         Variability().constants(crude().replace("pack", None))
 
 
 def test_where_no_hammer_rests_the_draw_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     name = "printhammer.printing.rates.variability.changed"
     monkeypatch.setattr(name, lambda hammer, rows: ([hammer] * len(rows), ["no hammer"] * len(rows)))
-    with pytest.raises(ph.InputError, match=r"0 of 40 hammers .* expected a smaller variability"):
+    with refused("variability"):
         Variability().draw(crude(), 4, 1)

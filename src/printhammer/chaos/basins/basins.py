@@ -92,10 +92,10 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
     """
     plane = np.asarray(labels)
     if plane.ndim != 2 or not plane.size or plane.dtype.kind not in "iu":
-        raise InputError(f"labels: shape {plane.shape}, expected a plane of whole numbers")
+        raise InputError(f"labels: shape {plane.shape}", key="labels", expected="a plane of whole numbers")
     side = read_count(box, "box")
     if side > min(plane.shape):
-        raise InputError(f"box = {box!r}, expected at most {min(plane.shape)} cells")
+        raise InputError.of("box", box, f"at most {min(plane.shape)} cells")
     rows, columns = (count // side for count in plane.shape)
     cut = plane[: rows * side, : columns * side].reshape(rows, side, columns, side)
     boxes = cut.transpose(0, 2, 1, 3).reshape(rows * columns, side * side)
@@ -316,7 +316,7 @@ def basins(
     check_tolerance(tolerance)
     count, most = read_count(firings, "firings"), read_count(rounds, "rounds")
     if count < _FEWEST:
-        raise InputError(f"firings = {firings!r}, expected at least {_FEWEST}")
+        raise InputError.of("firings", firings, f"at least {_FEWEST}")
     window = regime.window
     across = read_axis((*window.x, CELLS) if x is None else x, "x", "m")
     up = read_axis((*window.v, CELLS) if v is None else v, "v", "m/s")
@@ -397,15 +397,15 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
 def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
     """Read the least and the largest value of an axis and their number; InputError where it is none."""
     if not isinstance(entry, tuple | list) or len(entry) != 3:
-        raise InputError(f"{name} = {entry!r}, expected least and largest value and their number")
+        raise InputError.of(name, entry, "least and largest value and their number")
     low, high = (read_number(end, unit, name) for end in entry[:2])
     count = read_count(entry[2], f"{name}: number of values")
     if not low < high or count < 2:
-        raise InputError(f"{name} = {entry!r}, expected two ends, the second the larger one, and 2 or more")
+        raise InputError.of(name, entry, "two ends, the second the larger one, and 2 or more")
     return np.linspace(low, high, count)
 
 
 def check_cells(across: int, up: int) -> None:
     """Refuse a plane of more than `MOST_CELLS` cells."""
     if across * up > MOST_CELLS:
-        raise InputError(f"{across} x {up} cells, expected at most {MOST_CELLS}")
+        raise InputError(f"{across} x {up} cells", key="cells", expected=f"at most {MOST_CELLS}")

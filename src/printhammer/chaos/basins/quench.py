@@ -229,14 +229,18 @@ def quench_map(
     pulse = waveform_of(hammer, waveform)
     width = getattr(pulse, "width", None)
     if not isinstance(width, float):
-        raise InputError(f"waveform: a {pulse.shape} has no width, expected a pulse that has one")
+        raise InputError(
+            f"waveform: a {pulse.shape} has no width", key="waveform", expected="a pulse that has one"
+        )
     if hammer.front is None:
-        raise InputError(f"the hammer {hammer.name!r} has no pack, expected one that a dot is made on")
+        raise InputError(
+            f"the hammer {hammer.name!r} has no pack", key="pack", expected="one that a dot is made on"
+        )
     times = read_axis(gaps, "gaps", "s")
     wide = read_axis((0.5 * width, 1.5 * width, 128) if widths is None else widths, "widths", "s")
     for name, axis in (("gaps", times), ("widths", wide)):
         if not axis[0] > 0.0:
-            raise InputError(f"{name}: {axis[0]:.9g} s, expected times above 0 s")
+            raise InputError(f"{name}: {axis[0]:.9g} s", key=name, expected="times above 0 s")
     wait = read_positive(tail, "s", "tail")
     check_cells(times.size, wide.size)
     alone = simulate(hammer, PulseTrain(pulse), duration=pulse.support + wait, tolerance=tolerance).dots[0]

@@ -123,14 +123,16 @@ def bifurcation(
     name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
     count, skipped = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     if count - skipped < 2:
-        raise InputError(f"transient = {transient!r}, expected at least 2 fewer than the {count} firings")
+        raise InputError.of("transient", transient, f"at least 2 fewer than the {count} firings")
     if direction not in DIRECTIONS:
-        raise InputError(f"direction = {direction!r}, expected one of {', '.join(DIRECTIONS)}")
+        raise InputError.of("direction", direction, f"one of {', '.join(DIRECTIONS)}")
     halvings = read_count(refine, "refine", least=0)
     check_tolerance(tolerance)
     ways = ("up", "down") if direction == "both" else (direction,)
     if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
-        raise InputError(f"{len(grid)} values, expected at most {MOST_STATES} states in a diagram")
+        raise InputError(
+            f"{len(grid)} values", key="values", expected=f"at most {MOST_STATES} states in a diagram"
+        )
     begin = FROM_REST
     if state is not None:
         begin = (
@@ -183,14 +185,16 @@ def _parameter(
     """Return the name of the parameter, its values, and the regime in which it is changed."""
     periods, rates, parameter, values = choice
     if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
-        raise InputError("periods, rates and parameter: expected one of them")
+        raise InputError("periods, rates and parameter: expected one of them", key="parameter")
     if (parameter is None) != (values is None):
-        raise InputError("parameter and values: expected both of them, or neither")
+        raise InputError("parameter and values: expected both of them, or neither", key="parameter")
     name = parameter or (PERIOD if periods is not None else RATE)
     grid = _ascending(values if values is not None else periods if periods is not None else rates, name)
     if name in (PERIOD, RATE):
         if firing.get("period") is not None or firing.get("rate") is not None:
-            raise InputError(f"period and rate: expected none of them beside the values of {name!r}")
+            raise InputError(
+                f"period and rate: expected none of them beside the values of {name!r}", key="period"
+            )
         if isinstance(hammer, Hammer) and firing.get("drive") is None:
             first = float(grid[0])
             firing = {**firing, "period": first} if name == PERIOD else {**firing, "rate": first}
@@ -203,11 +207,11 @@ def _ascending(values: npt.ArrayLike | None, name: str) -> FloatArray:
     try:
         grid = np.atleast_1d(np.array(values, dtype=np.float64))
     except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers in SI") from None
+        raise InputError(f"{name}: expected numbers in SI", key=name) from None
     if grid.ndim != 1 or grid.size == 0 or not np.isfinite(grid).all():
-        raise InputError(f"{name}: expected a list of at least one finite number in SI")
+        raise InputError(f"{name}: expected a list of at least one finite number in SI", key=name)
     falling = np.flatnonzero(np.diff(grid) <= 0.0)
     if falling.size:
         before, after = grid[falling[0] : falling[0] + 2].tolist()
-        raise InputError(f"{name}: {after:.9g} follows {before:.9g}, expected ascending values")
+        raise InputError(f"{name}: {after:.9g} follows {before:.9g}", key=name, expected="ascending values")
     return grid

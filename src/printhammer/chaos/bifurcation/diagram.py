@@ -331,7 +331,7 @@ class Bifurcation(Result, rows="direction column"):
             return 0
         if direction not in self.directions:
             known = " and ".join(self.directions)
-            raise InputError(f"direction = {direction!r}, expected what the diagram has: {known}")
+            raise InputError.of("direction", direction, f"what the diagram has: {known}")
         return self.directions.index(direction)
 
     def _grouped(self, row: int, order: Sequence[int]) -> list[Window]:

@@ -85,11 +85,12 @@ class Steps(Declared):
     def __post_init__(self) -> None:
         if not 0.0 < self.smallest <= self.first <= self.largest < math.inf:
             raise InputError(
-                f"steps of {self.smallest:g}, {self.first:g} and {self.largest:g},"
-                " expected the smallest, the first and the largest, ascending"
+                f"steps of {self.smallest:g}, {self.first:g} and {self.largest:g}",
+                key="steps",
+                expected="the smallest, the first and the largest, ascending",
             )
         if self.most < 1:
-            raise InputError(f"most = {self.most}, expected a number of steps from 1 on")
+            raise InputError.of("most", self.most, "a number of steps from 1 on", written=str(self.most))
 
 
 Watch = Callable[[Node, Node], Stop | None]
@@ -145,14 +146,20 @@ def follow(
     chosen = Steps() if steps is None else steps
     low, high = (float(bound) for bound in bounds)
     if not (math.isfinite(low) and math.isfinite(high) and low <= parameter <= high and low < high):
-        raise InputError(f"parameter = {parameter:g}, expected one within the bounds {low:g} to {high:g}")
+        raise InputError.of(
+            "parameter", parameter, f"one within the bounds {low:g} to {high:g}", written=f"{parameter:g}"
+        )
     follower = Corrector(family, scales, chosen.precision)
     z = follower.scaled(state, parameter)
     leaving = None if row is None else np.asarray(row, dtype=np.float64)
     start = follower.onto(z) if leaving is None else follower.correct(z, leaving)
     if start is None:
         why = f": {follower.trouble}" if follower.trouble else ""
-        raise InputError(f"there is no fixed point near the parameter {parameter:.9g}{why}")
+        raise InputError(
+            f"there is no fixed point near the parameter {parameter:.9g}{why}",
+            key="parameter",
+            value=parameter,
+        )
     upward = start.tangent if leaving is not None or start.tangent[-1] >= 0.0 else -start.tangent
     halves: list[tuple[list[Node], Stop]] = []
     for sign in (-1.0, 1.0):

@@ -375,7 +375,7 @@ class Branch(Result):
             The event is none of this branch's period doublings, or no orbit of twice the period is near.
         """
         if event.kind != "period doubling" or event not in self.events:
-            raise InputError(f"event = {event.kind!r}, expected a period doubling of this branch")
+            raise InputError.of("event", event.kind, "a period doubling of this branch")
         return self.follow_doubled(event, read_count(most, "most"), threads)
 
 

@@ -340,7 +340,9 @@ def follow_doubled(
             break
         amplitude /= _CLOSER
     else:
-        raise InputError(f"no orbit of twice the period is near the parameter {point.parameter:.9g}")
+        raise InputError(
+            f"no orbit of twice the period is near the parameter {point.parameter:.9g}", key="parameter"
+        )
     return follow(
         doubled,
         first.state,

@@ -89,20 +89,26 @@ def continuation(
     if isinstance(start, Orbit):
         fired = [value for name, value in firing.items() if name not in ("phase", "overlap")]
         if any(value is not None for value in (*fired, state, firings)):
-            raise InputError("an orbit is given, expected no period, rate, waveform, drive, firings or state")
+            raise InputError(
+                "an orbit is given",
+                key="orbit",
+                expected="no period, rate, waveform, drive, firings or state",
+            )
         if not start.ok:
-            raise InputError(f"the orbit to start from is not periodic: {start.status}")
+            raise InputError(f"the orbit to start from is not periodic: {start.status}", key="orbit")
         regime, point, count = start.regime, np.array(start.section), start.firings
         phase = firing.get("phase")
         if phase is not None and phase != start.phase:
-            raise InputError(f"phase = {phase!r}, expected that of the orbit, {start.phase!r}, or none")
+            raise InputError.of("phase", phase, f"that of the orbit, {start.phase!r}, or none")
     else:
         regime = Regime.of(start, **firing)
         ends, own = read_bounds(regime, parameter, bounds), regime.value(parameter)
         if not ends[0] <= own <= ends[1]:
             raise InputError(
-                f"{parameter} = {own:.9g} {regime.quantity(parameter).si} at the start, expected one within"
-                f" the bounds {ends[0]:.9g} to {ends[1]:.9g}"
+                f"{parameter} = {own:.9g} {regime.quantity(parameter).si} at the start",
+                key=parameter,
+                value=own,
+                expected=f"one within the bounds {ends[0]:.9g} to {ends[1]:.9g}",
             )
         wanted = None if firings is None else read_count(firings, "firings")
         if state is None:
@@ -129,6 +135,10 @@ def _orbit_to_start_from(
         if orbit.firings == many and (orbit.phase == regime.phase or not phase_given):
             return orbit.regime, np.array(orbit.section), many
     raise InputError(
-        f"the train from rest at a period of {regime.period:.9g} s settles to no orbit of {many} firings, and"
-        " a search finds none, expected a state or an orbit to start from"
+        (
+            f"the train from rest at a period of {regime.period:.9g} s settles to no orbit of {many}"
+            " firings, and a search finds none"
+        ),
+        key="state",
+        expected="a state or an orbit to start from",
     )

@@ -90,7 +90,9 @@ class Corrector:
         self.precision = precision
         self.trouble = ""
         if not (np.isfinite(self.scales).all() and (self.scales > 0.0).all()):
-            raise InputError(f"scales = {self.scales.tolist()}, expected positive numbers")
+            raise InputError.of(
+                "scales", self.scales.tolist(), "positive numbers", written=str(self.scales.tolist())
+            )
 
     def scaled(self, state: npt.ArrayLike, parameter: float) -> FloatArray:
         """Return a point in scaled variables."""

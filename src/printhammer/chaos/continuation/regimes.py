@@ -185,9 +185,9 @@ def regimes(
     try:
         low, high = (read_positive(rate, "Hz", "rates") for rate in rates)
     except (TypeError, ValueError):
-        raise InputError(f"rates = {rates!r}, expected the least and the largest rate") from None
+        raise InputError.of("rates", rates, "the least and the largest rate") from None
     if not low < high:
-        raise InputError(f"rates = {rates!r}, expected the least and the largest rate, ascending")
+        raise InputError.of("rates", rates, "the least and the largest rate, ascending")
     count, levels = read_count(seeds, "seeds"), read_count(doublings, "doublings", least=0)
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)
     collected = _Collected((low, high), steps, tolerance, threads)

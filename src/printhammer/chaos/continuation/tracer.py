@@ -55,10 +55,10 @@ def read_bounds(
     try:
         low, high = bounds
     except (TypeError, ValueError):
-        raise InputError(f"bounds = {bounds!r}, expected the least and the largest {parameter}") from None
+        raise InputError.of("bounds", bounds, f"the least and the largest {parameter}") from None
     ends = read_number(low, unit, parameter), read_number(high, unit, parameter)
     if not ends[0] < ends[1]:
-        raise InputError(f"bounds = {bounds!r}, expected the least and the largest {parameter}, ascending")
+        raise InputError.of("bounds", bounds, f"the least and the largest {parameter}, ascending")
     return ends
 
 

@@ -183,7 +183,7 @@ class BifurcationCurve(Result, rows="point"):
             SI or text with a unit.
         """
         if name not in self.names:
-            raise InputError(f"name = {name!r}, expected {self.names[0]} or {self.names[1]}")
+            raise InputError.of("name", name, f"{self.names[0]} or {self.names[1]}")
         which = self.names.index(name)
         level = read_number(value, self.units[which], name)
         return [(place.first, place.second) for place in self.crossings(which, level)]
@@ -240,7 +240,7 @@ def settled_plane(
     n of the second. InputError where the numbers of values are negative.
     """
     if min(grid) < 0:
-        raise InputError(f"grid = {grid!r}, expected two numbers of values, not negative")
+        raise InputError.of("grid", grid, "two numbers of values, not negative")
     axes = (np.linspace(*bounds[0], grid[0]), np.linspace(*bounds[1], grid[1]))
     settled = np.zeros((grid[1], grid[0]), dtype=np.int64)
     judged = np.arange(_FIRINGS - _JUDGED + 1, _FIRINGS + 1)
@@ -319,8 +319,10 @@ def bifurcation_curve(
     for name, (low, high), at in ((start.first, own, start.value), (second, ends, value)):
         if not low <= at <= high:
             raise InputError(
-                f"{name} = {at:.9g} {start.regime.quantity(name).si} at the start, expected one within the"
-                f" bounds {low:.9g} to {high:.9g}"
+                f"{name} = {at:.9g} {start.regime.quantity(name).si} at the start",
+                key=name,
+                value=at,
+                expected=f"one within the bounds {low:.9g} to {high:.9g}",
             )
     plane = Plane(start.regime, (start.first, second), (own, ends), start.firings, start.tolerance)
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)
@@ -328,7 +330,9 @@ def bifurcation_curve(
     away = abs(traced.places[_nearest(traced, value)].first - start.value)
     if not away < 0.1 * (own[1] - own[0]):
         raise InputError(
-            f"{start.kind} at {start.first} = {start.value:.9g} {unit}: Newton's method leads away from it"
+            f"{start.kind} at {start.first} = {start.value:.9g} {unit}: Newton's method leads away from it",
+            key=start.first,
+            value=start.value,
         )
     return curve_of(plane, traced, grid, threads)
 

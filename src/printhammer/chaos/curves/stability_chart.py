@@ -167,9 +167,13 @@ def stability_chart(
     """
     if isinstance(branch, Branch):
         if first is not None or firing:
-            raise InputError("a branch is given, expected no first constant and no firing beside it")
+            raise InputError(
+                "a branch is given", key="first", expected="no first constant and no firing beside it"
+            )
     elif first is None:
-        raise InputError("first is missing, expected the first constant with its least and largest value")
+        raise InputError(
+            "first is missing", key="first", expected="the first constant with its least and largest value"
+        )
     else:
         branch = continuation(branch, first[0], first[1:], threads=threads, **firing)
     regime = branch.regime
@@ -177,7 +181,7 @@ def stability_chart(
     ends = read_bounds(regime, second, bounds)
     value = regime.value(second)
     if not ends[0] <= value <= ends[1]:
-        raise InputError(f"bounds = {bounds!r}, expected a range around the hammer's own {second}, {value:g}")
+        raise InputError.of("bounds", bounds, f"a range around the hammer's own {second}, {value:g}")
     chart = _Chart(branch, second, ends, Steps(most=read_count(most, "most"), precision=PRECISION))
     # The other multiplier lies inside the unit circle there.
     lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]

@@ -67,13 +67,21 @@ def start_of(
     """
     if isinstance(source, Branch):
         if regime is not None:
-            raise InputError("a branch is given, expected no regime beside it")
+            raise InputError("a branch is given", key="regime", expected="no regime beside it")
         return _of_branch(source, event)
     opened = source if isinstance(source, Reopened) else reopen(source)
     if regime is None:
-        raise InputError(f"{opened.path}: expected a regime beside the file, the hammer and how it is fired")
+        raise InputError(
+            f"{opened.path}: expected a regime beside the file, the hammer and how it is fired",
+            file=opened.path,
+            key="regime",
+        )
     if isinstance(event, BranchEvent):
-        raise InputError(f"{opened.path}: expected the number or kind of an event beside a file")
+        raise InputError(
+            f"{opened.path}: expected the number or kind of an event beside a file",
+            file=opened.path,
+            key="event",
+        )
     return _of_file(opened, event, regime)
 
 
@@ -83,13 +91,15 @@ def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
         stop: Stop = branch.stops[_ENDS[event]]
         if stop.reason != "grazing":
             raise InputError(
-                f"event = {event!r}: the branch does not end in a grazing there, {stop.sentence}"
+                f"event = {event!r}: the branch does not end in a grazing there, {stop.sentence}",
+                key="event",
+                value=event,
             )
         regime = replace(branch.regime, phase=float(branch.phases[_ENDS[event]]))
         return Start("grazing", regime, *at, np.array(stop.state), stop.parameter)
     if isinstance(event, BranchEvent):
         if not any(event is own for own in branch.events):
-            raise InputError(f"event = {event.kind!r}, expected one of the events of the branch")
+            raise InputError.of("event", event.kind, "one of the events of the branch")
         chosen = event
     else:
         kinds = [own.kind for own in branch.events]
@@ -103,32 +113,50 @@ def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, 
     known = ", ".join(dict.fromkeys(kinds)) or "none"
     if isinstance(event, int | np.integer):
         if not 0 <= event < len(kinds):
-            raise InputError(f"event = {event}, expected the number of one of {len(kinds)} events of {whose}")
+            raise InputError.of(
+                "event", event, f"the number of one of {len(kinds)} events of {whose}", written=str(event)
+            )
         if kinds[event] not in KINDS or not located[event]:
             why = "" if located[event] else " that was not located"
-            raise InputError(f"event = {event} is a {kinds[event]}{why}, expected a located one of {_LIST}")
+            raise InputError(
+                f"event = {event} is a {kinds[event]}{why}",
+                key="event",
+                value=event,
+                expected=f"a located one of {_LIST}",
+            )
         return int(event)
     if event is not None and event not in KINDS:
-        raise InputError(f"event = {event!r}, expected a number, first, last, or one of {_LIST}")
+        raise InputError.of("event", event, f"a number, first, last, or one of {_LIST}")
     for number, kind in enumerate(kinds):
         if located[number] and (kind == event or (event is None and kind in KINDS)):
             return number
-    raise InputError(f"event = {event or _LIST}: {whose} has none, its events are: {known}")
+    raise InputError(
+        f"event = {event or _LIST}: {whose} has none, its events are: {known}",
+        key="event",
+        value=event or _LIST,
+    )
 
 
 def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start:
     dataset, notes = opened.dataset, opened.attributes
     known = notes.get("hammer_fingerprint")
     if known is not None and known != regime.hammer.fingerprint:
-        raise InputError(
-            f"{opened.path}: hammer_fingerprint = {known[:12]}, expected that of {regime.hammer.name},"
-            f" {regime.hammer.fingerprint[:12]}"
+        raise InputError.of(
+            "hammer_fingerprint",
+            known[:12],
+            f"that of {regime.hammer.name}, {regime.hammer.fingerprint[:12]}",
+            file=opened.path,
+            written=str(known[:12]),
         )
     if "names" in notes and "first" in dataset:
         return _of_curve(opened, event, regime)
     needed = ("event_kind", "event_value", "event_x", "event_v", "event_phase", "firings")
     if any(name not in dataset for name in needed) or "parameter" not in notes:
-        raise InputError(f"{opened.path}: expected a branch or branches with their events, or a curve")
+        raise InputError(
+            f"{opened.path}: expected a branch or branches with their events, or a curve",
+            file=opened.path,
+            key="branch",
+        )
     if "branch" in dataset["event_kind"].dims:
         # Of several branches the first is meant, which is the one that was asked for.
         dataset = dataset.isel(branch=0)
@@ -142,9 +170,7 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
     )
     if isinstance(event, str) and event in _ENDS:
         if "graz" not in str(notes.get(f"{event}_end", "")):
-            raise InputError(
-                f"{opened.path}: event = {event!r}, expected an end in a grazing of a single branch"
-            )
+            raise InputError.of("event", event, "an end in a grazing of a single branch", file=opened.path)
         row = dataset.isel(orbit=_ENDS[event], firing=0)
         there = replace(regime, phase=float(row["orbit_phase"]))
         state = np.array([row["x"], row["v"]], dtype=np.float64)
@@ -163,9 +189,7 @@ def _of_curve(opened: Reopened, point: int | str | None, regime: Regime) -> Star
     count = dataset.sizes[along]
     number: Any = _ENDS.get(point, point) if isinstance(point, str) else point or 0
     if not isinstance(number, int | np.integer) or not -1 <= number < count:
-        raise InputError(
-            f"{opened.path}: event = {point!r}, expected a point of the curve from 0 to {count - 1}"
-        )
+        raise InputError.of("event", point, f"a point of the curve from 0 to {count - 1}", file=opened.path)
     row = dataset.isel({along: int(number)})
     names, bounds = notes["names"], notes["bounds"]
     return Start(

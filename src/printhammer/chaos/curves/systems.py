@@ -96,7 +96,7 @@ class Plane:
 def check_two(first: str, second: str) -> None:
     """Refuse the same constant twice; a rate is its period. InputError says so."""
     if second == first or {first, second} == {PERIOD, RATE}:
-        raise InputError(f"second = {second!r}, expected another constant than that of the branch, {first}")
+        raise InputError.of("second", second, f"another constant than that of the branch, {first}")
 
 
 class Place(Declared):

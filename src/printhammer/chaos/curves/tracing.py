@@ -118,7 +118,7 @@ class CurveTracer:
                 watch=self.watch(system),
             )
         except InputError as error:
-            raise InputError(f"{at}: {error}") from None
+            raise error.within(at) from None
         nodes = curve.nodes
         pieces = [(system, nodes)]
         stops = list(curve.stops)
@@ -157,7 +157,9 @@ class CurveTracer:
         if self.kind == GRAZING:
             if not near:
                 raise InputError(
-                    f"grazing at {start.first} = {start.value:.9g}: the orbit comes near no surface"
+                    f"grazing at {start.first} = {start.value:.9g}: the orbit comes near no surface",
+                    key=start.first,
+                    value=start.value,
                 )
             touch = near[0]
             return GrazingSystem(plane, touch.surface), np.array([touch.phase, start.value])

@@ -119,7 +119,7 @@ class LyapunovChart(Result, rows="period"):
     def of(cls, trains: Sequence[Lyapunov]) -> LyapunovChart:
         """Make a chart of results for single trains; InputError where there are none."""
         if not trains:
-            raise InputError("periods: expected at least one train")
+            raise InputError("periods: expected at least one train", key="periods")
         points = trains[0].points
         firings = int(points.firing[0]), int(points.firing[-1])
         rows = [_row(train) for train in trains]
@@ -250,14 +250,15 @@ def finite_time(
     known = train if isinstance(train, Lyapunov) else lyapunov(train, firings=firings)
     wanted = [read_count(length, "lengths") for length in lengths]
     if not wanted or sorted(set(wanted)) != wanted:
-        raise InputError(f"lengths = {lengths!r}, expected numbers of firings, ascending")
+        raise InputError.of("lengths", lengths, "numbers of firings, ascending")
     if not known.ok:
-        raise InputError(f"the run ended early ({known.status}), expected one that did not")
+        raise InputError(f"the run ended early ({known.status})", key="train", expected="one that did not")
     growth = known.factors[:, 0]
     if len(growth) < FEWEST * wanted[-1]:
         raise InputError(
-            f"lengths: of {len(growth)} firings there are fewer than {FEWEST} stretches of {wanted[-1]},"
-            f" expected at most {len(growth) // FEWEST}"
+            f"lengths: of {len(growth)} firings there are fewer than {FEWEST} stretches of {wanted[-1]}",
+            key="lengths",
+            expected=f"at most {len(growth) // FEWEST}",
         )
     values = tuple(growth[: len(growth) // n * n].reshape(-1, n).mean(axis=1) for n in wanted)
     return FiniteTime(

@@ -116,15 +116,17 @@ def correlation_dimension(
     rows, units = rows_of(points_of(states, {}), scales, MOST)
     apart, tolerance = read_count(theiler, "theiler"), read_positive(flat, "1", "flat")
     if len(rows) < FEWEST:
-        raise InputError(f"states: {len(rows)} are given, expected {FEWEST} to {MOST}")
+        raise InputError(f"states: {len(rows)} are given", key="states", expected=f"{FEWEST} to {MOST}")
     if apart > len(rows) // 4:
-        raise InputError(
-            f"theiler = {apart}, expected at most a quarter of the number of states, {len(rows)}"
+        raise InputError.of(
+            "theiler", apart, f"at most a quarter of the number of states, {len(rows)}", written=str(apart)
         )
     scaled = rows / units
     width = float(np.ptp(scaled, axis=0).max())
     if width == 0.0:
-        raise InputError("states: all are equal, expected an attractor of more than one state")
+        raise InputError(
+            "states: all are equal", key="states", expected="an attractor of more than one state"
+        )
     count = math.ceil(_PER_OCTAVE * math.log2(2.0 * len(rows)) * 2.0)
     radius = width * 2.0 ** (-np.arange(count)[::-1] / _PER_OCTAVE)
     sums, pairs = correlation_sums(scaled, radius, apart)

@@ -208,7 +208,7 @@ class Lyapunov(Result, rows="firing exponent"):
             counts = np.geomspace(q, n, min(_COUNTS, len(whole)))
         asked = np.atleast_1d(np.asarray(counts, dtype=np.float64))
         if asked.size and not (asked.min() >= 1.0 and asked.max() <= n):
-            raise InputError(f"counts = {counts!r}, expected numbers of firings from 1 to {n}")
+            raise InputError.of("counts", counts, f"numbers of firings from 1 to {n}")
         some = np.unique(np.maximum((asked / q).round(), 1.0).astype(np.int64))
         means = np.cumsum(whole, axis=0)[some - 1] / some[:, np.newaxis]
         errors = [[standard_error(whole[:cycles, k]) for k in (0, 1)] for cycles in some]

@@ -130,15 +130,15 @@ def recurrence(
     count = len(rows)
     apart, least = read_count(theiler, "theiler"), read_count(shortest, "shortest")
     if apart >= count:
-        raise InputError(f"theiler = {apart}, expected less than the number of states, {count}")
+        raise InputError.of("theiler", apart, f"less than the number of states, {count}", written=str(apart))
     if threshold is not None and rate is not None:
-        raise InputError("threshold and rate are given, expected one of them")
+        raise InputError("threshold and rate are given", key="threshold", expected="one of them")
     scaled = rows / units
     distances = _distances(scaled)
     if threshold is None:
         threshold = max(_threshold(distances, apart, RATE if rate is None else rate), floor)
     elif not (math.isfinite(threshold) and threshold >= 0.0):
-        raise InputError(f"threshold = {threshold!r}, expected a number, not negative")
+        raise InputError.of("threshold", threshold, "a number, not negative")
     return counted(distances <= threshold, float(threshold), apart, least)
 
 
@@ -189,7 +189,7 @@ def _distances(scaled: FloatArray) -> FloatArray:
 def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
     """Return the smallest threshold with which at least this part of the counted pairs recurs."""
     if not 0.0 < rate <= 1.0:
-        raise InputError(f"rate = {rate!r}, expected a part of all pairs, above 0 up to 1")
+        raise InputError.of("rate", rate, "a part of all pairs, above 0 up to 1")
     pairs = distances[np.triu_indices(len(distances), theiler)]
     wanted = max(math.ceil(rate * pairs.size), 1) - 1
     return float(np.partition(pairs, wanted)[wanted])
@@ -203,19 +203,23 @@ def rows_of(
         rows = np.column_stack([states.x, states.v, states.memory])
         units = states.window.half_widths[[0, 1, 0]]
         if not np.isfinite(rows).all():
-            raise InputError(f"states: the run ended early ({states.status}), expected one that did not")
+            raise InputError(
+                f"states: the run ended early ({states.status})", key="states", expected="one that did not"
+            )
     else:
         rows = read_array(states, "states", "numbers, a row for each state")
         rows = rows[:, np.newaxis] if rows.ndim == 1 else rows
         if rows.ndim != 2:
-            raise InputError(f"states: an array of shape {rows.shape}, expected a row for each state")
+            raise InputError(
+                f"states: an array of shape {rows.shape}", key="states", expected="a row for each state"
+            )
         units = np.ones(rows.shape[1])
     if not 2 <= len(rows) <= most:
-        raise InputError(f"states: {len(rows)} are given, expected 2 to {most}")
+        raise InputError(f"states: {len(rows)} are given", key="states", expected=f"2 to {most}")
     if not np.isfinite(rows).all():
-        raise InputError("states: not all are finite, expected finite numbers")
+        raise InputError("states: not all are finite", key="states", expected="finite numbers")
     if scales is not None:
         units = np.asarray(scales, dtype=np.float64)
     if units.shape != (rows.shape[1],) or not (np.isfinite(units) & (units > 0.0)).all():
-        raise InputError(f"scales = {scales!r}, expected {rows.shape[1]} positive numbers")
+        raise InputError.of("scales", scales, f"{rows.shape[1]} positive numbers")
     return rows, units

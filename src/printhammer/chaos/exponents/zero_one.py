@@ -187,13 +187,13 @@ def zero_one(
         numbers = _numbers(points)
         least = 1e-12 * float(np.abs(numbers).max(initial=0.0))
     if numbers.size < FEWEST:
-        raise InputError(f"series: {numbers.size} numbers, expected at least {FEWEST}")
+        raise InputError(f"series: {numbers.size} numbers", key="series", expected=f"at least {FEWEST}")
     if resolution is not None:
         if not (math.isfinite(resolution) and resolution >= 0.0):
-            raise InputError(f"resolution = {resolution!r}, expected a number, not negative")
+            raise InputError.of("resolution", resolution, "a number, not negative")
         least = float(resolution)
     if seed < 0:
-        raise InputError(f"seed = {seed!r}, expected a whole number, not negative")
+        raise InputError.of("seed", seed, "a whole number, not negative")
     chosen = np.random.default_rng(seed).uniform(*RANGE, many)
     length = numbers.size
     k, cycle, shown, correlations = math.nan, 1, 0, np.full(many, np.nan)
@@ -336,8 +336,12 @@ def _correlations(displacements: FloatArray) -> FloatArray:
 def _numbers(series: npt.ArrayLike) -> FloatArray:
     numbers = read_array(series, "series")
     if numbers.ndim != 1:
-        raise InputError(f"series: an array of shape {numbers.shape}, expected one number after the other")
+        raise InputError(
+            f"series: an array of shape {numbers.shape}", key="series", expected="one number after the other"
+        )
     wrong = np.flatnonzero(~np.isfinite(numbers))
     if wrong.size:
-        raise InputError(f"series: number {wrong[0] + 1} is {numbers[wrong[0]]}, expected finite numbers")
+        raise InputError(
+            f"series: number {wrong[0] + 1} is {numbers[wrong[0]]}", key="series", expected="finite numbers"
+        )
     return numbers

@@ -128,10 +128,12 @@ def manifolds(
         The orbit is no saddle with a derivative, or an argument is not what is described above.
     """
     if not orbit.ok or orbit.kind != SADDLE:
-        raise InputError(f"the orbit is a {orbit.name}, expected a saddle, which has both manifolds")
+        raise InputError(
+            f"the orbit is a {orbit.name}", key="orbit", expected="a saddle, which has both manifolds"
+        )
     unknown = [kind for kind in kinds if kind not in KINDS]
     if unknown or not kinds:
-        raise InputError(f"kinds = {kinds!r}, expected some of {', '.join(KINDS)}")
+        raise InputError.of("kinds", kinds, f"some of {', '.join(KINDS)}")
     limits = _Limits(
         read_positive(length, "1", "length"),
         read_count(points, "points"),

@@ -84,7 +84,7 @@ def orbits(
     most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
     count = read_count(starts, "starts")
     if most > MOST_FIRINGS:
-        raise InputError(f"longest = {most}, expected at most {MOST_FIRINGS} firings")
+        raise InputError.of("longest", most, f"at most {MOST_FIRINGS} firings", written=str(most))
     check_tolerance(tolerance)
     onward = read_count(follow, "follow", least=0)
     return Search(regime, most, several, onward, tolerance, thread_count(threads), progress).run(count)
@@ -125,7 +125,7 @@ def orbit(
     check_tolerance(tolerance)
     states = [read_state(state)]
     if count > MOST_FIRINGS:
-        raise InputError(f"firings = {count}, expected at most {MOST_FIRINGS}")
+        raise InputError.of("firings", count, f"at most {MOST_FIRINGS}", written=str(count))
     scales = regime.window.half_widths
     exact = ExactMaps(regime, tolerance, threads)
     for _ in range(count - 1):

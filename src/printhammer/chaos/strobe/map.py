@@ -99,9 +99,7 @@ def read_state(state: npt.ArrayLike) -> FloatArray:
     """Read displacement, m, and velocity, m/s; InputError where it is not two finite numbers."""
     pair = np.asarray(state, dtype=np.float64)
     if pair.shape != (2,) or not np.isfinite(pair).all():
-        raise InputError(
-            f"state = {state!r}, expected two finite numbers, displacement in m and velocity in m/s"
-        )
+        raise InputError.of("state", state, "two finite numbers, displacement in m and velocity in m/s")
     return pair
 
 

@@ -231,7 +231,7 @@ def strobes(
     """
     count, skipped = read_count(points, "points"), read_count(transient, "transient", least=0)
     if not 1 <= firings[0] < firings[1]:
-        raise InputError(f"firings = {firings!r}, expected the first and the last firing to judge, ascending")
+        raise InputError.of("firings", firings, "the first and the last firing to judge, ascending")
     fired = max(count + skipped, firings[1] if verdict else 1)
     many = regimes_of(hammers, periods, drives, waveform=waveform, overlap=overlap, phase=phase)
     table = None if states is None else np.asarray(states, dtype=np.float64)
@@ -239,7 +239,7 @@ def strobes(
     size = max(len(many), 0 if rows is None else len(rows)) if many and rows != [] else 0
     for name, entries in (("hammers and periods", many), ("states", rows)):
         if entries is not None and len(entries) not in (1, size):
-            raise InputError(f"{name}: {len(entries)} are given, expected 1 or {size}")
+            raise InputError(f"{name}: {len(entries)} are given", key=name, expected=f"1 or {size}")
     begun: list[Any] = [None] if rows is None else [tuple(row) for row in rows]
     trains = [Train.of(many[i % len(many)], fired, begun[i % len(begun)]) for i in range(size)]
     chosen = np.arange(skipped + 1, skipped + count + 1)
@@ -266,7 +266,7 @@ def points_of(series: Any, firing: Firing) -> Any:
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)
     if firing:
-        raise InputError(f"points are given, expected no {' or '.join(firing)} beside them")
+        raise InputError("points are given", key="points", expected=f"no {' or '.join(firing)} beside them")
     return series
 
 
@@ -325,7 +325,9 @@ def scheme_strobes(
     """
     if scheme not in SCHEMES or reading not in READINGS:
         known = f"{' or '.join(SCHEMES)}, and {', '.join(READINGS)}"
-        raise InputError(f"scheme = {scheme!r} with reading = {reading!r}, expected {known}")
+        raise InputError(
+            f"scheme = {scheme!r} with reading = {reading!r}", key="scheme", value=scheme, expected=known
+        )
     regimes = regimes_of(hammers, periods)
     strobed = []
     for done, regime in enumerate(regimes, 1):

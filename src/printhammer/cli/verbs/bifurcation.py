@@ -67,7 +67,9 @@ def bifurcation(
     start: Any = direction.replace("-", " ")
     timed = parameter in ("period", "rate")
     if timed and (period is not None or rate is not None):
-        raise InputError(f"--period and --rate: expected none of them where the {parameter} is changed")
+        raise InputError(
+            f"--period and --rate: expected none of them where the {parameter} is changed", key="--period"
+        )
     passed |= {"period": period, "rate": rate}
     firing = firing_of(job, hammer, passed, "--period '1.05 ms'", timed=not timed)
     if timed and "drive" not in firing:
@@ -114,12 +116,13 @@ def _axis(
     if parameter == "period" and not forced:
         first, last = first or _RANGE[0], last or _RANGE[1]
     if first is None or last is None:
-        raise InputError(f"--from and --to: expected both of them for {parameter}, in {unit}")
+        raise InputError(f"--from and --to: expected both of them for {parameter}, in {unit}", key="--from")
     low, high = (read_number(end, unit, name) for end, name in ((first, "--from"), (last, "--to")))
     if count < 2 or not low < high:
         raise InputError(
             f"--from {first}, --to {last} and --values {count}: expected the second to be the higher"
-            " one, and at least 2 values"
+            " one, and at least 2 values",
+            key="--from",
         )
     grid = np.linspace(low, high, count)
     if timed:

@@ -137,17 +137,21 @@ def duty(
             "none beside --rates",
         )
         if hammer is not None:
-            raise InputError(f"{hammer} is given, expected no hammer beside --rates")
+            raise InputError(
+                f"{hammer} is given", key="HAMMER", value=hammer, expected="no hammer beside --rates"
+            )
         with located(str(rates)):
             behind = thermal_limit(**read_rates(rates))
         return Answer(render(behind.summary()), files={"out": Content.of(behind)})
     from printhammer.control.duty import thermal_duty
 
     if (hammer is None) == (heat is None):
-        raise InputError("HAMMER and --heat: expected one of them, such as --heat '4 mJ'")
+        raise InputError("HAMMER and --heat: expected one of them, such as --heat '4 mJ'", key="HAMMER")
     for name in _NEEDED:
         if name not in passed:
-            raise InputError(f"--{name.replace('_', '-')} is missing, expected it beside the heat of a dot")
+            raise InputError(
+                f"--{name.replace('_', '-')} is missing", key=name, expected="it beside the heat of a dot"
+            )
     made = thermal_duty(heat if heat is not None else _fired(hammer, passed), **passed)
     return Answer(render(made.summary()), files={"out": Content.of(made)})
 
@@ -157,5 +161,9 @@ def _fired(name: str | None, passed: dict[str, Any]) -> Any:
     from printhammer.control.duty import heat_of
 
     if "feed" in passed:
-        raise InputError("--feed is given, expected it beside --heat only: a hammer has a driver of its own")
+        raise InputError(
+            "--feed is given",
+            key="--feed",
+            expected="it beside --heat only: a hammer has a driver of its own",
+        )
     return heat_of(load_hammer(str(name), fired=True))

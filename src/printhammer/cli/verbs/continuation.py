@@ -26,7 +26,9 @@ def read_state(written: str, name: str) -> tuple[float, float]:
     parts = [part.strip() for part in written.split(",")]
     if len(parts) != 2:
         raise InputError(
-            f"{name} {written!r}: expected displacement and velocity, such as '46.2 um, 12 mm/s'"
+            f"{name} {written!r}: expected displacement and velocity, such as '46.2 um, 12 mm/s'",
+            key=name,
+            value=written,
         )
     return read_number(parts[0], "m", name), read_number(parts[1], "m/s", name)
 
@@ -89,9 +91,12 @@ def continue_(
 
     bounds = both(lowest, highest, "--from", "--to", parameter)
     if regimes and (period, rate, firings, state, second) != (None,) * 5:
-        raise InputError("--regimes: expected no --period, --rate, --firings, --state or --second beside it")
+        raise InputError(
+            "--regimes: expected no --period, --rate, --firings, --state or --second beside it",
+            key="--regimes",
+        )
     if regimes and parameter != "rate":
-        raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes")
+        raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes", key="--parameter")
     passed |= {"period": period, "rate": rate}
     firing = firing_of(job, hammer, passed, "--period '1.3 ms'", timed=not regimes)
     ends = None if second is None else both(second_from, second_to, "--second-from", "--second-to", second)
@@ -133,7 +138,11 @@ def continue_(
 def both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
     """Return both ends of a range; InputError where one is missing."""
     if low is None or high is None:
-        raise InputError(f"{first if low is None else last} is missing, expected the range of {parameter}")
+        raise InputError(
+            f"{first if low is None else last} is missing",
+            key=first if low is None else last,
+            expected=f"the range of {parameter}",
+        )
     return low, high
 
 
@@ -144,7 +153,7 @@ def _followed(
     from printhammer.chaos.continuation.regimes import follow_doublings
 
     if levels < 0:
-        raise InputError(f"doublings = {levels}, expected a whole number from 0 on")
+        raise InputError.of("doublings", levels, "a whole number from 0 on", written=str(levels))
     with job.counting("orbits", remaining=False) as tell:
         branch = continuation(hammer, parameter, bounds, progress=tell, **options)
     return follow_doublings(branch, levels, most=options["most"])
@@ -158,7 +167,11 @@ def read_event(written: str, name: str) -> int | str:
     if written.strip().isdecimal():
         return int(written)
     if written not in (*KINDS, FIRST, LAST):
-        raise InputError(f"{name} {written!r}: expected a number, {FIRST}, {LAST}, {' or '.join(KINDS)}")
+        raise InputError(
+            f"{name} {written!r}: expected a number, {FIRST}, {LAST}, {' or '.join(KINDS)}",
+            key=name,
+            value=written,
+        )
     return written
 
 
@@ -217,7 +230,9 @@ def curve(
     chosen: dict[str, Any] = {"event": event, "grid": (grid, grid), "most": most}
     if start is not None:
         if (firings, state) != (None, None):
-            raise InputError(f"--start {start}: expected no --firings and no --state beside it")
+            raise InputError(
+                f"--start {start}: expected no --firings and no --state beside it", key="--start"
+            )
         own = (
             None if lowest is None and highest is None else both(lowest, highest, "--from", "--to", parameter)
         )

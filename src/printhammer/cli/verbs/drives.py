@@ -54,10 +54,12 @@ def energy(
     passed |= {"least": "heat" if heat else "positive work", "shape": "pulses" if pulses else "free"}
     current = any(path.suffix.lower() == ".csv" for path in job.outputs)
     if pulses and current:
-        raise InputError("--pulses is given, expected no current (.csv) beside it")
+        raise InputError("--pulses is given", key="--pulses", expected="no current (.csv) beside it")
     if rates is not None:
         if supply or current:
-            raise InputError("--rates is given, expected neither --supply nor a current (.csv) beside it")
+            raise InputError(
+                "--rates is given", key="--rates", expected="neither --supply nor a current (.csv) beside it"
+            )
         from printhammer.control.least_work.rates import FOUND, least_work_rates
 
         with job.counting("rates") as tell:

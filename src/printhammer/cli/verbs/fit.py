@@ -236,7 +236,9 @@ def motion(
         from printhammer.identify.shots.motion import fit_motion
 
         if known is None:
-            raise InputError("the hammer is missing, expected --hammer with the constants known already")
+            raise InputError(
+                "the hammer is missing", key="hammer", expected="--hammer with the constants known already"
+            )
         keys = [key.strip() for key in free.split(",")] if free is not None else None
         tables = opt.given(magnet=magnet, spring=spring, pack=pack, backstop=backstop)
         for fit in _earlier_fits(tables, known, passed["robust"]):
@@ -277,7 +279,9 @@ def coil(
         from printhammer.identify.coil import FREE, fit_coil
 
         if known is None:
-            raise InputError("the hammer is missing, expected --hammer with the constants known already")
+            raise InputError(
+                "the hammer is missing", key="hammer", expected="--hammer with the constants known already"
+            )
         keys = list(FREE) if free is None else _keys(free)
         return fit_coil(files, known, free=[*keys, *_keys(also or "")], **passed)
 
@@ -297,7 +301,9 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
     fits = []
     if "magnet" in rest:
         if "spring" not in rest:
-            raise InputError("--magnet: expected --spring too, or F0 and Bs cannot be told apart")
+            raise InputError(
+                "--magnet: expected --spring too, or F0 and Bs cannot be told apart", key="--magnet"
+            )
         fits.append(fit("magnet", rest.pop("magnet"), spring=rest.pop("spring"), **options))
     return [*fits, *(fit(kind, path, **options) for kind, path in rest.items())]
 
@@ -309,7 +315,9 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
 
     for path in job.wanted["into"]:
         if hammer is None:
-            raise InputError(f"--into {path}: expected --hammer too, in which constants are replaced")
+            raise InputError(
+                f"--into {path}: expected --hammer too, in which constants are replaced", key="--into"
+            )
     announce_compiling()
     known = None if hammer is None else load(hammer)
     fit = fitted(known)

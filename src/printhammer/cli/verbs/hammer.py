@@ -199,7 +199,7 @@ def from_datasheet(
         typer.echo(_example(example), nl=False)
         return Answer()
     if sheet is None:
-        raise InputError("SHEET is missing, expected a data sheet; --example NAME prints one")
+        raise InputError("SHEET is missing", key="SHEET", expected="a data sheet; --example NAME prints one")
     from printhammer.identify.datasheet.build import hammer_of
     from printhammer.identify.datasheet.sheet import read_sheet
     from printhammer.results import Cells, Grid, Summary
@@ -234,5 +234,5 @@ def _example(name: str) -> str:
     folder = files("printhammer").joinpath("hammers", "sheets")
     known = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir())
     if name not in known:
-        raise InputError(f"--example = {name!r}, expected {nearest(name, known)}")
+        raise InputError.of("--example", name, nearest(name, known))
     return folder.joinpath(f"{name}.toml").read_text(encoding="utf-8")

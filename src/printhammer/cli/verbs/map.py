@@ -77,10 +77,12 @@ def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -
     if figure is None:
         return 9
     if not any(path.suffix.lower() in PICTURES for path in outputs):
-        raise InputError(f"--figure {figure}: expected a picture among the files of --out")
+        raise InputError(f"--figure {figure}: expected a picture among the files of --out", key="--figure")
     if measured is not None:
         raise InputError(
-            f"--figure {figure} is given beside --measured {measured}, expected one or the other"
+            f"--figure {figure} is given beside --measured {measured}",
+            key="--figure",
+            expected="one or the other",
         )
     return int(figure)
 
@@ -99,18 +101,20 @@ def _axes(
         moments = known[known >= 0.0]
         if len(moments) < 2:
             raise InputError(
-                f"--measured {beside.attrs['source']}: {len(moments)} times from the first firing on,"
-                " expected at least 2"
+                f"--measured {beside.attrs['source']}: {len(moments)} times from the first firing on",
+                key="--measured",
+                expected="at least 2",
             )
     if beside is not None and low is None and high is None and rates is None:
         return beside["rate"].values, moments
     low, high = LOWEST if low is None else low, HIGHEST if high is None else high
     count = RATES if rates is None else rates
     if not 1 <= count <= MOST_CELLS:
-        raise InputError(f"--rates {count}: expected a whole number from 1 to {MOST_CELLS}")
+        raise InputError(f"--rates {count}: expected a whole number from 1 to {MOST_CELLS}", key="--rates")
     if high < low or (high == low and count > 1):
         raise InputError(
-            f"--from {low:.9g} Hz and --to {high:.9g} Hz: expected the second to be the higher one"
+            f"--from {low:.9g} Hz and --to {high:.9g} Hz: expected the second to be the higher one",
+            key="--from",
         )
     return np.linspace(low, high, count), moments
 

@@ -92,18 +92,18 @@ def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str,
     from printhammer.support.files import check_outputs
 
     if kind not in (*KINDS, ALL):
-        raise InputError(f"KIND = {kind!r}, expected one of {', '.join((*KINDS, ALL))}")
+        raise InputError.of("KIND", kind, f"one of {', '.join((*KINDS, ALL))}")
     if out is None:
         what = "a folder" if kind == ALL else "a file"
-        raise InputError(f"--out is missing, expected {what} for the measurements")
+        raise InputError("--out is missing", key="--out", expected=f"{what} for the measurements")
     if kind != ALL:
         if out.suffix.lower() != ".csv":
-            raise InputError(f"--out {out}: expected a name that ends in .csv")
+            raise InputError(f"--out {out}: expected a name that ends in .csv", key="--out")
         paths = {kind: out}
         check_outputs(paths.values(), job.inputs)
     else:
         if out.exists() and not out.is_dir():
-            raise InputError(f"--out {out}: expected a folder, this is a file")
+            raise InputError(f"--out {out}: expected a folder, this is a file", key="--out")
         paths = {each: out / f"{each}.csv" for each in KINDS}
         if out.is_dir():
             check_outputs(paths.values(), job.inputs)
@@ -125,7 +125,9 @@ def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str,
         if name in settings and not recorded:
             flag = name.replace("_", "-")
             raise InputError(
-                f"--{flag} {settings[name]} is given with {kinds[0]}, expected it with motion or current only"
+                f"--{flag} {settings[name]} is given with {kinds[0]}",
+                key=f"--{flag}",
+                expected="it with motion or current only",
             )
     return {kind: applicable(SENSORS[kind], settings) for kind in kinds}
 
@@ -143,7 +145,9 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
         owners = [kind for kind in kinds if name in accepted[kind]]
         if not owners:
             right = ", ".join(kind for kind, make in BENCHES.items() if name in signature(make).parameters)
-            raise InputError(f"--{name} {text} is given with {kinds[0]}, expected it with {right} only")
+            raise InputError(
+                f"--{name} {text} is given with {kinds[0]}", key=f"--{name}", expected=f"it with {right} only"
+            )
         value: Any = (
             text
             if name in _TEXTS

@@ -41,13 +41,17 @@ def figure(
 
     entry = FIGURES.get(opt.read_whole(number, "figure"))
     if entry is None:
-        raise InputError(f"figure = {number}: expected one of {', '.join(map(str, FIGURES))}")
+        raise InputError.of(
+            "figure", number, f"one of {', '.join(map(str, FIGURES))}", written=str(number), said=": expected"
+        )
     if scheme == "exact" and reading != "firings":
-        raise InputError(
-            f"--reading = {reading}, expected it with --scheme, since the exact motion has no step"
+        raise InputError.of(
+            "--reading", reading, "it with --scheme, since the exact motion has no step", written=str(reading)
         )
     if scheme != "exact" and entry.number != _POINCARE:
-        raise InputError(f"--scheme = {scheme}, expected it with figure {_POINCARE}, not {entry.number}")
+        raise InputError.of(
+            "--scheme", scheme, f"it with figure {_POINCARE}, not {entry.number}", written=str(scheme)
+        )
     options: dict[str, Any] = {}
     name = f"figure{entry.number:02d}"
     if entry.number == _POINCARE:

@@ -38,9 +38,11 @@ def chosen_strategy(
         this hammer.
     """
     if serial is not None and table is None:
-        raise InputError(f"--serial {serial}: expected a table that was learned, --table, beside it")
+        raise InputError(
+            f"--serial {serial}: expected a table that was learned, --table, beside it", key="--serial"
+        )
     if feedback and table is not None:
-        raise InputError(f"--table {table} and --feedback: expected one of them")
+        raise InputError(f"--table {table} and --feedback: expected one of them", key="--table")
     if table is not None:
         from printhammer.control.table.compensation import load_table
 
@@ -112,7 +114,7 @@ def quality(
     instead = {"safe-rate": safe_rate, "yield": yield_ is not None, "damping": damping}
     tasks = [name for name, wanted in instead.items() if wanted] or ["report"]
     if len(tasks) > 1:
-        raise InputError(f"--{tasks[0]} and --{tasks[1]}: expected one of them")
+        raise InputError(f"--{tasks[0]} and --{tasks[1]}: expected one of them", key=f"--{tasks[0]}")
     task = tasks[0]
     of_report = opt.given(rate=rate, pattern=pattern, pulses=pulses, pitch=pitch, paper=paper)
     of_drive = opt.given(table=table, serial=serial, feedback=feedback or None)
@@ -120,9 +122,11 @@ def quality(
     of_draw = opt.given(spread=spread, judged_by=judged_by, seed=seed)
     _only(task, {*of_report, *of_drive, *of_grid, *of_draw, *opt.given(current=current, threads=threads)})
     if task == "report" and rate is None:
-        raise InputError("--rate: expected slots per second, such as --rate 900Hz, or --safe-rate")
+        raise InputError(
+            "--rate: expected slots per second, such as --rate 900Hz, or --safe-rate", key="--rate"
+        )
     if pattern is not None and pulses is not None:
-        raise InputError("--pattern and --pulses: expected one of them")
+        raise InputError("--pattern and --pulses: expected one of them", key="--pattern")
     share = None if force_limit is None else opt.read_share(force_limit, "--force-limit")
     bounds = replace(limits_named(limits), **opt.given(force=share, arrival=arrival_limit))
     strategy, loaded_table = chosen_strategy(job, hammer, table, feedback, serial)
@@ -152,7 +156,7 @@ def quality(
 
         spreads = _spreads(hammer, spread or [])
         if yield_ is None or yield_ < 1:
-            raise InputError(f"--yield {yield_}: expected a number of hammers, 1 or more")
+            raise InputError(f"--yield {yield_}: expected a number of hammers, 1 or more", key="--yield")
         drawn = opt.given(seed=seed, judged_by=judged_by)
         with job.counting("hammers") as tell:
             result = tolerance_yield(hammer, rate, number=yield_, progress=tell, **spreads, **drawn, **many)
@@ -187,7 +191,9 @@ def _only(task: str, options: set[str]) -> None:
     if odd:
         where = " or ".join(named(name) for name, takes in _TAKES.items() if odd[0] in takes)
         flag = odd[0].replace("_", "-")
-        raise InputError(f"--{flag} is given, which belongs to {where}, not to {named(task)}")
+        raise InputError(
+            f"--{flag} is given, which belongs to {where}, not to {named(task)}", key=f"--{flag}"
+        )
 
 
 def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
@@ -198,7 +204,10 @@ def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
         return {}
     common = [written for written in texts if "=" not in written]
     if len(common) > 1:
-        raise InputError(f"--spread {common[1]}: expected one spread of all constants, {common[0]} is given")
+        raise InputError(
+            f"--spread {common[1]}: expected one spread of all constants, {common[0]} is given",
+            key="--spread",
+        )
     spreads = spreads_of(hammer, opt.read_share(common[0], "--spread")) if common else {}
     for written in texts:
         key, sign, value = written.partition("=")
@@ -265,7 +274,7 @@ def print_(
     from printhammer.printing.page.pattern import BITMAPS
 
     if rate is None:
-        raise InputError("--rate is missing, expected slots per second such as '1.2 kHz'")
+        raise InputError("--rate is missing", key="--rate", expected="slots per second such as '1.2 kHz'")
     often = read_positive(rate, "Hz", "--rate")
     if not job.outputs:
         *pages, last = (Path(name) for name in _USUAL)
@@ -301,15 +310,18 @@ def _pattern(
 
     if path is not None:
         if text is not None:
-            raise InputError("TEXT and --pattern: both are given, expected one of them")
+            raise InputError("TEXT and --pattern: both are given", key="--pattern", expected="one of them")
         for name, value in (("--font", font), ("--columns", columns)):
             if value is not None:
                 raise InputError(
-                    f"{name} {value} is given beside --pattern {path}, expected with a text only"
+                    f"{name} {value} is given beside --pattern {path}",
+                    key=name,
+                    value=value,
+                    expected="with a text only",
                 )
         return Pattern.load(path, wires)
     if text is None:
-        raise InputError("TEXT and --pattern: neither is given, expected one of them")
+        raise InputError("TEXT and --pattern: neither is given", key="--pattern", expected="one of them")
     return Pattern.from_text(
         text.replace("\\n", "\n"),
         WIRES if wires is None else wires,

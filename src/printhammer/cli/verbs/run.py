@@ -82,11 +82,16 @@ def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
     beside = opt.given(**train)
     if file is not None:
         for name in beside:
-            raise InputError(f"--{name} is given beside --drive {file}, expected one or the other")
+            raise InputError(
+                f"--{name} is given beside --drive {file}", key=f"--{name}", expected="one or the other"
+            )
         return load_drive(file, hammer.waveform)
     if hammer.waveform is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] to fire, expected one, or --drive FILE"
+            f"{hammer.path}: the hammer has no [waveform] to fire",
+            file=hammer.path,
+            key="waveform",
+            expected="one, or --drive FILE",
         )
     if "at" in beside:
         beside["at"] = [each.strip() for each in beside["at"].split(",")]

@@ -160,10 +160,12 @@ def _periods(
 
     ranged = lowest is not None or highest is not None
     if sum((period is not None, rate is not None, ranged)) != 1:
-        raise InputError("--period, --rate, --from and --to: expected --period, --rate, or --from and --to")
+        raise InputError(
+            "--period, --rate, --from and --to: expected --period, --rate, or --from and --to", key="--period"
+        )
     if not ranged:
         if steps is not None:
-            raise InputError(f"--steps {steps}: expected --from and --to beside it")
+            raise InputError(f"--steps {steps}: expected --from and --to beside it", key="--steps")
         name, unit = ("--period", "s") if period is not None else ("--rate", "Hz")
         values = np.array(
             [read_positive(each.strip(), unit, name) for each in (period or rate or "").split(",")]
@@ -171,13 +173,14 @@ def _periods(
         return values if unit == "s" else 1.0 / values
     if lowest is None or highest is None:
         missing = "--from" if lowest is None else "--to"
-        raise InputError(f"{missing} is missing, expected both --from and --to")
+        raise InputError(f"{missing} is missing", key=missing, expected="both --from and --to")
     low, high = read_positive(lowest, "s", "--from"), read_positive(highest, "s", "--to")
     count = _STEPS if steps is None else steps
     if not high > low:
         raise InputError(
-            f"--from {low:.9g} s and --to {high:.9g} s: expected the second to be the longer one"
+            f"--from {low:.9g} s and --to {high:.9g} s: expected the second to be the longer one",
+            key="--from",
         )
     if count < 2:
-        raise InputError(f"--steps {steps}: expected at least 2")
+        raise InputError(f"--steps {steps}: expected at least 2", key="--steps")
     return np.linspace(low, high, count)

@@ -53,13 +53,13 @@ def sweep(
     from printhammer.sweep.spec import read_spec
 
     if spec is None:
-        raise InputError("SPEC is missing, expected a spec file; --example prints one")
+        raise InputError("SPEC is missing", key="SPEC", expected="a spec file; --example prints one")
     if threads is not None and dask is not None:
-        raise InputError("--threads is given beside --dask, expected one or the other")
+        raise InputError("--threads is given beside --dask", key="--threads", expected="one or the other")
     if check:
         return Answer(render(make_plan(read_spec(spec)).summary()))
     if out is None:
-        raise InputError("--out is missing, expected a folder for the results")
+        raise InputError("--out is missing", key="--out", expected="a folder for the results")
     from printhammer.sweep import sweep as run_sweep
 
     announce_compiling()

@@ -31,7 +31,9 @@ def tuned_along(
 
     axis, values = _read(along)
     if "rate" not in options or "rates" in options:
-        raise InputError("--along is given without --rate, expected one rate, such as --rate 1.3kHz")
+        raise InputError(
+            "--along is given without --rate", key="--along", expected="one rate, such as --rate 1.3kHz"
+        )
     check_endings(job.wanted["out"], (*opt.DATA, ".h"), "--out")
     with job.counting("tuning") as tell:
         made = tune_along(hammer, axis, values, progress=tell, **options)
@@ -54,7 +56,7 @@ def _read(written: str) -> tuple[str, list[float]]:
 
     axis, _, rest = written.strip().partition(" ")
     if axis not in AXES:
-        raise InputError(f"--along {written!r}: expected one of {', '.join(AXES)} first")
+        raise InputError(f"--along {written!r}: expected one of {', '.join(AXES)} first", key="--along")
     return axis, opt.between(opt.read_span(rest, f"--along {axis}"), AXES[axis].unit, f"--along {axis}")
 
 
@@ -107,9 +109,11 @@ def tune(
     from printhammer.control.table.tuning import tune as tuned
 
     if job.wanted["report"] and not judge:
-        raise InputError(f"--report {job.wanted['report'][0]} is given, expected none beside --no-judge")
+        raise InputError(
+            f"--report {job.wanted['report'][0]} is given", key="--report", expected="none beside --no-judge"
+        )
     if "rate" in passed and "rates" in passed:
-        raise InputError("--rate and --rates are given, expected one of them")
+        raise InputError("--rate and --rates are given", key="--rate", expected="one of them")
     if variability:
         from printhammer.printing.rates.variability import Variability
 
@@ -117,7 +121,9 @@ def tune(
     options = opt.given(tolerance=tolerance, threads=threads)
     if along is not None:
         if job.wanted["report"]:
-            raise InputError(f"--report {job.wanted['report'][0]} is given, expected none beside --along")
+            raise InputError(
+                f"--report {job.wanted['report'][0]} is given", key="--report", expected="none beside --along"
+            )
         return tuned_along(job, hammer, along, opt.given(tick=tick), budget, {**passed, **options}, units)
     with job.counting("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)
@@ -224,7 +230,9 @@ def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict
 
     if noise is None:
         raise InputError(
-            "--signal-noise is missing, expected the noise of a sample, such as '5 mA' or '50 mV'"
+            "--signal-noise is missing",
+            key="--signal-noise",
+            expected="the noise of a sample, such as '5 mA' or '50 mV'",
         )
     with job.counting("sampling") as tell:
         study = impact_time(hammer, signal=signal, noise=[noise], dots=200, units=50, progress=tell)

@@ -253,7 +253,7 @@ def feedback(
 def _checked_gaps(asked: npt.ArrayLike) -> FloatArray:
     gaps = np.asarray(asked, dtype=np.float64)
     if gaps.ndim != 1 or not 0 < gaps.size <= MOST_GAPS or not (np.isfinite(gaps) & (gaps > 0.0)).all():
-        raise InputError(f"gaps = {asked!r}, expected 1 to {MOST_GAPS} positive times, s")
+        raise InputError.of("gaps", asked, f"1 to {MOST_GAPS} positive times, s")
     return gaps
 
 

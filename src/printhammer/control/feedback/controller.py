@@ -100,7 +100,9 @@ class Controller:
     ) -> None:
         if hammer.front is None or hammer.backstop is None:
             missing = "pack" if hammer.front is None else "backstop"
-            raise InputError(f"{hammer.path}: the hammer has no {missing}, expected one")
+            raise InputError(
+                f"{hammer.path}: the hammer has no {missing}", file=hammer.path, key=missing, expected="one"
+            )
         self.limits = Limits() if limits is None else limits
         self.plant = plant = Plant(hammer, driver, nominal(hammer), threads)
         self.hammer, self.driver = hammer, driver

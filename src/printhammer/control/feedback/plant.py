@@ -122,7 +122,10 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":
         raise InputError(
-            f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current, which the loop switches"
+            f"{hammer.path}: the waveform is a {pulse.quantity}",
+            file=hammer.path,
+            key="waveform",
+            expected="a current, which the loop switches",
         )
     own = max(float(getattr(pulse, "decay", STANDARD)), FASTEST)
     return Driver(current, own if edge is None else edge)

@@ -133,8 +133,14 @@ def launch(plant: Plant, forces: ForceMap) -> Launch:
     struck = ok & dots.struck[:, 0]
     if not struck.any() or not speed[struck].min() <= wanted <= speed[struck].max():
         raise InputError(
-            f"{plant.hammer.path}: no push of {driver.current:g} A from rest touches the pack at {wanted:.3g}"
-            " m/s, expected a stronger driver"
+            (
+                f"{plant.hammer.path}: no push of {driver.current:g} A from rest touches the pack at"
+                f" {wanted:.3g}"
+                " m/s"
+            ),
+            file=plant.hammer.path,
+            key="current",
+            expected="a stronger driver",
         )
     order = np.argsort(speed[struck])
     width, time = (

@@ -244,9 +244,9 @@ def learn(
     largest = read_positive(largest_current, "A", "largest_current")
     count = read_count(members, "members")
     if not 100 <= count <= 5000:
-        raise InputError(f"members = {count}, expected 100 to 5000")
+        raise InputError.of("members", count, "100 to 5000", written=str(count))
     if not serial:
-        raise InputError(f"serial = {serial!r}, expected a text")
+        raise InputError.of("serial", serial, "a text")
     shown = ImpactSensor() if sensor is None else sensor
     spread = Variability.of(hammer) if variability is None else variability
     steps, total = iter(range(1, 3)), 2 + len(RUNS)

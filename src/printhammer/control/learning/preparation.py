@@ -51,9 +51,9 @@ def law_for(
     Arguments are those of `learn`.
     """
     if not 0.0 < forgetting < 1.0:
-        raise InputError(f"forgetting = {forgetting!r}, expected a number above 0 and below 1")
+        raise InputError.of("forgetting", forgetting, "a number above 0 and below 1")
     if not 0.0 <= doubt <= 1.0:
-        raise InputError(f"doubt = {doubt!r}, expected a number from 0 to 1")
+        raise InputError.of("doubt", doubt, "a number from 0 to 1")
     spread = Variability.of(hammer) if variability is None else variability
     bounds = Limits() if limits is None else limits
     driven = driven_by(hammer, driver, largest_current)

@@ -47,11 +47,17 @@ class ImpactSensor(Declared):
             value = getattr(self, name)
             if not 0.0 <= value < most:
                 limit = f" and below {most:g}" if math.isfinite(most) else ""
-                raise InputError(f"sensor: {name} = {value!r} is expected to be a number not below 0{limit}")
+                raise InputError.of(
+                    name, value, f"a number not below 0{limit}", file="sensor", said=" is expected to be"
+                )
         if not (math.isfinite(self.gain) and self.gain > -1.0):
-            raise InputError(f"sensor: gain = {self.gain!r} is expected to be a number above -1")
+            raise InputError.of(
+                "gain", self.gain, "a number above -1", file="sensor", said=" is expected to be"
+            )
         if type(self.seed) is not int or self.seed < 0:
-            raise InputError(f"sensor: seed = {self.seed!r} is expected to be a whole number not below 0")
+            raise InputError.of(
+                "seed", self.seed, "a whole number not below 0", file="sensor", said=" is expected to be"
+            )
 
     def read(self, flight: FloatArray, force: FloatArray, unit: int, run: int) -> Readings:
         """Return what is shown of dots (N,) by their true flight times, s, and forces; NaN if lost."""

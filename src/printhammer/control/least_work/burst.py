@@ -143,7 +143,12 @@ class LeastWork(Result, rows="node"):
     def nodes(self) -> tuple[list[float], list[float]]:
         """Times, s, and currents, A, of the nodes, between which the current runs in straight lines."""
         if self.shape != "free":
-            raise InputError(f"shape = {self.shape!r}: the current has no nodes, expected a free one")
+            raise InputError(
+                f"shape = {self.shape!r}: the current has no nodes",
+                key="shape",
+                value=self.shape,
+                expected="a free one",
+            )
         times, values = [0.0], [0.0]
         for at, waveform in zip(self.drive.times.tolist(), self.drive.waveforms, strict=True):
             assert isinstance(waveform, Sampled)
@@ -225,7 +230,7 @@ class LeastWork(Result, rows="node"):
         """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it."""
         factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
         if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
-            raise InputError(f"changes = {changes!r}, expected relative changes of the current above -1")
+            raise InputError.of("changes", changes, "relative changes of the current above -1")
         drives = [self.drive.scaled(factor) for factor in factors.tolist()]
         result = Ensemble(self.hammer, drives, self.motion.end).run(dots=True, engine="plain")
         dots = result.dots
@@ -400,33 +405,44 @@ def least_work(
     period = 1.0 / read_positive(rate, "Hz", "rate")
     count = read_count(dots, "dots")
     if count > MOST_DOTS:
-        raise InputError(f"dots = {count}, expected at most {MOST_DOTS}")
+        raise InputError.of("dots", count, f"at most {MOST_DOTS}", written=str(count))
     share, top = read_positive(force, "1", "force"), read_positive(largest, "A", "largest")
     if share > 2.0:
-        raise InputError(f"force = {share!r}, expected at most 2 times that of the single pulse")
+        raise InputError.of("force", share, "at most 2 times that of the single pulse")
     if least not in LEASTS:
-        raise InputError(f"least = {least!r}, expected one of {', '.join(LEASTS)}")
+        raise InputError.of("least", least, f"one of {', '.join(LEASTS)}")
     if shape not in SHAPES:
-        raise InputError(f"shape = {shape!r}, expected one of {', '.join(SHAPES)}")
+        raise InputError.of("shape", shape, f"one of {', '.join(SHAPES)}")
     apart = None if spacing is None else read_positive(spacing, "s", "spacing")
     for role in ("magnet", "spring", "backstop", "pack"):
         if getattr(hammer, role) is None:
-            raise InputError(f"{hammer.path}: the hammer has no {role}, expected one with all parts")
+            raise InputError(
+                f"{hammer.path}: the hammer has no {role}",
+                file=hammer.path,
+                key=role,
+                expected="one with all parts",
+            )
     waveform = pulse_of(hammer)
     if waveform.quantity != "current":
         raise InputError(
-            f"{hammer.path}: the waveform is a {waveform.quantity}, expected a current, which is sought"
+            f"{hammer.path}: the waveform is a {waveform.quantity}",
+            file=hammer.path,
+            key="waveform",
+            expected="a current, which is sought",
         )
     steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
     if shape == "pulses":
         steepest = math.inf
     elif slew is None and not math.isfinite(steepest):
         raise InputError(
-            f"{hammer.path}: the waveform jumps, expected slew, the steepest slope of the current"
+            f"{hammer.path}: the waveform jumps",
+            file=hammer.path,
+            key="waveform",
+            expected="slew, the steepest slope of the current",
         )
     elif not (math.isfinite(steepest) and steepest > 0.0):
-        raise InputError(
-            f"slew = {steepest!r} A/s, expected a positive number, the steepest slope of a current"
+        raise InputError.of(
+            "slew", steepest, "a positive number, the steepest slope of a current", unit="A/s"
         )
     single = nominal(hammer)
     alone = simulate(hammer, PulseTrain(waveform), points=2)

@@ -58,12 +58,20 @@ class PulsePlan:
     ) -> None:
         width = getattr(waveform, "width", None)
         if not isinstance(width, float):
-            raise InputError(f"{task.hammer.path}: a {waveform.shape} waveform has no width to be sought")
+            raise InputError(
+                f"{task.hammer.path}: a {waveform.shape} waveform has no width to be sought",
+                file=task.hammer.path,
+                key="waveform",
+            )
         self._task, self._waveform = task, waveform
         self._period, self._past, self._lead, self._landing = period, past, lead, landing
         self._widest = widest(waveform, task.largest / (1.0 + GONE), 0.0, period, _HALVINGS)
         if self._widest <= _NONE * period:
-            raise InputError(f"{task.hammer.path}: no width keeps the waveform below {task.largest:g} A")
+            raise InputError(
+                f"{task.hammer.path}: no width keeps the waveform below {task.largest:g} A",
+                file=task.hammer.path,
+                key="width",
+            )
         self._state = SlotState(rest, 0.0, -1, 0.0, 0.0)
         self._begin = 0.0
         self._fired: list[tuple[float, float]] = []

@@ -85,7 +85,7 @@ def least_work_rates(
         With a status for each rate; a rate at which no current was found is no exception.
     """
     if isinstance(rates, str) or not len(rates):
-        raise InputError(f"rates = {rates!r}, expected at least one rate in a sequence")
+        raise InputError.of("rates", rates, "at least one rate in a sequence")
     asked = np.array([read_positive(rate, "Hz", "rate") for rate in rates])
     rows: list[tuple[float, float, float, float, int, str]] = []
     for number, rate in enumerate(asked.tolist()):

@@ -111,14 +111,14 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         checked_size(self.gaps, self.reach)
         rates = np.asarray(self.rates)
         if rates.ndim != 1 or not rates.size or not np.isfinite(rates).all() or rates[0] <= 0.0:
-            raise InputError("rates: expected positive numbers, at least one")
+            raise InputError("rates: expected positive numbers, at least one", key="rates")
         if (np.diff(rates) <= 0.0).any():
-            raise InputError("rates: expected ascending numbers")
+            raise InputError("rates: expected ascending numbers", key="rates")
         shape = rates.size, entries_of(self.gaps, self.reach)
         for name in (*COLUMNS, "deviation"):
             if np.shape(getattr(self, name)) != shape:
                 raise InputError(
-                    f"{name}: an array of shape {np.shape(getattr(self, name))}, expected {shape}"
+                    f"{name}: an array of shape {np.shape(getattr(self, name))}", key=name, expected=shape
                 )
         for row, rate in enumerate(rates.tolist()):
             for history in histories(self.gaps, self.reach):
@@ -131,12 +131,12 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         where = f"rate {rate:g} Hz, history {'-'.join(map(str, history))}"
         for name, value in values.items():
             if not np.isfinite(value):
-                raise InputError(f"{where}: {name} = {value!r} s, expected a number")
+                raise InputError.of(name, value, "a number", file=where, unit="s")
         if values["width"] <= 0.0:
-            raise InputError(f"{where}: width = {values['width']!r} s, expected a positive number")
+            raise InputError.of("width", values["width"], "a positive number", file=where, unit="s")
         for name in ("brake_delay", "brake_width"):
             if values[name] < 0.0:
-                raise InputError(f"{where}: {name} = {values[name]!r} s, expected a number not below 0")
+                raise InputError.of(name, values[name], "a number not below 0", file=where, unit="s")
         before = [
             number_of((*history[1:], gap) if history[0] else history, self.reach)
             for gap in range(self.reach + 1)
@@ -145,16 +145,25 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         over = float((self.width[row, before] - self.advance[row, before]).max())
         if values["brake_width"] > 0.0:
             if values["brake_delay"] < over - _NEAR:
-                raise InputError(
-                    f"{where}: brake_delay = {values['brake_delay']!r} s, expected a brake pulse after that"
-                    f" of the dot before, which ends at {over:.6g} s"
+                raise InputError.of(
+                    "brake_delay",
+                    values["brake_delay"],
+                    f"a brake pulse after that of the dot before, which ends at {over:.6g} s",
+                    file=where,
+                    unit="s",
                 )
             over = values["brake_delay"] + values["brake_width"]
         begun = history[0] / rate - values["advance"]
         if history[0] and begun < over - _NEAR:
             raise InputError(
-                f"{where}: advance = {values['advance']!r} s fires {begun:.6g} s after the slot of the dot"
-                f" before, expected a firing after its pulses have ended, at {over:.6g} s"
+                (
+                    f"{where}: advance = {values['advance']!r} s fires {begun:.6g} s after the slot of the"
+                    " dot before"
+                ),
+                file=where,
+                key="advance",
+                value=values["advance"],
+                expected=f"a firing after its pulses have ended, at {over:.6g} s",
             )
 
     @property
@@ -173,7 +182,11 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         low, high = float(self.rates[0]), float(self.rates[-1])
         if not low * (1.0 - _NEAR) <= asked <= high * (1.0 + _NEAR):
             span = f"{low:g} Hz" if low == high else f"{low:g} Hz to {high:g} Hz"
-            raise InputError(f"rate = {asked:g} Hz: the table for {self.hammer!r} is made for {span}")
+            raise InputError(
+                f"rate = {asked:g} Hz: the table for {self.hammer!r} is made for {span}",
+                key="rate",
+                value=asked,
+            )
         after = int(np.clip(np.searchsorted(self.rates, asked), 1, max(1, self.rates.size - 1)))
         first, second = after - 1, min(after, self.rates.size - 1)
         periods = 1.0 / self.rates[[first, second]]
@@ -227,8 +240,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         if self.serial and serial not in (self.serial, ANY_UNIT):
             unit = "no serial" if serial is None else f"serial = {serial!r}"
             raise InputError(
-                f"{unit} is given: the table was learned on unit {self.serial!r}, expected this serial, or"
-                f" {ANY_UNIT!r} to drive another unit with it"
+                f"{unit} is given: the table was learned on unit {self.serial!r}",
+                key="unit",
+                value=unit,
+                expected=f"this serial, or {ANY_UNIT!r} to drive another unit with it",
             )
         self.check_hammer(hammer)
         return TableStrategy(self, hammer)
@@ -238,7 +253,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
-                f" {self.fingerprint[:12]}, expected {hammer.fingerprint[:12]}"
+                f" {self.fingerprint[:12]}",
+                file=hammer.path,
+                key="hammer",
+                expected=f"{hammer.fingerprint[:12]}",
             )
 
     def drive(self, hammer: Hammer, slots: Sequence[int], rate: float | str) -> Drive:
@@ -330,8 +348,10 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         unit, size = checked_tick(tick), self.size(tick)
         if budget is not None and size > budget:
             raise InputError(
-                f"budget = {budget} bytes: the table takes {size}, expected a larger budget, a longer tick, a"
-                " shorter history, a shorter reach, or fewer rates"
+                f"budget = {budget} bytes: the table takes {size}",
+                key="budget",
+                value=budget,
+                expected="a larger budget, a longer tick, a shorter history, a shorter reach, or fewer rates",
             )
         return header_text(self._head, self.rates, self._times, unit)
 
@@ -395,7 +415,7 @@ def checked_tick(tick: float | str) -> float:
     asked = read_positive(tick, "s", "tick")
     count = round(asked / NANOSECOND)
     if count < 1 or abs(asked / NANOSECOND - count) > _NEAR * count:
-        raise InputError(f"tick = {tick!r}, expected a whole number of nanoseconds")
+        raise InputError.of("tick", tick, "a whole number of nanoseconds")
     return count * NANOSECOND
 
 
@@ -415,8 +435,10 @@ class TableStrategy:
             largest = float(getattr(table, name).max())
             if largest > widest * (1.0 + ROUNDING):
                 raise InputError(
-                    f"the table for {table.hammer!r} has a {name} of {largest:.9g} s, expected at most"
-                    f" {widest:.9g} s, so that the current is at most {table.largest_current:g} A"
+                    f"the table for {table.hammer!r} has a {name} of {largest:.9g} s",
+                    key=name,
+                    expected=f"at most {widest:.9g} s, so that the current is at most"
+                    f" {table.largest_current:g} A",
                 )
 
     def __call__(self, _hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
@@ -445,9 +467,9 @@ def load_table(path: str | Path) -> CompensationTable:
     """
     target = Path(path)
     if target.suffix.lower() not in (".csv", ".json"):
-        raise InputError(f"{target}: expected a table whose name ends in .csv or .json")
+        raise InputError(f"{target}: expected a table whose name ends in .csv or .json", file=target)
     text = read_text(target, "the table")
     try:
         return CompensationTable(**read_table(text, target.suffix.lower()))
     except InputError as error:
-        raise InputError(f"{target}: {error}") from None
+        raise error.within(target) from None

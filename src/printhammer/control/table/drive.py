@@ -43,7 +43,7 @@ def checked_size(gaps: int, reach: int) -> tuple[int, int]:
     """Return number of gaps and reach."""
     for name, value, most in (("history", gaps, MOST_GAPS), ("reach", reach, MOST_REACH)):
         if isinstance(value, bool) or not 1 <= value <= most:
-            raise InputError(f"{name} = {value!r}, expected a whole number from 1 to {most}")
+            raise InputError.of(name, value, f"a whole number from 1 to {most}")
     return int(gaps), int(reach)
 
 
@@ -86,7 +86,7 @@ def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
     """
     steps = np.diff(np.asarray(slots, np.int64))
     if (steps < 1).any():
-        raise InputError(f"slots = {tuple(slots)}, expected ascending numbers")
+        raise InputError.of("slots", tuple(slots), "ascending numbers", written=str(tuple(slots)))
     recent = [REST] * gaps
     numbers = [number_of(recent, reach)]
     for step in steps.tolist():
@@ -151,10 +151,18 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
     pulse = pulse_of(hammer)
     width = getattr(pulse, "width", None)
     if not isinstance(width, float):
-        raise InputError(f"{hammer.path}: a {pulse.shape} has no width, expected a pulse that has one")
+        raise InputError(
+            f"{hammer.path}: a {pulse.shape} has no width",
+            file=hammer.path,
+            key="waveform",
+            expected="a pulse that has one",
+        )
     if pulse.quantity == "force" or (pulse.quantity == "voltage" and not pulse.replaces):
         raise InputError(
-            f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current, or a driver of the coil"
+            f"{hammer.path}: the waveform is a {pulse.quantity}",
+            file=hammer.path,
+            key="waveform",
+            expected="a current, or a driver of the coil",
         )
 
     def peak_of(other: Waveform) -> float:
@@ -162,7 +170,12 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
     peak = peak_of(pulse)
     if peak > largest * (1.0 + ROUNDING):
-        raise InputError(f"{hammer.path}: the waveform peaks at {peak:.4g} A, expected at most {largest:g} A")
+        raise InputError(
+            f"{hammer.path}: the waveform peaks at {peak:.4g} A",
+            file=hammer.path,
+            key="waveform",
+            expected=f"at most {largest:g} A",
+        )
     bound = max(peak, largest * (1.0 - MARGIN))
     halvings = _HALVINGS if pulse.quantity == "current" else _FEWER
     return pulse, widest(pulse, bound, width, WIDEST * width, halvings, peak_of)
@@ -268,7 +281,7 @@ _ROUNDS: Final = 7  # How often: each time between two neighbours of the one bef
 def checked_driver(driver: str) -> Driver:
     """Return a driver by its name."""
     if driver not in DRIVERS:
-        raise InputError(f"driver = {driver!r}, expected {', '.join(DRIVERS[:-1])} or {DRIVERS[-1]}")
+        raise InputError.of("driver", driver, f"{', '.join(DRIVERS[:-1])} or {DRIVERS[-1]}")
     return driver  # type: ignore[return-value]
 
 
@@ -287,7 +300,10 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
     own: Any = pulse_of(hammer)
     if own.quantity != "current":
         raise InputError(
-            f"{hammer.path}: the waveform is a {own.quantity}, expected a current, or driver = 'own'"
+            f"{hammer.path}: the waveform is a {own.quantity}",
+            file=hammer.path,
+            key="waveform",
+            expected="a current, or driver = 'own'",
         )
     edge = max(float(getattr(own, "decay", _EDGE)), _LEAST_EDGE)
     force = nominal(hammer, tolerance=DISPLAY_TOLERANCE).force
@@ -305,8 +321,10 @@ def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: fl
         hard = [dot is not None and dot.force >= force for dot in dots]
         if hard[0] or not any(hard):
             raise InputError(
-                f"{hammer.path}: no width of the pulse makes a dot of {force:.4g} N, expected another"
-                " largest_current, or a hammer nearer to its design"
+                f"{hammer.path}: no width of the pulse makes a dot of {force:.4g} N",
+                file=hammer.path,
+                key="width",
+                expected="another largest_current, or a hammer nearer to its design",
             )
         first = hard.index(True)
         low, high = widths[first - 1], widths[first]

@@ -78,37 +78,48 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
     lines = text.splitlines()
     if not lines or lines[0].strip() != _FIRST:
         first = shown(lines[0] if lines else "")
-        raise InputError(f"first line = {first}, expected {_FIRST!r}")
+        raise InputError(f"first line = {first}", key="first, value=line", expected=f"{_FIRST!r}")
     head: Head = {}
     for line in lines[1:]:
         if not line.startswith("#") or _ATTRIBUTE.match(line):
             continue
         key, mark, value = line[1:].partition("=")
         if not mark:
-            raise InputError(f"{shown(line)}: expected '# key = value'")
+            raise InputError(f"{shown(line)}: expected '# key = value'", key="line", value=line)
         if key.strip() in head:
-            raise InputError(f"{key.strip()} is given twice, expected once")
+            raise InputError(f"{key.strip()} is given twice", key=key.strip(), expected="once")
         try:
             head[key.strip()] = json.loads(value)
         except ValueError:
-            raise InputError(f"{key.strip()} = {shown(value.strip())}: expected a text or a number") from None
+            raise InputError.of(
+                key.strip(),
+                value.strip(),
+                "a text or a number",
+                written=shown(value.strip()),
+                said=": expected",
+            ) from None
     _check_head(head)
     gaps, wanted = head["gaps"], columns(head["gaps"])
     table = [cells for _line, cells in sheet_of(text, "table", gaps=True).rows]
     if not table or table[0] != wanted:
-        raise InputError(
-            f"columns = {shown(','.join(table[0]) if table else '')}, expected {','.join(wanted)}"
+        raise InputError.of(
+            "columns",
+            ",".join(table[0]) if table else "",
+            ",".join(wanted),
+            written=shown(",".join(table[0]) if table else ""),
         )
     rows = []
     for number, cells in enumerate(table[1:], 1):
         if len(cells) != len(wanted):
-            raise InputError(f"row {number}: {len(cells)} cells, expected {len(wanted)}")
+            raise InputError(f"row {number}: {len(cells)} cells", key="row", expected=f"{len(wanted)}")
         row: dict[str, Any] = {"gaps": cells[1 : 1 + gaps]}
         for name, cell in zip(("rate", *COLUMNS, DEVIATION), (cells[0], *cells[1 + gaps :]), strict=True):
             try:
                 row[name] = float(cell) if cell or name != DEVIATION else None
             except ValueError:
-                raise InputError(f"row {number}: {name} = {shown(cell)}, expected a number") from None
+                raise InputError.of(
+                    name, cell, "a number", file=f"row {number}", written=shown(cell)
+                ) from None
         rows.append(row)
     return head, rows
 
@@ -118,10 +129,10 @@ def _of_json(text: str) -> tuple[Head, Rows]:
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"expected JSON ({' '.join(str(error).split())})") from None
+        raise InputError(f"expected JSON ({' '.join(str(error).split())})", key="table") from None
     if not isinstance(data, dict) or not isinstance(data.get("columns"), dict):
         columns = data.get("columns") if isinstance(data, dict) else data
-        raise InputError(f"columns = {shown(columns)}, expected the arrays of a table")
+        raise InputError.of("columns", columns, "the arrays of a table", written=shown(columns))
     head = {key: data[key] for key in (*HEAD, *OPTIONAL) if key in data}
     head |= {"fingerprint": data["hammer_fingerprint"]} if "hammer_fingerprint" in data else {}
     _check_head(head)
@@ -131,7 +142,9 @@ def _of_json(text: str) -> tuple[Head, Rows]:
             if entry[name] is None and name == DEVIATION:
                 continue
             if isinstance(entry[name], bool) or not isinstance(entry[name], int | float):
-                raise InputError(f"entry {number}: {name} = {shown(entry[name])}, expected a number")
+                raise InputError.of(
+                    name, entry[name], "a number", file=f"entry {number}", written=shown(entry[name])
+                )
     return head, entries
 
 
@@ -141,12 +154,16 @@ def _entries(arrays: Mapping[str, Any]) -> Rows:
     _check_keys(arrays, wanted, "columns: ")
     for name in wanted:
         if not isinstance(arrays[name], dict) or not isinstance(arrays[name].get("values"), list):
-            raise InputError(f"columns: {name} = {shown(arrays[name])}, expected an array with its values")
+            raise InputError.of(
+                name, arrays[name], "an array with its values", file="columns", written=shown(arrays[name])
+            )
     rates, texts = arrays["rate"]["values"], arrays["history"]["values"]
     values = {name: arrays[name]["values"] for name in (*COLUMNS, DEVIATION)}
     for name, table in values.items():
         if [len(row) if isinstance(row, list) else None for row in table] != [len(texts)] * len(rates):
-            raise InputError(f"columns: {name}: expected {len(rates)} rows of {len(texts)} numbers")
+            raise InputError(
+                f"columns: {name}: expected {len(rates)} rows of {len(texts)} numbers", key="columns"
+            )
     return [
         {"rate": rate, "gaps": str(text).split("-"), **{name: values[name][i][j] for name in values}}
         for i, rate in enumerate(rates)
@@ -163,19 +180,21 @@ def _check_head(head: Mapping[str, Any]) -> None:
         good = isinstance(value, int | float) if kind is float else isinstance(value, kind)
         if isinstance(value, bool) or not good:
             expected = {str: "a text", int: "a whole number", float: "a number"}[kind]
-            raise InputError(f"{key} = {shown(value)}, expected {expected}")
+            raise InputError.of(key, value, expected, written=shown(value))
     checked_size(head["gaps"], head["reach"])
     if not 0.0 < head["largest_current"] < np.inf:
-        raise InputError(f"largest_current = {head['largest_current']!r} A, expected a positive number")
+        raise InputError.of("largest_current", head["largest_current"], "a positive number", unit="A")
 
 
 def _check_keys(entry: Mapping[str, Any], wanted: Sequence[str], where: str) -> None:
     for key in entry:
         if key not in wanted:
-            raise InputError(f"{where}{shown(key)} is not known, expected one of {', '.join(wanted)}")
+            raise InputError(
+                f"{where}{shown(key)} is not known", key=key, expected=f"one of {', '.join(wanted)}"
+            )
     for key in wanted:
         if key not in entry:
-            raise InputError(f"{where}{key} is missing")
+            raise InputError(f"{where}{key} is missing", key=key)
 
 
 def _built(head: Head, rows: Rows) -> dict[str, Any]:
@@ -183,10 +202,10 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
     gaps, reach = head["gaps"], head["reach"]
     for number, row in enumerate(rows, 1):
         if not (np.isfinite(row["rate"]) and row["rate"] > 0.0):
-            raise InputError(f"row {number}: rate = {row['rate']!r} Hz, expected a positive number")
+            raise InputError.of("rate", row["rate"], "a positive number", file=f"row {number}", unit="Hz")
     rates = np.unique([float(row["rate"]) for row in rows])
     if not rates.size:
-        raise InputError("the table has no rows, expected one for each history")
+        raise InputError("the table has no rows", key="rows", expected="one for each history")
     shape = rates.size, entries_of(gaps, reach)
     arrays = {name: np.full(shape, np.nan) for name in (*COLUMNS, DEVIATION)}
     filled = np.zeros(shape, np.bool_)
@@ -194,7 +213,9 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
         history = _history(row["gaps"], gaps, reach, f"row {number}: ")
         place = int(np.searchsorted(rates, row["rate"])), number_of(history, reach)
         if filled[place]:
-            raise InputError(f"row {number}: the history {history_text(history)} is given twice")
+            raise InputError(
+                f"row {number}: the history {history_text(history)} is given twice", key="history"
+            )
         filled[place] = True
         for name, values in arrays.items():
             values[place] = np.nan if row[name] is None else row[name]
@@ -202,8 +223,9 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
         lacking = ~filled[:, number_of(history, reach)]
         if lacking.any():
             raise InputError(
-                f"the history {history_text(history)} at {rates[lacking][0]:g} Hz is missing, expected a row"
-                " for it"
+                f"the history {history_text(history)} at {rates[lacking][0]:g} Hz is missing",
+                key="history",
+                expected="a row for it",
             )
     shared = shared_numbers(gaps, reach)
     arguments = {**head, "largest_current": float(head["largest_current"])}
@@ -212,16 +234,18 @@ def _built(head: Head, rows: Rows) -> dict[str, Any]:
 
 def _history(texts: Any, gaps: int, reach: int, where: str) -> tuple[int, ...]:
     if not isinstance(texts, list) or len(texts) != gaps:
-        raise InputError(f"{where}gaps = {shown(texts)}, expected {gaps} of them")
+        raise InputError.of(f"{where}gaps", texts, f"{gaps} of them", written=shown(texts))
     known = {gap_text(gap): gap for gap in range(REST, reach + 1)}
     for text in texts:
         if not isinstance(text, str) or text not in known:
-            raise InputError(
-                f"{where}gap = {shown(text)}, expected 'rest' or a whole number from 1 to {reach}"
+            raise InputError.of(
+                f"{where}gap", text, f"'rest' or a whole number from 1 to {reach}", written=shown(text)
             )
     history = tuple(known[text] for text in texts)
     if history != plain(history):
-        raise InputError(f"{where}gaps = {'-'.join(texts)}, expected only rest after a rest")
+        raise InputError.of(
+            f"{where}gaps", "-".join(texts), "only rest after a rest", written=str("-".join(texts))
+        )
     return history
 
 

@@ -168,7 +168,7 @@ def judge_table(
         [read_positive(rate, "Hz", "rate") for rate in rates] if rates is not None else between(table)
     )
     if not asked.size or not perturbations:
-        raise InputError("rates, perturbations: expected at least one of each")
+        raise InputError("rates, perturbations: expected at least one of each", key="rates")
     bounds = Limits() if limits is None else limits
     single: Nominal = nominal(hammer, tolerance=tolerance)
     driven = [perturbed(hammer, by) for by in perturbations]

@@ -53,8 +53,10 @@ def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
     place = settled_from(np.abs(motion.x - rest) > QUIET * (front - rest))
     if dot.t_out is None or not touches(motion) or not motion.ok or place == len(motion.x):
         raise InputError(
-            f"{hammer.path}: the hammer is not at rest {1e3 * _LONGEST:g} ms after a single pulse, expected"
-            " one that settles on its backstop"
+            f"{hammer.path}: the hammer is not at rest {1e3 * _LONGEST:g} ms after a single pulse",
+            file=hammer.path,
+            key="hammer",
+            expected="one that settles on its backstop",
         )
     return Single(known, float(dot.t_out), float(motion.t[place]))
 

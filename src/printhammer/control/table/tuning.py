@@ -200,7 +200,7 @@ def tune(
     pulse, widest = print_pulse(driven, largest)
     single = single_of(driven, pulse, tolerance)
     if rate is not None and rates is not None:
-        raise InputError("rate and rates are given, expected one of them")
+        raise InputError("rate and rates are given", key="rates", expected="one of them")
     asked = [rate] if rate is not None else rates
     grid = _all_rates(single) if asked is None else _given_rates(asked)
     nodes = len(spaced(_periods(grid, far, single), SPACING))
@@ -235,8 +235,10 @@ def tune(
     if lost.size:
         speed = float(grid[lost[0]])
         raise InputError(
-            f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before,"
-            " expected a lower rate"
+            (f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before"),
+            key="rate",
+            value=speed,
+            expected="a lower rate",
         )
     return draft.table().fired_by(driver, hammer)
 
@@ -270,10 +272,10 @@ def _all_rates(single: Single) -> FloatArray:
 
 def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     if isinstance(asked, str) or len(asked) == 0:
-        raise InputError(f"rates = {asked!r}, expected a list of rates, at least one")
+        raise InputError.of("rates", asked, "a list of rates, at least one")
     rates = np.array([read_positive(rate, "Hz", "rate") for rate in asked])
     if (np.diff(rates) <= 0.0).any():
-        raise InputError(f"rates = {list(asked)!r}, expected ascending rates")
+        raise InputError.of("rates", list(asked), "ascending rates")
     return rates
 
 
@@ -335,5 +337,7 @@ def _usable(draft: Draft) -> int:
     """Return the number of rates that keep well to the limits, from the lowest on."""
     bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
-        raise InputError("the table does not keep to the limits at any rate, expected a hammer that prints")
+        raise InputError(
+            "the table does not keep to the limits at any rate", key="rates", expected="a hammer that prints"
+        )
     return int(bad[0]) if bad.size else draft.rates.size

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from printhammer.drive.segments import evaluate, largest
 from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
-from printhammer.support.constants import quantities, sentence
+from printhammer.support.constants import invalid, quantities
 
 QuantityName = Literal["current", "force", "voltage"]
 QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force", "V": "voltage"}
@@ -63,7 +63,7 @@ class Waveform(BaseModel):
             try:
                 super().__init__(**data)
             except ValidationError as error:
-                raise InputError(sentence(error, type(self), f"{self.shape} waveform: ")) from None
+                raise invalid(error, type(self), f"{self.shape} waveform: ") from None
 
         # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.
         __init__.__pydantic_base_init__ = True
@@ -89,7 +89,11 @@ class Waveform(BaseModel):
                 result.setdefault("quantity", QUANTITY_UNITS[unit])
                 break
             else:
-                result[name] = parse(text, note.si)
+                try:
+                    result[name] = parse(text, note.si)
+                except InputError as error:
+                    error.key = name
+                    raise
         return result
 
     @abstractmethod

@@ -42,8 +42,8 @@ class Chain(Waveform):
         parts = _checked(data["parts"])
         driven = parts[0][1].quantity
         if data.get("quantity", driven) != driven:
-            raise InputError(
-                f"quantity = {data['quantity']!r} is expected to be that of the parts, {driven!r}"
+            raise InputError.of(
+                "quantity", data["quantity"], f"that of the parts, {driven!r}", said=" is expected to be"
             )
         return {**data, "parts": parts, "quantity": driven}
 
@@ -85,21 +85,34 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
     except TypeError:
         pairs = []
     if not pairs or any(len(pair) != 2 for pair in pairs):
-        raise InputError(f"parts = {parts!r} is expected to be pairs of an offset and a waveform")
+        raise InputError.of("parts", parts, "pairs of an offset and a waveform", said=" is expected to be")
     checked: list[tuple[float, Waveform]] = []
     for number, (begin, waveform) in enumerate(pairs):
         if not isinstance(waveform, Waveform):
-            raise InputError(f"parts[{number}]: {waveform!r} is expected to be a waveform")
+            raise InputError(
+                f"parts[{number}]: {waveform!r} is expected to be a waveform", key=f"parts[{number}]"
+            )
         if waveform.quantity != pairs[0][1].quantity:
             raise InputError(
-                f"parts[{number}] is a {waveform.quantity}, expected a {pairs[0][1].quantity} like the first"
+                f"parts[{number}] is a {waveform.quantity}",
+                key=f"parts[{number}]",
+                expected=f"a {pairs[0][1].quantity} like the first",
             )
         if not math.isfinite(waveform.support):
-            raise InputError(f"parts[{number}] is a {waveform.shape}, expected a waveform that ends")
+            raise InputError(
+                f"parts[{number}] is a {waveform.shape}",
+                key=f"parts[{number}]",
+                expected="a waveform that ends",
+            )
         offset = _offset(begin, number)
         if not (_over(*checked[-1], offset) if checked else offset >= 0.0):
             sooner = f"parts[{number - 1}] is over" if checked else "the firing"
-            raise InputError(f"parts[{number}] begins at {offset:.9g} s, expected a time not before {sooner}")
+            raise InputError(
+                f"parts[{number}] begins at {offset:.9g} s",
+                key=f"parts[{number}]",
+                value=offset,
+                expected=f"a time not before {sooner}",
+            )
         checked.append((offset, waveform))
     return tuple(checked)
 
@@ -124,5 +137,8 @@ def _offset(written: object, number: int) -> float:
     if isinstance(written, str):
         return read_number(written, "s", f"parts[{number}]")
     if isinstance(written, bool) or not isinstance(written, float | int) or not math.isfinite(written):
-        raise InputError(f"parts[{number}]: offset {written!r} is expected to be a finite number in s")
+        raise InputError(
+            f"parts[{number}]: offset {written!r} is expected to be a finite number in s",
+            key=f"parts[{number}]",
+        )
     return float(written)

@@ -240,12 +240,20 @@ class Switched(Waveform):
         if not self.at or len(self.at) != len(self.levels):
             raise InputError(
                 f"levels = {list(self.levels)} is expected to have one value for each of the"
-                f" {len(self.at)} times, at least one"
+                f" {len(self.at)} times, at least one",
+                key="levels",
+                value=list(self.levels),
             )
         if self.at[0] < 0.0 or any(not before < after for before, after in itertools.pairwise(self.at)):
-            raise InputError(f"at = {list(self.at)} is expected to ascend from 0 s on")
+            raise InputError(
+                f"at = {list(self.at)} is expected to ascend from 0 s on", key="at", value=list(self.at)
+            )
         if self.levels[-1] != 0.0:
-            raise InputError(f"levels = {list(self.levels)} is expected to end with 0")
+            raise InputError(
+                f"levels = {list(self.levels)} is expected to end with 0",
+                key="levels",
+                value=list(self.levels),
+            )
         return self
 
     def segments(self) -> FloatArray:

@@ -47,26 +47,41 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
         t = np.asarray(times, dtype=np.float64)
         y = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{what}: the samples are expected to be numbers") from None
+        raise InputError(
+            f"{what}: the samples are expected to be numbers", file=what, key="samples"
+        ) from None
     if t.ndim != 1 or t.shape != y.shape:
-        raise InputError(f"{what}: {t.size} times and {y.size} values, expected one value for each time")
+        raise InputError(
+            f"{what}: {t.size} times and {y.size} values",
+            file=what,
+            key="time",
+            expected="one value for each time",
+        )
     if len(t) < 2:
-        raise InputError(f"{what}: {len(t)} samples, expected at least 2")
+        raise InputError(f"{what}: {len(t)} samples", file=what, key="time", expected="at least 2")
     for name, column in (("time", t), ("value", y)):
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):
             raise InputError(
-                f"{what}: {name} {column[bad[0]]} of sample {bad[0] + 1} is expected to be finite"
+                f"{what}: {name} {column[bad[0]]} of sample {bad[0] + 1} is expected to be finite",
+                file=what,
+                key=name,
             )
     if t[0] < 0.0:
-        raise InputError(f"{what}: first time {t[0]:.9g} s is expected to be 0 or later (the firing is at 0)")
+        raise InputError(
+            f"{what}: first time {t[0]:.9g} s is expected to be 0 or later (the firing is at 0)",
+            file=what,
+            key="time",
+        )
     bad = np.flatnonzero(np.diff(t) <= 0.0)
     if len(bad):
         k = int(bad[0]) + 1
         order = f"{t[k]:.9g} s (sample {k + 1}) follows {t[k - 1]:.9g} s"
-        raise InputError(f"{what}: times are expected to increase strictly, but {order}")
+        raise InputError(
+            f"{what}: times are expected to increase strictly, but {order}", file=what, key="times"
+        )
     if quantity not in _UNITS:
-        raise InputError(f"{what}: quantity = {quantity!r} is expected to be current or force")
+        raise InputError.of("quantity", quantity, "current or force", file=what, said=" is expected to be")
     return Samples(tuple(t.tolist()), tuple(y.tolist()), quantity)
 
 
@@ -86,13 +101,18 @@ def read_csv(path: Path) -> Samples:
     rows = read_sheet(path, "the sampled waveform").rows
     if not rows:
         raise InputError(
-            f"{what}: the file is empty, expected the heading {_HEADINGS} and at least 2 samples"
+            f"{what}: the file is empty",
+            file=what,
+            key="samples",
+            expected=f"the heading {_HEADINGS} and at least 2 samples",
         )
     time_unit, name, unit = _heading(rows[0][1], what)
     columns: tuple[list[float], list[float]] = ([], [])
     for line, row in rows[1:]:
         if len(row) != 2:
-            raise InputError(f"{what}: line {line} has {len(row)} cells, expected 2")
+            raise InputError(
+                f"{what}: line {line} has {len(row)} cells", file=what, key=f"line {line}", expected="2"
+            )
         for cell, column in zip(row, columns, strict=True):
             column.append(finite(cell, f"{what}: line {line}"))
     return checked(
@@ -106,18 +126,24 @@ def read_csv(path: Path) -> Samples:
 def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
     """Return the unit of time, what is driven, and its unit."""
     if len(cells) != 2:
-        raise InputError(f"{what}: {len(cells)} columns, expected the 2 columns {_HEADINGS}")
+        raise InputError(
+            f"{what}: {len(cells)} columns", file=what, key="columns", expected=f"the 2 columns {_HEADINGS}"
+        )
     names, units = zip(*map(split_heading, cells), strict=True)
     for cell, unit in zip(cells, units, strict=True):
         if not unit:
             raise InputError(
-                f"{what}: heading {cell.strip()!r} is expected to carry its unit, such as 'time [us]'"
+                f"{what}: heading {cell.strip()!r} is expected to carry its unit, such as 'time [us]'",
+                file=what,
+                key=cell.strip(),
             )
     names = tuple(name.lower() for name in names)
     for quantity in _UNITS:
         if names == ("time", quantity):
             return units[0], quantity, units[1]
-    raise InputError(f"{what}: columns {names[0]!r} and {names[1]!r}, expected {_HEADINGS}")
+    raise InputError(
+        f"{what}: columns {names[0]!r} and {names[1]!r}", file=what, key="columns", expected=_HEADINGS
+    )
 
 
 def _converted(column: list[float], unit: str, si: str, what: str) -> list[float]:

@@ -74,11 +74,13 @@ def plot(
         There is nothing to draw, or an orbit belongs to another parameter or phase.
     """
     if show not in ("x", "v"):
-        raise InputError(f"show = {show!r}, expected 'x' or 'v'")
+        raise InputError.of("show", show, "'x' or 'v'")
     states = getattr(diagram, show)
     if not np.isfinite(states).any():
         raise InputError(
-            "the diagram has no states to draw, expected at least one run that got to its points"
+            "the diagram has no states to draw",
+            key="states",
+            expected="at least one run that got to its points",
         )
     figure = new_figure(4.8)
     bands = len(diagram.directions)
@@ -163,8 +165,9 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
     if states.ndim == 2:
         if orbit.parameter != diagram.parameter or orbit.phase != diagram.phase:
             raise InputError(
-                f"orbits: a branch in {orbit.parameter} at phase {orbit.phase:g}, expected one in"
-                f" {diagram.parameter} at phase {diagram.phase:g}"
+                f"orbits: a branch in {orbit.parameter} at phase {orbit.phase:g}",
+                key="orbits",
+                expected=f"one in {diagram.parameter} at phase {diagram.phase:g}",
             )
         values, states, size = _crossed(across.shown(orbit.values), states, np.abs(orbit.multipliers[:, 0]))
         for kind, look in (("stable", "-"), ("unstable", (0, (1.5, 1.5)))):
@@ -174,7 +177,9 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
         return
     if diagram.phase:
         raise InputError(
-            f"orbits: their states are at the firings, expected a diagram of phase 0 for {orbit!r}"
+            "orbits: their states are at the firings",
+            key="orbits",
+            expected=f"a diagram of phase 0 for {orbit!r}",
         )
     kind, inside = ("stable", style.GREEN) if orbit.kind == "stable" else ("unstable", "white")
     at = np.full(len(states), float(across.shown(orbit.regime.value(diagram.parameter))))

@@ -66,9 +66,9 @@ def plot(
     """
     drawn: list[Branch] = list(getattr(branches, "found", [branches]))
     if not drawn:
-        raise InputError("branches: expected at least one to draw")
+        raise InputError("branches: expected at least one to draw", key="branches")
     if show not in _SHOWN:
-        raise InputError(f"show = {show!r}, expected one of {', '.join(_SHOWN)}")
+        raise InputError.of("show", show, f"one of {', '.join(_SHOWN)}")
     figure, ax = new_panel(4.4)
     heading, factor = axis_of(drawn[0].parameter, drawn[0].unit)
     name, _, shown, times = _SHOWN[show]

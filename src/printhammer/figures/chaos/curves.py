@@ -112,7 +112,7 @@ def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
     from matplotlib.lines import Line2D
 
     if len(curve) < 2:
-        raise InputError(f"curve: {len(curve)} point, expected at least two to draw")
+        raise InputError(f"curve: {len(curve)} point", key="curve", expected="at least two to draw")
     figure, ax = new_panel(4.4)
     headings, factors = zip(*map(axis_of, curve.names, curve.units), strict=True)
     handles: list[Any] = []

@@ -45,9 +45,9 @@ def plot(
         Largest number of constants in a panel.
     """
     if bars < 1:
-        raise InputError(f"bars = {bars}, expected at least 1")
+        raise InputError.of("bars", bars, "at least 1", written=str(bars))
     if not quantities:
-        raise InputError("quantities: expected at least one to draw")
+        raise InputError("quantities: expected at least one to draw", key="quantities")
     number = _dot(table, dot, quantities)
     rows = math.ceil(len(quantities) / _COLUMNS)
     figure = new_figure(0.5 + rows * (0.9 + 0.19 * bars), 7.2)
@@ -73,12 +73,12 @@ def _dot(table: Sensitivities, dot: int | None, quantities: Sequence[str]) -> in
         return 0
     if dot is None:
         if not struck:
-            raise InputError("all dots are lost, expected one that struck")
+            raise InputError("all dots are lost", key="dot", expected="one that struck")
         return struck[0]
     if not 0 <= dot < len(table.dots):
-        raise InputError(f"dot = {dot}, expected a number from 0 to {len(table.dots) - 1}")
+        raise InputError.of("dot", dot, f"a number from 0 to {len(table.dots) - 1}", written=str(dot))
     if dot not in struck:
-        raise InputError(f"dot = {dot} is lost and has no sensitivities")
+        raise InputError(f"dot = {dot} is lost and has no sensitivities", key="dot", value=dot)
     return dot
 
 
@@ -88,7 +88,9 @@ def _sensitivities(table: Sensitivities, name: str, dot: int) -> FloatArray:
     if name in table.run_quantities:
         return np.asarray(table.run_logarithmic[table.run_quantities.index(name)])
     known = ", ".join((*table.quantities, *table.run_quantities))
-    raise InputError(f"quantity = {name!r} is not known, expected one of {known}")
+    raise InputError(
+        f"quantity = {name!r} is not known", key="quantity", value=name, expected=f"one of {known}"
+    )
 
 
 def _panel(ax: Axes, table: Sensitivities, values: FloatArray, bars: int) -> None:

@@ -26,7 +26,9 @@ _PER_PIECE: Final = 60
 def waveform_of(hammer: Hammer) -> Waveform:
     """Return the standard waveform of a hammer."""
     if hammer.waveform is None:
-        raise InputError(f"the hammer {hammer.name!r} has no waveform to fire, expected a [waveform]")
+        raise InputError(
+            f"the hammer {hammer.name!r} has no waveform to fire", key="waveform", expected="a [waveform]"
+        )
     return hammer.waveform
 
 
@@ -108,12 +110,16 @@ def reach(hammer: Hammer) -> tuple[float, float]:
     near = hammer.origin if hammer.position is not None else max(low, min(0.0, end))
     if hammer.platen is None and hammer.pack is None and not math.isfinite(high):
         raise InputError(
-            f"the hammer {hammer.name!r} has neither platen nor pack, expected one to scale the figure"
+            f"the hammer {hammer.name!r} has neither platen nor pack",
+            key="pack",
+            expected="one to scale the figure",
         )
     if hammer.pack is not None and hammer.front is not None:
         end = max(end, hammer.front + 0.2 * abs(hammer.front - near))
     if not near < end:
-        raise InputError(f"the hammer {hammer.name!r} has no stroke: from {near:.6g} m to {end:.6g} m")
+        raise InputError(
+            f"the hammer {hammer.name!r} has no stroke: from {near:.6g} m to {end:.6g} m", key="stroke"
+        )
     room = 0.08 * (end - near)
     return max(low + 1e-3 * room, near - 2.0 * room) if math.isfinite(low) else near - room, min(
         high, end + room

@@ -63,7 +63,9 @@ def chart_of(
 def drawable(chart: xr.Dataset) -> xr.Dataset:
     """Return a map that has an axis of time."""
     if chart["time"].size < 2:
-        raise InputError(f"the map has {chart['time'].size} times, expected at least 2 to draw it")
+        raise InputError(
+            f"the map has {chart['time'].size} times", key="times", expected="at least 2 to draw it"
+        )
     return chart
 
 

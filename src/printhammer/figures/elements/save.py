@@ -53,7 +53,7 @@ def save(
     """
     unknown = [kind for kind in formats if kind not in FORMATS]
     if unknown:
-        raise InputError(f"format = {unknown[0]!r}, expected one of {', '.join(FORMATS)}")
+        raise InputError.of("format", unknown[0], f"one of {', '.join(FORMATS)}")
     target = Path(folder)
     paths = {kind: target / f"{name}.{kind}" for kind in formats}
     drafts = {kind: target / f".{name}.{kind}.part" for kind in formats}
@@ -70,6 +70,6 @@ def save(
                 draft.unlink(missing_ok=True)
     except OSError as error:
         raise InputError(
-            f"{target}: the figure {name} cannot be written ({error.strerror or error})"
+            f"{target}: the figure {name} cannot be written ({error.strerror or error})", file=target
         ) from None
     return list(paths.values())

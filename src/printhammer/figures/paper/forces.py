@@ -256,12 +256,14 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     from printhammer.hammer.static_force import StaticForce
 
     if hammer.magnet is None:
-        raise InputError(f"the hammer {hammer.name!r} has no magnet, whose force Fig. 2 shows")
+        raise InputError(f"the hammer {hammer.name!r} has no magnet, whose force Fig. 2 shows", key="magnet")
     low, high = getattr(hammer.magnet, "current_range", (-np.inf, np.inf))
     inside = [current for current in currents if low <= current <= high]
     if not inside:
         raise InputError(
-            f"currents = {list(currents)} A: none is in the range {low:g} to {high:g} A of the magnet's law"
+            f"currents = {list(currents)} A: none is in the range {low:g} to {high:g} A of the magnet's law",
+            key="currents",
+            value=list(currents),
         )
     start, end = reach(hammer)
     x = np.linspace(start, end, _POINTS)

@@ -55,7 +55,9 @@ def two_pulses(
         The hammer has no waveform or no rest state, or the delays are not one to three positive numbers.
     """
     if not 1 <= len(delays) <= 3 or not all(delay > 0.0 for delay in delays):
-        raise InputError(f"delays = {list(delays)} s, expected one to three positive numbers")
+        raise InputError.of(
+            "delays", list(delays), "one to three positive numbers", written=str(list(delays)), unit="s"
+        )
     motions = [fired(hammer, (0.0, delay), duration) for delay in delays]
     until = max(motion.end if duration is not None else shown_until(motion) for motion in motions)
     labels = [f"second pulse at {_text(delay)}" for delay in delays]
@@ -140,5 +142,5 @@ def plot(motion: Motion, *, until: float | str | None = None, heading: str = "")
     if end is None:
         end = motion.end
     if not end > 0.0:
-        raise InputError(f"until = {until!r}, expected a positive time (s)")
+        raise InputError.of("until", until, "a positive time (s)")
     return timeline([motion], min(end, motion.end), heading=heading, show_firings=True)

@@ -69,7 +69,7 @@ def poincare(
     waveform_of(hammer)
     shown = _strobed(hammer, periods, points, scheme, reading) if strobes is None else list(strobes)
     if not shown:
-        raise InputError("strobes: expected at least one train to draw")
+        raise InputError("strobes: expected at least one train to draw", key="strobes")
     window = shown[0].window
     way, speed = scales_of(window)
     rows = -(-len(shown) // _COLUMNS)

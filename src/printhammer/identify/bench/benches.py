@@ -91,7 +91,12 @@ def magnet(
 ) -> Bench:
     """Hold the armature at displacements, m, with currents, A, in the coil."""
     if hammer.magnet is None:
-        raise InputError(f"{hammer.path}: the hammer has no [magnet], expected one to measure its force")
+        raise InputError(
+            f"{hammer.path}: the hammer has no [magnet]",
+            file=hammer.path,
+            key="magnet",
+            expected="one to measure its force",
+        )
     places = _places(hammer, displacements)
     levels = _currents(hammer) if currents is None else _array(currents, "currents")
     force = StaticForce(hammer)
@@ -101,7 +106,10 @@ def magnet(
     if not np.isfinite(total).all():
         bad = float(x[~np.isfinite(total)][0])
         raise InputError(
-            f"{hammer.path}: the magnet has no force at {bad:.6g} m, expected its range to be kept"
+            f"{hammer.path}: the magnet has no force at {bad:.6g} m",
+            file=hammer.path,
+            key="magnet",
+            expected="its range to be kept",
         )
     return Bench(
         "static force of magnet and spring, armature held, pack absent; positive toward the paper",
@@ -118,7 +126,12 @@ def spring(
 ) -> Bench:
     """Hold the armature at displacements, m, with the magnet taken out."""
     if hammer.spring is None:
-        raise InputError(f"{hammer.path}: the hammer has no [spring], expected one to measure its force")
+        raise InputError(
+            f"{hammer.path}: the hammer has no [spring]",
+            file=hammer.path,
+            key="spring",
+            expected="one to measure its force",
+        )
     x = _places(hammer, displacements)
     force = StaticForce(hammer)
     return Bench(
@@ -137,14 +150,19 @@ def pack(
 ) -> Bench:
     """Press the pack to largest indentations, m, each on fresh paper, and let it go."""
     if hammer.pack is None:
-        raise InputError(f"{hammer.path}: the hammer has no [pack], expected one to press")
+        raise InputError(
+            f"{hammer.path}: the hammer has no [pack]", file=hammer.path, key="pack", expected="one to press"
+        )
     deepest = _peaks(hammer) if peaks is None else _array(peaks, "peaks")
     if points < 2 or not (deepest > 0.0).all():
-        raise InputError("peaks and points are expected to be positive indentations and 2 points or more")
+        raise InputError(
+            "peaks and points are expected to be positive indentations and 2 points or more", key="peaks"
+        )
     room = getattr(hammer.pack, "thickness", math.inf)
     if deepest.max() >= room:
         raise InputError(
-            f"a peak of {deepest.max():.6g} m is expected to be less than the thickness, {room:.6g} m"
+            f"a peak of {deepest.max():.6g} m is expected to be less than the thickness, {room:.6g} m",
+            key="peaks",
         )
     (loading, c), (memory, _), (unloading, _) = (
         law_of(hammer, hammer.pack, f"pack_{name}") for name in ("loading", "memory", "unloading")
@@ -170,10 +188,15 @@ def pack(
 def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = None) -> Bench:  # noqa: ARG001
     """Throw the armature alone at the backstop with speeds, m/s."""
     if hammer.backstop is None:
-        raise InputError(f"{hammer.path}: the hammer has no [backstop], expected one to rebound from")
+        raise InputError(
+            f"{hammer.path}: the hammer has no [backstop]",
+            file=hammer.path,
+            key="backstop",
+            expected="one to rebound from",
+        )
     impacts = np.linspace(SPEEDS[0], SPEEDS[1], SPEEDS[2]) if speeds is None else _array(speeds, "speeds")
     if not (impacts > 0.0).all():
-        raise InputError("speeds are expected to be greater than 0 m/s")
+        raise InputError("speeds are expected to be greater than 0 m/s", key="speeds")
     bare = hammer.replace({"magnet": None, "spring": None, "pack": None, "waveform": None})
     different, which = np.unique(impacts, return_inverse=True)
     rebound = np.array([_rebound(bare, speed) for speed in different.tolist()])[which]
@@ -191,14 +214,21 @@ def motion(
     from printhammer.drive.trains import PulseTrain
 
     if hammer.waveform is None:
-        raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
+        raise InputError(
+            f"{hammer.path}: the hammer has no [waveform] to fire",
+            file=hammer.path,
+            key="waveform",
+            expected="one",
+        )
     first, last, rate, length = _record(sensor, duration, before)
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
     t = np.arange(first, last + 1) / rate
     fine = np.arange(last * each + 1) / (rate * each)
     shot = simulate(hammer, PulseTrain(hammer.waveform), duration=max(float(fine[-1]), length), times=fine)
     if not shot.ok:
-        raise InputError(f"{hammer.path}: the shot did not reach its end: {shot.message}")
+        raise InputError(
+            f"{hammer.path}: the shot did not reach its end: {shot.message}", file=hammer.path, key="waveform"
+        )
     tau = time_constant(sensor.bandwidth)
     shown = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
     after = t >= 0.0
@@ -254,17 +284,21 @@ def _record(
 
     rate = sensor.sampling_rate
     if rate is None:
-        raise InputError("the sensor has no sampling rate, expected one for a record")
+        raise InputError("the sensor has no sampling rate", key="sensor", expected="one for a record")
     length = CYCLE if duration is None else read_positive(duration, "s", "duration")
     early = read_number(before, "s", "before")
     if early < 0.0:
-        raise InputError(f"before = {before!r} is expected to be 0 s or more")
+        raise InputError.of("before", before, "0 s or more", said=" is expected to be")
     first, last = -math.floor(early * rate + 1e-9), math.floor(length * rate + 1e-9)
     if last < 1:
-        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz has no sample after the firing")
+        raise InputError(
+            f"a record of {length:.6g} s at {rate:.6g} Hz has no sample after the firing", key="length"
+        )
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
     if last * each - first > _MOST:
-        raise InputError(f"a record of {length:.6g} s at {rate:.6g} Hz is too long, expected a shorter one")
+        raise InputError(
+            f"a record of {length:.6g} s at {rate:.6g} Hz is too long", key="length", expected="a shorter one"
+        )
     return first, last, rate, length
 
 
@@ -274,7 +308,7 @@ def _array(values: npt.ArrayLike, name: str) -> FloatArray:
     except (TypeError, ValueError):
         numbers = np.empty(0)
     if numbers.ndim != 1 or not numbers.size or not np.isfinite(numbers).all():
-        raise InputError(f"{name} are expected to be a list of finite numbers in SI")
+        raise InputError(f"{name} are expected to be a list of finite numbers in SI", key=name)
     return numbers
 
 
@@ -284,7 +318,10 @@ def _places(hammer: Hammer, displacements: npt.ArrayLike | None) -> FloatArray:
     low, high = hammer.origin, StaticForce(hammer).end
     if not low < high or (hammer.platen is None and hammer.pack is None):
         raise InputError(
-            f"{hammer.path}: the hammer has no platen or pack, expected displacements to be given"
+            f"{hammer.path}: the hammer has no platen or pack",
+            file=hammer.path,
+            key="platen",
+            expected="displacements to be given",
         )
     return np.linspace(low, high, DISPLACEMENTS)
 
@@ -295,7 +332,12 @@ def _currents(hammer: Hammer) -> FloatArray:
 
         return np.linspace(0.0, typical_current(hammer, PulseTrain(hammer.waveform)), CURRENTS)
     if hammer.waveform is None or hammer.waveform.unit != "A":
-        raise InputError(f"{hammer.path}: the hammer has no current to fire, expected currents to be given")
+        raise InputError(
+            f"{hammer.path}: the hammer has no current to fire",
+            file=hammer.path,
+            key="current",
+            expected="currents to be given",
+        )
     return np.linspace(0.0, HIGHEST_CURRENT * hammer.waveform.peak, CURRENTS)
 
 
@@ -303,7 +345,10 @@ def _peaks(hammer: Hammer) -> FloatArray:
     thickness = getattr(hammer.pack, "thickness", None)
     if thickness is None:
         raise InputError(
-            f"{hammer.path}: the pack has no thickness, expected the largest indentations to be given"
+            f"{hammer.path}: the pack has no thickness",
+            file=hammer.path,
+            key="pack",
+            expected="the largest indentations to be given",
         )
     return float(thickness) * np.array(PEAKS)
 
@@ -331,9 +376,17 @@ def _rebound(bare: Hammer, speed: float) -> float:
     for _ in range(_LONGEST):
         run = simulate(bare, idle, duration=duration, state=(bare.origin + _RUN_UP, -speed), points=2)
         if not run.ok:
-            raise InputError(f"{bare.path}: the rebound at {speed:.6g} m/s did not end: {run.message}")
+            raise InputError(
+                f"{bare.path}: the rebound at {speed:.6g} m/s did not end: {run.message}",
+                file=bare.path,
+                key="speeds",
+            )
         left = run.contacts[0].v_out if run.contacts else None
         if left is not None:
             return float(left)
         duration *= 2.0
-    raise InputError(f"{bare.path}: the armature does not come back from the backstop at {speed:.6g} m/s")
+    raise InputError(
+        f"{bare.path}: the armature does not come back from the backstop at {speed:.6g} m/s",
+        file=bare.path,
+        key="speeds",
+    )

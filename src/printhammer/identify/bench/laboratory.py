@@ -157,9 +157,9 @@ def measure(
         There is no such kind, or the hammer lacks what is to be measured.
     """
     if kind not in BENCHES:
-        raise InputError(f"kind = {kind!r}, expected one of {', '.join(KINDS)}")
+        raise InputError.of("kind", kind, f"one of {', '.join(KINDS)}")
     if seed < 0:
-        raise InputError(f"seed = {seed!r} is expected to be a whole number, 0 or more")
+        raise InputError.of("seed", seed, "a whole number, 0 or more", said=" is expected to be")
     used = sensor if isinstance(sensor, Sensor) else adjusted(SENSORS[kind], sensor or {}, SI)
     there = BENCHES[kind](hammer, used, **bench)
     streams = np.random.SeedSequence([seed, KINDS.index(kind)]).spawn(len(UNITS) + 1)

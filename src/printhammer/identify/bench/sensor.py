@@ -47,12 +47,14 @@ class Amount:
             share, _percent, tail = text.partition("%")
             of = tail.strip() or FULL_SCALE
             if of not in (FULL_SCALE, READING):
-                raise InputError(f"{name}: {text!r}, expected nothing, {FULL_SCALE!r} or {READING!r} after %")
+                raise InputError(
+                    f"{name}: {text!r}", key=name, expected=f"nothing, {FULL_SCALE!r} or {READING!r} after %"
+                )
             size = read_number(f"{share.strip()} %", "1", name)
         else:
             size = read_number(text, si, name)
         if size < 0.0 and not signed:
-            raise InputError(f"{name} = {text!r} is expected to be 0 or more")
+            raise InputError.of(name, text, "0 or more", said=" is expected to be")
         return cls(size, of)
 
     def at(self, true: FloatArray) -> FloatArray:
@@ -71,7 +73,9 @@ class Channel(Declared):
 
     def __post_init__(self) -> None:
         if self.resolution.of == READING:
-            raise InputError(f"a resolution {READING} is given, expected one in steps of the same size")
+            raise InputError(
+                f"a resolution {READING} is given", key="resolution", expected="one in steps of the same size"
+            )
 
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
         """Return what is read of true values, SI, with standard normal numbers for the noise, shape (n,)."""
@@ -131,9 +135,9 @@ class Sensor:
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         for name, frequency in (("sampling_rate", self.sampling_rate), ("bandwidth", self.bandwidth)):
             if frequency is not None and not (frequency > 0.0 and math.isfinite(frequency)):
-                raise InputError(f"{name} = {frequency!r} is expected to be more than 0 Hz")
+                raise InputError.of(name, frequency, "more than 0 Hz", said=" is expected to be")
         if not 0.0 <= self.outliers <= 0.5:
-            raise InputError(f"outliers = {self.outliers!r} is expected to be a share from 0 to 0.5")
+            raise InputError.of("outliers", self.outliers, "a share from 0 to 0.5", said=" is expected to be")
 
     def exact(self) -> Sensor:
         """Return sensors without errors: no noise, resolution, offset, bandwidth or outliers."""
@@ -181,7 +185,9 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
     for name in settings:
         if name not in (*PARTS, *_OTHERS):
             raise InputError(
-                f"the sensor setting {name!r} is not known, expected one of {', '.join((*PARTS, *_OTHERS))}"
+                f"the sensor setting {name!r} is not known",
+                key="sensor",
+                expected=f"one of {', '.join((*PARTS, *_OTHERS))}",
             )
     if settings.get("exact"):
         sensor = sensor.exact()
@@ -190,7 +196,9 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
         for name, written in _quantities(role, settings.get(role)).items():
             if name not in channels:
                 known = ", ".join(channels)
-                raise InputError(f"{role}: the quantity {name!r} is not measured, expected one of {known}")
+                raise InputError(
+                    f"{role}: the quantity {name!r} is not measured", key=role, expected=f"one of {known}"
+                )
             amount = Amount.read(written, units[name], f"{role} of {name}", signed=role == "offset")
             channels[name] = replace(channels[name], **{role: amount})
     changes: dict[str, Any] = {"channels": channels}
@@ -198,7 +206,9 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
         if settings.get(name) is not None:
             changes[name] = read(settings[name], name)
     if sensor.sampling_rate is None and any(changes.get(name) for name in ("sampling_rate", "bandwidth")):
-        raise InputError("a sampling rate or bandwidth is given, expected it with a record of a motion only")
+        raise InputError(
+            "a sampling rate or bandwidth is given", key="rate", expected="it with a record of a motion only"
+        )
     return replace(sensor, **changes)
 
 
@@ -233,10 +243,15 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
             if quantity not in quantities:
                 known = ", ".join(quantities)
                 raise InputError(
-                    f"{part} {text!r}: the quantity {quantity!r} is not known, expected one of {known}"
+                    f"{part} {text!r}: the quantity {quantity!r} is not known",
+                    key=part,
+                    value=text,
+                    expected=f"one of {known}",
                 )
             if quantity in amounts:
-                raise InputError(f"{part} {text!r}: {quantity} is given twice, expected it once")
+                raise InputError(
+                    f"{part} {text!r}: {quantity} is given twice", key=part, value=text, expected="it once"
+                )
             amounts[quantity] = amount.strip() if equals else text.strip()
     return amounts
 
@@ -253,7 +268,9 @@ def _of_dimension(text: str, part: str, quantities: Mapping[str, str]) -> list[s
         such = next(iter(quantities))
         raise InputError(
             f"{part} {text!r}: expected an amount such as '{such}=0.5 %', or a number with the unit of"
-            f" {' or '.join(quantities)}"
+            f" {' or '.join(quantities)}",
+            key=part,
+            value=text,
         )
     return names
 
@@ -262,7 +279,7 @@ def _quantities(part: str, amounts: Any) -> Mapping[str, Any]:
     if amounts is None:
         return {}
     if not isinstance(amounts, Mapping):
-        raise InputError(f"{part} = {amounts!r}, expected amounts by quantity, such as {{'force': '0.5 %'}}")
+        raise InputError.of(part, amounts, "amounts by quantity, such as {'force': '0.5 %'}")
     return amounts
 
 
@@ -275,7 +292,7 @@ def _frequency(value: Any, name: str) -> float | None:
 def _share(value: Any, name: str) -> float:
     share = read_number(value, "1", name)
     if not (0.0 <= share <= 0.5 and math.isfinite(share)):
-        raise InputError(f"{name} = {value!r}, expected a share from 0 to 50 %")
+        raise InputError.of(name, value, "a share from 0 to 50 %")
     return share
 
 

@@ -321,9 +321,13 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
     pull = law.magnet_force(magnet.part.packed(0.0), 0.0, current)
     preload = sheet.si("spring.preload", 0.0)
     if preload >= pull:
-        raise InputError(
-            f"spring.preload = {preload:g} N: expected less than the {pull:.3g} N of the magnet at full gap"
-            f" and {current:.3g} A"
+        raise InputError.of(
+            "spring.preload",
+            preload,
+            f"less than the {pull:.3g} N of the magnet at full gap and {current:.3g} A",
+            written=f"{preload:g}",
+            unit="N",
+            said=": expected",
         )
     zero: dict[str, Any] = {"preload": _made(0.0, "N", "assumed", "the sheet does not tell")}
     zero["stiffness"] = _made(0.0, "N/m", "assumed", "the sheet does not tell")
@@ -372,9 +376,13 @@ def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -
     held = sheet.si("spring.preload", 0.0) + sheet.si("spring.stiffness", 0.0) * x
     work = float(np.trapezoid(pull - held, x))
     if work <= 0.0:
-        raise InputError(
-            f"spring.stiffness = {sheet.si('spring.stiffness', 0.0):g} N/m: expected a spring that the magnet"
-            f" overcomes on the way at {current:.3g} A"
+        raise InputError.of(
+            "spring.stiffness",
+            sheet.si("spring.stiffness", 0.0),
+            f"a spring that the magnet overcomes on the way at {current:.3g} A",
+            written=f"{sheet.si('spring.stiffness', 0.0):g}",
+            unit="N/m",
+            said=": expected",
         )
     return work
 
@@ -399,12 +407,18 @@ def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str
 
     table: dict[str, Any] = {"shape": sheet.driver.get("shape", "rail"), "voltage": sheet.constant("rail")}
     if table["shape"] not in SHAPES:
-        raise InputError(f"driver.shape = {shown(table['shape'])}: expected one of {', '.join(SHAPES)}")
+        raise InputError.of(
+            "driver.shape",
+            table["shape"],
+            f"one of {', '.join(SHAPES)}",
+            written=shown(table["shape"]),
+            said=": expected",
+        )
     known = quantities(SHAPES[table["shape"]])
     for key, value in sheet.driver.items():
         status, source = sheet.origin(f"driver.{key}")
         if key in known and isinstance(value, str):
-            with located(f"driver.{key}"):
+            with located(f"driver.{key}", key=f"driver.{key}"):
                 number, unit = split(value, known[key].si)
             table[key] = {"value": plain(number), "unit": unit, "status": status, "source": source}
         elif key != "shape":

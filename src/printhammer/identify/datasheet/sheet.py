@@ -141,32 +141,40 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
     for key in document:
         if key not in known:
             raise InputError(
-                f"the key {shown(key, quotes=False)} is not known, expected {nearest(key, known)}"
+                f"the key {shown(key, quotes=False)} is not known", key=key, expected=f"{nearest(key, known)}"
             )
     for key in [key for key, needed in TEXTS.items() if needed] + [
         *(key for key, (_si, needed) in QUANTITIES.items() if needed),
         "force",
     ]:
         if key not in document:
-            raise InputError(f"{key} is missing, expected {_WANTED.get(key) or _quantity_text(key)}")
+            raise InputError(
+                f"{key} is missing", key=key, expected=f"{_WANTED.get(key) or _quantity_text(key)}"
+            )
     texts = {key: document[key] for key in TEXTS if key in document}
     for key, text in texts.items():
         if not isinstance(text, str) or not text.strip():
-            raise InputError(f"{key} = {shown(text)}: expected text in quotes")
+            raise InputError.of(key, text, "text in quotes", written=shown(text), said=": expected")
     entries = {
         key: _entry(key, document[key], si) for key, (si, _needed) in QUANTITIES.items() if key in document
     }
     for name, units in TABLES.items():
         table = document.get(name, {})
         if not isinstance(table, Mapping):
-            raise InputError(f"{name} = {shown(table)}: expected a table with {' and '.join(units)}")
+            raise InputError.of(
+                name, table, f"a table with {' and '.join(units)}", written=shown(table), said=": expected"
+            )
         for key, value in table.items():
             if key not in units:
-                raise InputError(f"the key {name}.{key} is not known, expected {nearest(key, units)}")
+                raise InputError(
+                    f"the key {name}.{key} is not known",
+                    key=f"{name}.{key}",
+                    expected=f"{nearest(key, units)}",
+                )
             entries[f"{name}.{key}"] = _entry(f"{name}.{key}", value, units[key])
     force = document["force"]
     if not isinstance(force, list) or not force:
-        raise InputError(f"force = {shown(force)}: expected {_WANTED['force']}")
+        raise InputError.of("force", force, _WANTED["force"], written=shown(force), said=": expected")
     points = [
         _pair(f"force, point {number}", pair, ("m", "N"), _WANTED["force"])
         for number, pair in enumerate(force, 1)
@@ -176,7 +184,9 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
         inductance = _pair("inductance", document["inductance"], ("H", "m"), '["45 mH", "4 mm"]')
     driver = document.get("driver", {})
     if not isinstance(driver, Mapping):
-        raise InputError(f"driver = {shown(driver)}: expected a table with a shape")
+        raise InputError.of(
+            "driver", driver, "a table with a shape", written=shown(driver), said=": expected"
+        )
     sheet = DataSheet(
         where, texts, entries, points, inductance, dict(driver), _assumed(document), _why(document)
     )
@@ -199,20 +209,26 @@ def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
     """Read a quantity that must be positive, or may be `zero`."""
     zero = zero or key in _ZERO
     if isinstance(written, bool) or not isinstance(written, str | int | float):
-        raise InputError(f"{key} = {shown(written)}: expected {describe(si)} in quotes, with its unit")
-    with located(key):
+        raise InputError.of(
+            key,
+            written,
+            f"{describe(si)} in quotes, with its unit",
+            written=shown(written),
+            said=": expected",
+        )
+    with located(key, key=key):
         value, unit = split(written if isinstance(written, str) else repr(written), si)
         size = to_si(value, unit, si)
     if size < 0.0 or (size == 0.0 and not zero):
         least = "0 or more" if zero else "more than 0"
-        raise InputError(f"{key} = {shown(written)}: expected {least}")
+        raise InputError.of(key, written, least, written=shown(written), said=": expected")
     return Entry(key, value, unit, size)
 
 
 def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[Entry, Entry]:
     """Read two quantities, of which a length may be 0."""
     if not isinstance(written, list) or len(written) != _PAIR:
-        raise InputError(f"{key} = {shown(written)}: expected {wanted}")
+        raise InputError.of(key, written, wanted, written=shown(written), said=": expected")
     first, second = (_entry(key, part, si, zero=si == "m") for part, si in zip(written, units, strict=True))
     return first, second
 
@@ -227,12 +243,20 @@ def _keys(document: Mapping[str, Any]) -> list[str]:
 def _assumed(document: Mapping[str, Any]) -> frozenset[str]:
     assumed = document.get("assumed", [])
     if not isinstance(assumed, list):
-        raise InputError(f'assumed = {shown(assumed)}: expected keys of this sheet, such as ["mass"]')
+        raise InputError.of(
+            "assumed",
+            assumed,
+            'keys of this sheet, such as ["mass"]',
+            written=shown(assumed),
+            said=": expected",
+        )
     known = _keys(document)
     for key in assumed:
         if key not in known:
             expected = nearest(str(key), known)
-            raise InputError(f"assumed: {shown(key)} is no key of this sheet, expected {expected}")
+            raise InputError(
+                f"assumed: {shown(key)} is no key of this sheet", key="assumed", expected=expected
+            )
     return frozenset(assumed)
 
 
@@ -241,10 +265,10 @@ def _why(document: Mapping[str, Any]) -> dict[str, str]:
     if not isinstance(why, Mapping) or not all(
         isinstance(text, str) and text.strip() for text in why.values()
     ):
-        raise InputError(f"why = {shown(why)}: expected a table of keys and texts")
+        raise InputError.of("why", why, "a table of keys and texts", written=shown(why), said=": expected")
     for key in why:
         if key not in _keys(document):
-            raise InputError(f"why.{key} is given, expected a key of this sheet")
+            raise InputError(f"why.{key} is given", key=f"why.{key}", expected="a key of this sheet")
     return dict(why)
 
 
@@ -252,15 +276,19 @@ def _check(sheet: DataSheet) -> None:
     """Refuse what does not fit together."""
     gaps = [gap.si for gap, _force in sheet.force]
     if len(set(gaps)) < len(gaps):
-        raise InputError("force: a gap is given twice, expected one force at each")
+        raise InputError("force: a gap is given twice", key="force", expected="one force at each")
     restitution = sheet.si("stop.restitution", 0.0)
     if restitution > 1.0:
-        raise InputError(f"stop.restitution = {restitution:g}: expected 1 or less")
+        raise InputError.of(
+            "stop.restitution", restitution, "1 or less", written=f"{restitution:g}", said=": expected"
+        )
     if ("stop.stiffness" in sheet.entries) != ("stop.damping" in sheet.entries):
-        raise InputError("stop: expected both stiffness and damping, or neither")
+        raise InputError("stop: expected both stiffness and damping, or neither", key="stop")
     if sheet.si("target", 0.0) > sheet.si("stroke"):
         target, stroke = sheet.entries["target"], sheet.entries["stroke"]
         raise InputError(
             f"target = {target.value:g} {target.unit}: expected it within the stroke of {stroke.value:g}"
-            f" {stroke.unit}"
+            f" {stroke.unit}",
+            key="target",
+            value=target.value,
         )

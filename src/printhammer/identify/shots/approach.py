@@ -48,8 +48,8 @@ class Priors:
                 factor = np.linalg.cholesky(prior.covariance / np.outer(size, size))
             except np.linalg.LinAlgError:
                 raise InputError(
-                    "what current and earlier fits tell has no positive definite covariance, expected"
-                    " currents without stray values, and tables that tell the constants apart"
+                    "what current and earlier fits tell has no positive definite covariance",
+                    expected="currents without stray values, and tables that tell the constants apart",
                 ) from None
             self._white.append((prior, np.linalg.inv(factor)))
 

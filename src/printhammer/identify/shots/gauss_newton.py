@@ -60,7 +60,12 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     sizes = np.sqrt((design * design).sum(axis=0))
     blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
     if blind:
-        raise InputError(f"{where}: nothing in the records depends on {blind[0]}, expected it not to be free")
+        raise InputError(
+            f"{where}: nothing in the records depends on {blind[0]}",
+            file=where,
+            key="free",
+            expected="it not to be free",
+        )
     values, vectors = singular(design / sizes)
     if values[0] * _DEGENERATE > values[-1]:
         return
@@ -68,8 +73,13 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     tied = [name for name, part in zip(names, direction, strict=True) if part > _SHARE * direction.max()]
     listed = tied[0] if len(tied) == 1 else f"{', '.join(tied[:-1])} and {tied[-1]}"
     raise InputError(
-        f"{where}: a motion cannot tell apart {listed}: changed together they leave the records as"
-        " they are, expected at least one of them to be held"
+        (
+            f"{where}: a motion cannot tell apart {listed}: changed together they leave the"
+            " records as they are"
+        ),
+        file=where,
+        key="free",
+        expected="at least one of them to be held",
     )
 
 
@@ -174,7 +184,7 @@ class GaussNewton:
         """Return the rows of data and priors over their standard errors, shape (m, p), at some values."""
         chains = self.shooting.chains(values, states, derivatives=True)
         if chains is None:
-            raise InputError(_NO_MOTION)
+            raise InputError(_NO_MOTION, key="motion")
         parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
         return self._weighted(values, parts, near=False).design
 
@@ -201,7 +211,7 @@ class GaussNewton:
         passed: list[tuple[float, float]] = []
         for _ in range(_MOST_STEPS):
             if chains is None:
-                raise InputError(_NO_MOTION)
+                raise InputError(_NO_MOTION, key="motion")
             parts = [self.shooting.condensed(shot, chain) for shot, chain in enumerate(chains)]
             here = self._weighted(values, parts, near=near, noise=noise)
             step = np.zeros(len(values))
@@ -233,10 +243,12 @@ class GaussNewton:
                 length *= 0.5
                 if length < _SHORTEST:
                     raise InputError(
-                        "the fit does not converge, expected constants nearer to the truth to begin with"
+                        "the fit does not converge",
+                        key="fit",
+                        expected="constants nearer to the truth to begin with",
                     )
             values, states, chains = new, moved, trial
-        raise InputError(f"the fit has not converged after {_MOST_STEPS} steps")
+        raise InputError(f"the fit has not converged after {_MOST_STEPS} steps", key="fit")
 
     def _weighted(
         self,

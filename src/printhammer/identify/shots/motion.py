@@ -211,9 +211,9 @@ def fit_motion(
         were fitted to it before; a constant cannot be found from it, or not be told apart from others.
     """
     if isinstance(paths, str) or not paths:
-        raise InputError(f"paths = {paths!r}, expected a sequence of at least one record")
+        raise InputError.of("paths", paths, "a sequence of at least one record")
     if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0.0):
-        raise InputError(f"bandwidth = {bandwidth!r} Hz, expected a positive number")
+        raise InputError.of("bandwidth", bandwidth, "a positive number", unit="Hz")
     for each in reversed(earlier):
         hammer = each.into(hammer)
     shots = [read_shot(path, hammer, bandwidth) for path in paths]
@@ -248,28 +248,34 @@ def _free_keys(
         return ("mass", _DAMPING) if touched and hertz else ("mass",)
     keys = (free,) if isinstance(free, str) else tuple(free)
     if not keys:
-        raise InputError("free: no constants are given, expected at least one such as 'mass'")
+        raise InputError("free: no constants are given", key="free", expected="at least one such as 'mass'")
     where = " and ".join(shot.name for shot in shots)
     for number, key in enumerate(keys):
         if key in keys[:number]:
-            raise InputError(f"free: {key} is given twice, expected it once")
+            raise InputError(f"free: {key} is given twice", key="free", expected="it once")
         given_otherwise = hertz and key in (_DAMPING, "backstop.stiffness")
         if (key not in hammer.constants and not given_otherwise) or key == "platen":
             known = [name for name in hammer.constants if name != "platen"]
             moving = nearest(key, known, "one such as 'mass'")
             raise InputError(
-                f"free: {key!r} is no constant of {hammer.path} that moves the armature, expected {moving}"
+                f"free: {key!r} is no constant of {hammer.path} that moves the armature",
+                key="free",
+                expected=moving,
             )
         if key == _DAMPING and not touched:
             raise InputError(
-                f"{where}: the record does not touch the backstop after the shot, expected one that does for"
-                f" {key}"
+                f"{where}: the record does not touch the backstop after the shot",
+                file=where,
+                key=key,
+                expected=f"one that does for {key}",
             )
         fewest = max((touch.count for shot in shots for touch in shot.touching("backstop")), default=0)
         if key.startswith("backstop.") and touched and fewest < FEWEST:
             raise InputError(
-                f"{where}: {fewest} samples in the longest contact with the backstop, expected at least"
-                f" {FEWEST} for {key}"
+                f"{where}: {fewest} samples in the longest contact with the backstop",
+                file=where,
+                key=key,
+                expected=f"at least {FEWEST} for {key}",
             )
     return keys
 
@@ -287,7 +293,12 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
     hammer = hammer.replace(changes) if changes else hammer
     for key in keys:
         if hammer.constants[key].si == 0.0:
-            raise InputError(f"{hammer.path}: {key} is 0, expected a value from which a fit can begin")
+            raise InputError(
+                f"{hammer.path}: {key} is 0",
+                file=hammer.path,
+                key=key,
+                expected="a value from which a fit can begin",
+            )
     return hammer
 
 
@@ -305,8 +316,10 @@ def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
     for path, print_ in zip(paths, prints, strict=True):
         if print_ in used:
             raise InputError(
-                f"{path}: the constants of {hammer.path} were fitted to this record already, expected"
-                " another record, or the hammer from before that fit"
+                f"{path}: the constants of {hammer.path} were fitted to this record already",
+                file=path,
+                key="record",
+                expected="another record, or the hammer from before that fit",
             )
     return prints
 
@@ -318,8 +331,13 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
         if shot.current is None:
             if hammer.waveform is None:
                 raise InputError(
-                    f"{shot.name}: neither the record has a column 'current [A]' nor {hammer.path} a"
-                    " waveform, expected one of them"
+                    (
+                        f"{shot.name}: neither the record has a column 'current [A]' nor {hammer.path} a"
+                        " waveform"
+                    ),
+                    file=shot.name,
+                    key="current",
+                    expected="one of them",
                 )
             pulses.append(None)
         else:

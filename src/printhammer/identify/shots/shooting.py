@@ -296,7 +296,7 @@ def _drive(hammer: Hammer, pulse: Pulse | None, values: FloatArray) -> PulseTrai
     if pulse is not None:
         return PulseTrain(pulse.changed(values.tolist()) if pulse.names else pulse.waveform)
     if hammer.waveform is None:
-        raise InputError(f"{hammer.path}: the hammer has no waveform")
+        raise InputError(f"{hammer.path}: the hammer has no waveform", file=hammer.path, key="waveform")
     return PulseTrain(hammer.waveform)
 
 

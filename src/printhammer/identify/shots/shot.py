@@ -94,11 +94,17 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
     bad = np.flatnonzero(np.diff(t) <= 0.0)
     if len(bad):
         raise InputError(
-            f"{name}: line {table.lines[bad[0] + 1]}: time {t[bad[0] + 1]:.9g} s, expected ascending times"
+            f"{name}: line {table.lines[bad[0] + 1]}: time {t[bad[0] + 1]:.9g} s",
+            file=name,
+            key="time",
+            expected="ascending times",
         )
     if len(t) < 4 * FEWEST:
         raise InputError(
-            f"{name}: {len(t)} samples, expected the record of a whole shot, {4 * FEWEST} at least"
+            f"{name}: {len(t)} samples",
+            file=name,
+            key="samples",
+            expected=f"the record of a whole shot, {4 * FEWEST} at least",
         )
     noise = noise_of_record(x)
     touches, smooth, clear = find_touches(t, x, noise, hammer)
@@ -171,26 +177,35 @@ def _check(
     start = smooth[0] - hammer.position if hammer.position is not None else 0.0
     if start > clear:
         raise InputError(
-            f"{name}: the record begins at {_us(t[0])} with the armature {_um(start)} off the backstop,"
-            " expected a record from the firing at rest on"
+            (f"{name}: the record begins at {_us(t[0])} with the armature {_um(start)} off the backstop"),
+            file=name,
+            key="start",
+            expected="a record from the firing at rest on",
         )
     if hammer.front is None:
         return
     packs = [touch for touch in touches if touch.surface == "pack"]
     if not packs:
         raise InputError(
-            f"{name}: the record misses the impact: its largest displacement is {_um(float(smooth.max()))},"
-            f" expected a record that goes beyond the front of the pack at {_um(hammer.front)}"
+            f"{name}: the record misses the impact: its largest displacement is {_um(float(smooth.max()))}",
+            file=name,
+            key="displacement",
+            expected=f"a record that goes beyond the front of the pack at {_um(hammer.front)}",
         )
     if packs[0].last == len(t) - 1:
         raise InputError(
-            f"{name}: the record ends at {_us(t[-1])} inside the pack, expected a record of the whole impact"
+            f"{name}: the record ends at {_us(t[-1])} inside the pack",
+            file=name,
+            key="end",
+            expected="a record of the whole impact",
         )
     if packs[0].count < FEWEST:
         spacing = float(np.median(np.diff(t)))
         raise InputError(
-            f"{name}: {packs[0].count} samples in the pack, one every {_us(spacing)}, expected at least"
-            f" {FEWEST} in a contact"
+            f"{name}: {packs[0].count} samples in the pack, one every {_us(spacing)}",
+            file=name,
+            key="pack",
+            expected=f"at least {FEWEST} in a contact",
         )
 
 
@@ -276,7 +291,12 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
     noise = noise_of_record(current)
     top = float(np.percentile(np.abs(current[t >= 0.0]), 98.0)) if (t >= 0.0).any() else 0.0
     if top <= max(5.0 * noise, 0.0):
-        raise InputError(f"{where}: the column 'current' shows no pulse, expected the current of the shot")
+        raise InputError(
+            f"{where}: the column 'current' shows no pulse",
+            file=where,
+            key="current",
+            expected="the current of the shot",
+        )
     if waveform is None or isinstance(waveform, Sampled):
         return _recorded(t, current, noise, "the current is taken from the record")
     pulse, rms = _fitted(t, current, waveform, tau, top)

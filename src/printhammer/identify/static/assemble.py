@@ -144,8 +144,13 @@ def solved(data: Data, law: Law, start: FloatArray, *, robust: bool) -> Solution
     except NoSolutionError as error:
         files = " and ".join(str(path) for path in data.files)
         raise InputError(
-            f"{files}: no constants of the law come near the data, line {data.lines[error.row]} lies farthest"
-            f" off, expected rows in the order of the measurement, and none too far from the others"
+            (
+                f"{files}: no constants of the law come near the data, line {data.lines[error.row]}"
+                " lies farthest off"
+            ),
+            file=files,
+            key=f"line {data.lines[error.row]}",
+            expected="rows in the order of the measurement, and none too far from the others",
         ) from None
 
 
@@ -187,8 +192,13 @@ def assemble(
         if key in constants and constants[key].interval[0] <= 0.0:
             low, high = constants[key].interval
             raise InputError(
-                f"{data.files[0]}: {key} cannot be distinguished from zero (95 % interval {low:.3g} to"
-                f" {high:.3g} {constants[key].unit}), expected {remedy}"
+                (
+                    f"{data.files[0]}: {key} cannot be distinguished from zero (95 % interval {low:.3g} to"
+                    f" {high:.3g} {constants[key].unit})"
+                ),
+                file=data.files[0],
+                key=key,
+                expected=remedy,
             )
     weak = [
         f"{key} is weakly determined: its profile puts it between {shape.interval[0]:.4g} and"
@@ -282,6 +292,16 @@ def enough(data: Data, needed: int, what: str) -> None:
     """Refuse data with fewer rows than a fit needs."""
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
-        raise InputError(f"{where}: {len(data.values)} rows, too few for {what}, expected {needed} or more")
+        raise InputError(
+            f"{where}: {len(data.values)} rows, too few for {what}",
+            file=where,
+            key="rows",
+            expected=f"{needed} or more",
+        )
     if not np.any(data.values):
-        raise InputError(f"{where}: every {data.axes[1][0]} is 0, expected measured values")
+        raise InputError(
+            f"{where}: every {data.axes[1][0]} is 0",
+            file=where,
+            key=data.axes[1][0],
+            expected="measured values",
+        )

@@ -138,12 +138,12 @@ class Stiffness:
         ):
             if len(pairs) not in counts:
                 wanted = "1 (a flat backstop) or 2" if len(counts) > 1 else "2, of armature and backstop"
-                raise InputError(f"{name}: {len(pairs)} given, expected {wanted}")
+                raise InputError(f"{name}: {len(pairs)} given", key=name, expected=wanted)
             for value, _error in pairs:
                 inside = -1.0 < value <= 0.5 if name.startswith("Poisson") else value > 0.0
                 if not inside:
                     wanted = "more than -1 and at most 0.5" if name.startswith("Poisson") else "more than 0"
-                    raise InputError(f"{name}: {value:g}, expected {wanted}")
+                    raise InputError(f"{name}: {value:g}", key=name, value=value, expected=wanted)
         values = np.array([value for pairs in (radii, moduli, ratios) for value, _error in pairs])
         errors = np.array([error for pairs in (radii, moduli, ratios) for _value, error in pairs])
 
@@ -178,7 +178,9 @@ def fit_backstop(
     k = Stiffness(float(stiffness)) if isinstance(stiffness, (int, float)) else stiffness
     if path is None:
         if k is None:
-            raise InputError("the backstop: expected a table of rebounds, or the geometry of its bodies")
+            raise InputError(
+                "the backstop: expected a table of rebounds, or the geometry of its bodies", key="backstop"
+            )
         return _of_bodies(k)
     table = read_table(path, {"impact speed": "m/s", "rebound speed": "m/s"})
     speed, back = table.values["impact speed"], table.values["rebound speed"]
@@ -186,21 +188,28 @@ def fit_backstop(
         low = int(np.argmin(column))
         if column[low] <= 0.0:
             raise InputError(
-                f"{table.path}: line {table.lines[low]}, column {name!r}: {column[low]:g} m/s, expected a"
-                " positive speed"
+                f"{table.path}: line {table.lines[low]}, column {name!r}: {column[low]:g} m/s",
+                file=table.path,
+                key=name,
+                expected="a positive speed",
             )
     zeros = np.zeros(len(speed), dtype=np.int64)
     data = Data((table.path,), "backstop", speed, back, _AXES, zeros, ("rebounds",), table.lines)
     enough(data, _ROWS, "the damping of the backstop and its error")
     if speed.max() < _SPAN * speed.min():
         raise InputError(
-            f"{table.path}: impact speeds from {speed.min():.4g} to {speed.max():.4g} m/s, expected a span of"
-            f" {_SPAN:g} times or more, or the restitution law cannot be tested"
+            f"{table.path}: impact speeds from {speed.min():.4g} to {speed.max():.4g} m/s",
+            file=table.path,
+            key="impact speed",
+            expected=f"a span of {_SPAN:g} times or more, or the restitution law cannot be tested",
         )
     middle = float(np.median(back / speed))
     if middle >= 1.0:
         raise InputError(
-            f"{table.path}: rebounds are {middle:.3g} times as fast as impacts, expected them slower"
+            f"{table.path}: rebounds are {middle:.3g} times as fast as impacts",
+            file=table.path,
+            key="rebound speed",
+            expected="them slower",
         )
     law = RestitutionLaw(speed)
     start = np.array([damping_from_restitution(1.0, middle, float(np.median(speed)))])

@@ -116,8 +116,10 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
     c, k, square, twice = _least_absolute(np.column_stack(columns), force)[:4]
     if square <= 0.0:
         raise InputError(
-            f"{table.path}: at 0 A the force falls toward the magnet by no inverse root, expected a pull,"
-            " negative forces near the magnet and less of it farther away"
+            f"{table.path}: at 0 A the force falls toward the magnet by no inverse root",
+            file=table.path,
+            key="force",
+            expected="a pull, negative forces near the magnet and less of it farther away",
         )
     am = math.sqrt(square)
     strongest = float(current[np.argmax(np.abs(current))])
@@ -126,8 +128,10 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
         bm = (am - math.sqrt(max(square - twice * strongest, 0.0))) / strongest
     if bm <= 0.0:
         raise InputError(
-            f"{table.path}: the pull grows with the current, expected currents counted positive where they"
-            " weaken it"
+            f"{table.path}: the pull grows with the current",
+            file=table.path,
+            key="current",
+            expected="currents counted positive where they weaken it",
         )
     return np.array([c, am, bm, k])
 
@@ -181,7 +185,12 @@ def fit_magnet(
     table = read_table(path, {"displacement": "m", "current": "A", "force": "N"})
     alone = None if spring is None else read_table(spring, {"displacement": "m", "force": "N"})
     if alone is not None and position is None:
-        raise InputError(f"{alone.path}: the position of the backstop is missing, expected it with a spring")
+        raise InputError(
+            f"{alone.path}: the position of the backstop is missing",
+            file=alone.path,
+            key="position",
+            expected="it with a spring",
+        )
     data = _data(table, alone)
     x = data.abscissa
     # NaN where there is no magnet.
@@ -244,22 +253,34 @@ def _check(table: Readings, alone: Readings | None, zero: float, position: float
     low = int(np.argmin(x))
     if x[low] <= zero:
         where = f"{table.path}: line {table.lines[low]}: displacement {x[low]:.6g} m"
-        raise InputError(f"{where}, expected more than {zero:g} m, where equation (3) ends")
+        raise InputError(
+            where,
+            file=table.path,
+            key="displacement",
+            value=x[low],
+            expected=f"more than {zero:g} m, where equation (3) ends",
+        )
     levels = clusters(current)
     if levels == 1:
         raise InputError(
-            f"{table.path}: all forces are at {current[0]:.4g} A, expected 2 or more currents, or magnet.Bm"
-            " cannot be found"
+            f"{table.path}: all forces are at {current[0]:.4g} A",
+            file=table.path,
+            key="current",
+            expected="2 or more currents, or magnet.Bm cannot be found",
         )
     places, needed = clusters(x), 3 if alone is not None else 4
     if 0 < places < needed:
         raise InputError(
-            f"{table.path}: {places} different displacements, expected {needed} or more, or the pull cannot"
-            " be told from the spring"
+            f"{table.path}: {places} different displacements",
+            file=table.path,
+            key="displacement",
+            expected=f"{needed} or more, or the pull cannot be told from the spring",
         )
     near = x <= max(x.min(), position or 0.0) + 0.02 * np.ptp(x)
     if force[near].max() <= 0.0:
-        raise InputError(_never(table, float(x[near].max()), float(force[near].max())))
+        raise InputError(
+            _never(table, float(x[near].max()), float(force[near].max())), file=table.path, key="force"
+        )
     return levels
 
 
@@ -280,7 +301,7 @@ def _releases(
     currents = np.unique(table.values["current"])
     best = float(law.at(p, np.full(len(currents), place), currents).max())
     if best <= 0.0:
-        raise InputError(_never(table, place, best))
+        raise InputError(_never(table, place, best), file=table.path, key="force")
 
 
 def _names(with_spring: bool, with_zero: bool) -> list[tuple[str, str, bool]]:

@@ -95,9 +95,14 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
         first, last = table.lines[rows[0]], table.lines[rows[-1]]
         if depth[rows[-1]] <= depth[rows[0]]:
             raise InputError(
-                f"{table.path}: lines {first} to {last} are loading, but their indentation falls from"
-                f" {from_si(float(depth[rows[0]]), 'm', 'um'):.4g} to"
-                f" {from_si(float(depth[rows[-1]]), 'm', 'um'):.4g} um, expected one that grows"
+                (
+                    f"{table.path}: lines {first} to {last} are loading, but their indentation falls"
+                    f" from {from_si(float(depth[rows[0]]), 'm', 'um'):.4g}"
+                    f" to {from_si(float(depth[rows[-1]]), 'm', 'um'):.4g} um"
+                ),
+                file=table.path,
+                key="indentation",
+                expected="one that grows",
             )
         order = rows[np.argsort(depth[rows], kind="stable")]
         # Running medians, of as many values as there are enough for, pass single outliers over.
@@ -115,8 +120,10 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 for at in (from_si(float(depth[row]), "m", "um"),)
             )
             raise InputError(
-                f"{table.path}: the force of the loading branch falls from {high} to {low}, expected one that"
-                " grows"
+                f"{table.path}: the force of the loading branch falls from {high} to {low}",
+                file=table.path,
+                key="force",
+                expected="one that grows",
             )
 
 
@@ -198,7 +205,12 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
         branch.
     """
     if not thickness > 0.0:
-        raise InputError(f"the thickness of the pack is {thickness:g} m, expected more than 0 m")
+        raise InputError(
+            f"the thickness of the pack is {thickness:g} m",
+            key="thickness",
+            value=thickness,
+            expected="more than 0 m",
+        )
     table = read_table(path, {"indentation": "m", "force": "N"}, text={"branch": ("loading", "unloading")})
     cycles = cycles_of(table)
     check_loading(table, cycles)
@@ -217,7 +229,10 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
     enough(data, law.parameters + _SPARE, "the stiffness of the pack, the turning points and their errors")
     if exponents and not len(cycles.unloaded):
         raise InputError(
-            f"{table.path}: no rows of unloading, expected some, or their exponent cannot be found"
+            f"{table.path}: no rows of unloading",
+            file=table.path,
+            key="rows",
+            expected="some, or their exponent cannot be found",
         )
     solution = solved(data, law, _start(law, table), robust=robust)
     _check_turns(law, table, solution)
@@ -243,15 +258,19 @@ def _start(law: PackLaw, table: Readings) -> FloatArray:
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
     if len(rows) < _LOADING_ROWS:
         raise InputError(
-            f"{table.path}: {len(rows)} rows of loading inside the pack, expected {_LOADING_ROWS} or more, or"
-            " the stiffness cannot be found"
+            f"{table.path}: {len(rows)} rows of loading inside the pack",
+            file=table.path,
+            key="rows",
+            expected=f"{_LOADING_ROWS} or more, or the stiffness cannot be found",
         )
     deep = rows[np.argsort(law.log_r[rows], kind="stable")[len(rows) // 2 :]]
     stiffness = float(np.median(force[deep] * np.exp(-LOADING * law.log_r[deep])))
     if stiffness <= 0.0:
         raise InputError(
-            f"{table.path}: the forces of loading are not positive, expected magnitudes, whatever their"
-            " direction"
+            f"{table.path}: the forces of loading are not positive",
+            file=table.path,
+            key="force",
+            expected="magnitudes, whatever their direction",
         )
     turns = [law.log_r[law.inside & (cycles.cycle == turn)].max() for turn in law.turns]
     return np.array([stiffness, *turns, *([LOADING, UNLOADING] if law.free else [])])
@@ -263,8 +282,13 @@ def _check_turns(law: PackLaw, table: Readings, solution: Solution) -> None:
         rows = np.flatnonzero(law.inside & (law.cycles.cycle == turn))
         if abs(meeting - law.log_r[rows].max()) > _FAR:
             raise InputError(
-                f"{table.path}: lines {table.lines[rows[0]]} to {table.lines[rows[-1]]} are a load cycle"
-                " whose loading and unloading do not meet, expected rows in the order of the measurement"
+                (
+                    f"{table.path}: lines {table.lines[rows[0]]} to {table.lines[rows[-1]]} are a load"
+                    " cycle whose loading and unloading do not meet"
+                ),
+                file=table.path,
+                key="rows",
+                expected="rows in the order of the measurement",
             )
 
 

@@ -58,15 +58,20 @@ def fit_solenoid(path: str | Path, *, turns: float, current: float | None = None
     more = {"current": "A", "inductance": "H", "linkage": "Wb", "armature flux": "Wb"}
     table = read_table(path, {"gap": "m", "force": "N"}, optional=more)
     if not turns > 0.0:
-        raise InputError(f"turns = {turns:g}, expected more than 0")
+        raise InputError.of("turns", turns, "more than 0", written=f"{turns:g}")
     if "current" not in table.values and current is None:
         raise InputError(
-            f"{table.path}: the column 'current' is missing, expected it or one current for all rows"
+            f"{table.path}: the column 'current' is missing",
+            file=table.path,
+            key="current",
+            expected="it or one current for all rows",
         )
     if "inductance" not in table.values and "linkage" not in table.values:
         raise InputError(
-            f"{table.path}: neither 'inductance' nor 'linkage', expected one of these columns beside the"
-            " force, or the saturation cannot be told"
+            f"{table.path}: neither 'inductance' nor 'linkage'",
+            file=table.path,
+            key="inductance",
+            expected="one of these columns beside the force, or the saturation cannot be told",
         )
     gap, force = table.values["gap"], table.values["force"]
     currents = table.values.get("current", np.full(len(gap), current))
@@ -77,10 +82,17 @@ def fit_solenoid(path: str | Path, *, turns: float, current: float | None = None
         low = int(np.argmin(values))
         if not values[low] > 0.0:
             where = f"{table.path}: line {table.lines[low]}"
-            raise InputError(f"{where}: the {name} is {values[low]:.4g}, expected more than 0")
+            raise InputError(
+                f"{where}: the {name} is {values[low]:.4g}", file=where, key=name, expected="more than 0"
+            )
     if gap.min() < 0.0:
         low = int(np.argmin(gap))
-        raise InputError(f"{table.path}: line {table.lines[low]}: gap {gap[low]:.4g} m, expected 0 or more")
+        raise InputError(
+            f"{table.path}: line {table.lines[low]}: gap {gap[low]:.4g} m",
+            file=table.path,
+            key="gap",
+            expected="0 or more",
+        )
     rows = len(gap)
     data = Data(
         (table.path,),

@@ -65,7 +65,10 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
     enough(data, _ROWS, "the two constants of the spring and their errors")
     if len(np.unique(x)) < 3:
         raise InputError(
-            f"{table.path}: {len(np.unique(x))} different displacements, expected 3 or more for a line"
+            f"{table.path}: {len(np.unique(x))} different displacements",
+            file=table.path,
+            key="displacement",
+            expected="3 or more for a line",
         )
     law = SpringLaw(x - position)
     solution = solved(data, law, start_of(table.path, x - position, force), robust=robust)
@@ -92,12 +95,16 @@ def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
     slope, height = (float(part) for part in theilslopes(force, travel)[:2])
     if not slope < 0.0:
         raise InputError(
-            f"{path}: the spring force rises by {slope:.3g} N/m with the displacement, expected a force"
-            " toward the paper that falls"
+            f"{path}: the spring force rises by {slope:.3g} N/m with the displacement",
+            file=path,
+            key="force",
+            expected="a force toward the paper that falls",
         )
     if not height > 0.0:
         raise InputError(
-            f"{path}: the spring force at the backstop is {height:.3g} N, expected a positive force, toward"
-            " the paper"
+            f"{path}: the spring force at the backstop is {height:.3g} N",
+            file=path,
+            key="force",
+            expected="a positive force, toward the paper",
         )
     return np.array([height, -height / slope])

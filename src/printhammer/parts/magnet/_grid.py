@@ -50,26 +50,42 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str)
         if not (math.isfinite(x) and math.isfinite(current) and math.isfinite(value)):
             raise InputError(
                 f"{what}: the point {x!r} m, {current!r} A, {value!r} {UNITS[quantity]} is expected to be"
-                " finite"
+                " finite",
+                file=what,
+                key="point",
             )
         if (x, current) in points:
-            raise InputError(f"{what}: the point {x:.9g} m, {current:.9g} A is given twice, expected once")
+            raise InputError(
+                f"{what}: the point {x:.9g} m, {current:.9g} A is given twice",
+                file=what,
+                key="point",
+                expected="once",
+            )
         points[x, current] = value
     xs = sorted({x for x, _ in points})
     currents = sorted({current for _, current in points})
     for name, values in (("displacements", xs), ("currents", currents)):
         if len(values) < 2:
-            raise InputError(f"{what}: {len(values)} different {name}, expected at least 2")
+            raise InputError(
+                f"{what}: {len(values)} different {name}", file=what, key=name, expected="at least 2"
+            )
     for x in xs:
         for current in currents:
             if (x, current) not in points:
                 raise InputError(
-                    f"{what}: the point {x:.9g} m, {current:.9g} A is missing, expected a complete grid of "
-                    f"{len(xs)} displacements and {len(currents)} currents"
+                    f"{what}: the point {x:.9g} m, {current:.9g} A is missing",
+                    file=what,
+                    key="point",
+                    expected=f"a complete grid of {len(xs)} displacements and {len(currents)} currents",
                 )
     if not currents[0] <= 0.0 <= currents[-1]:
         span = f"{currents[0]:.9g} to {currents[-1]:.9g} A"
-        raise InputError(f"{what}: the currents go from {span}, expected a range with 0 A in it")
+        raise InputError(
+            f"{what}: the currents go from {span}",
+            file=what,
+            key="current",
+            expected="a range with 0 A in it",
+        )
     measured = tuple(tuple(points[x, current] for current in currents) for x in xs)
     return Grid(tuple(xs), tuple(currents), measured)
 
@@ -94,13 +110,21 @@ def read_csv(path: Path, quantity: str) -> Grid:
     lines = read_sheet(path, f"the {quantity} table").rows
     if not lines:
         raise InputError(
-            f"{what}: the file is empty, expected the heading {heading!r} and a grid of {quantity}s"
+            f"{what}: the file is empty",
+            file=what,
+            key="heading",
+            expected=f"the heading {heading!r} and a grid of {quantity}s",
         )
     order, units = _heading(lines[0][1], what, columns, heading)
     rows = []
     for number, cells in lines[1:]:
         if len(cells) != len(order):
-            raise InputError(f"{what}: line {number} has {len(cells)} cells, expected {len(order)}")
+            raise InputError(
+                f"{what}: line {number} has {len(cells)} cells",
+                file=what,
+                key=f"line {number}",
+                expected=f"{len(order)}",
+            )
         row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
         with located(f"{what}: line {number}"):
             x, current, value = (to_si(row[name], units[name], si) for name, si in columns.items())
@@ -121,13 +145,20 @@ def _heading(
         if name not in columns or name in units:
             break
         if not unit:
-            raise InputError(f"{what}: column {cell.strip()!r} has no unit, expected the heading {heading!r}")
-        with located(f"{what}: column {cell.strip()!r}"):
+            raise InputError(
+                f"{what}: column {cell.strip()!r} has no unit",
+                file=what,
+                key=cell.strip(),
+                expected=f"the heading {heading!r}",
+            )
+        with located(f"{what}: column {cell.strip()!r}", file=what, key=cell.strip()):
             to_si(1.0, unit, columns[name])
         units[name] = unit
     if len(units) != len(columns) or len(cells) != len(columns):
         listed = ",".join(cell.strip() for cell in cells)
-        raise InputError(f"{what}: the heading is {listed!r}, expected {heading!r}")
+        raise InputError(
+            f"{what}: the heading is {listed!r}", file=what, key="heading", expected=f"{heading!r}"
+        )
     return list(units), units
 
 
@@ -204,7 +235,9 @@ class GridMagnet(MagnetPart):
         if len(values) != len(x) or any(len(line) != len(current) for line in values):
             raise InputError(
                 f"{what}: expected {len(x)} rows of {len(current)} {cls.quantity}s, one for each x and"
-                " current"
+                " current",
+                file=what,
+                key="rows",
             )
         rows = [
             (float(a), float(b), float(value))

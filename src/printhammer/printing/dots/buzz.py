@@ -263,9 +263,13 @@ class _Search:
     ) -> None:
         for name in ("pack", "backstop", "waveform"):
             if getattr(hammer, name) is None:
-                raise InputError(f"the hammer {hammer.name!r} has no {name}, expected one for buzz printing")
+                raise InputError(
+                    f"the hammer {hammer.name!r} has no {name}", key=name, expected="one for buzz printing"
+                )
         if not 1 <= fewest <= pulses:
-            raise InputError(f"pulses = {pulses}, expected at least the {fewest} dots that must count")
+            raise InputError.of(
+                "pulses", pulses, f"at least the {fewest} dots that must count", written=str(pulses)
+            )
         self.hammer, self.pulses, self.fewest, self.forces = hammer, pulses, fewest, forces
         self.limit = max_current if pulse_of(hammer).quantity == "current" else math.inf
         self.tried = 0

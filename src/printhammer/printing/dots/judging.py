@@ -84,7 +84,7 @@ def judge(
     shape = dots.fired.shape
     for name, values in (("wanted", wanted), ("slot_times", slot_times)):
         if np.shape(values) != shape:
-            raise InputError(f"{name}: an array of shape {np.shape(values)}, expected {shape}")
+            raise InputError(f"{name}: an array of shape {np.shape(values)}", key=name, expected=shape)
     asked = np.asarray(wanted, dtype=np.bool_)
     run = dots.fired.copy()
     if ok is not None:
@@ -124,7 +124,11 @@ class Limits(Declared):
         for name, unit in (("force", ""), ("arrival", " s"), ("extra_contacts", "")):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0.0:
-                raise InputError(f"limits: {name} = {value!r}{unit} is expected to be a number not below 0")
+                raise InputError(
+                    f"limits: {name} = {value!r}{unit} is expected to be a number not below 0",
+                    key=f"limits.{name}",
+                    value=value,
+                )
 
     @property
     def text(self) -> str:
@@ -163,5 +167,5 @@ PRESETS: Final = {
 def limits_named(name: str) -> Limits:
     """Return the limits of a name."""
     if name not in PRESETS:
-        raise InputError(f"limits = {name!r}, expected one of {', '.join(PRESETS)}")
+        raise InputError.of("limits", name, f"one of {', '.join(PRESETS)}")
     return PRESETS[name]

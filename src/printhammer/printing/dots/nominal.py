@@ -49,16 +49,30 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     """
     pulse = pulse_of(hammer, waveform)
     if hammer.front is None:
-        raise InputError(f"{hammer.path}: the hammer has no pack, expected one that a dot is made on")
+        raise InputError(
+            f"{hammer.path}: the hammer has no pack",
+            file=hammer.path,
+            key="pack",
+            expected="one that a dot is made on",
+        )
     motion = simulate(hammer, PulseTrain(pulse), duration=wait_of(pulse), points=2, tolerance=tolerance)
     if not motion.ok:
-        raise InputError(f"{hammer.path}: the run of a single pulse ends early: {motion.message}")
+        raise InputError(
+            f"{hammer.path}: the run of a single pulse ends early: {motion.message}",
+            file=hammer.path,
+            key="pulse",
+        )
     dot = motion.dots[0]
     values = (dot.peak_force, dot.flight_time, dot.impact_speed, dot.indentation)
     energies = (dot.loading_work, dot.net_loss)
     known = [value for value in (*values, *energies) if value is not None]
     if len(known) < len(values) + len(energies) or not known[0] > 0.0:
-        raise InputError(f"{hammer.path}: a single pulse makes no dot, expected a hammer that prints")
+        raise InputError(
+            f"{hammer.path}: a single pulse makes no dot",
+            file=hammer.path,
+            key="pulse",
+            expected="a hammer that prints",
+        )
     return Nominal(*known)
 
 
@@ -93,5 +107,10 @@ def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:
     """Return a waveform, by default that of the hammer."""
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None:
-        raise InputError(f"{hammer.path}: the hammer has no [waveform] to fire, expected one")
+        raise InputError(
+            f"{hammer.path}: the hammer has no [waveform] to fire",
+            file=hammer.path,
+            key="waveform",
+            expected="one",
+        )
     return pulse

@@ -47,9 +47,13 @@ class Paper(Declared):
             most = 1.0 / _WIDEST if name == "stiffness" else math.inf
             if not (math.isfinite(value) and 0.0 <= value < most):
                 limit = " and below 1/3" if name == "stiffness" else ""
-                raise InputError(f"paper: {name} = {value!r} is expected to be a number not below 0{limit}")
+                raise InputError.of(
+                    name, value, f"a number not below 0{limit}", file="paper", said=" is expected to be"
+                )
         if type(self.seed) is not int or self.seed < 0:
-            raise InputError(f"paper: seed = {self.seed!r} is expected to be a whole number not below 0")
+            raise InputError.of(
+                "seed", self.seed, "a whole number not below 0", file="paper", said=" is expected to be"
+            )
 
     @classmethod
     def load(cls, path: str | Path) -> Paper:
@@ -70,7 +74,7 @@ class Paper(Declared):
             for key in keys:
                 if key not in known:
                     odd = key if key.isprintable() else shown(key)
-                    raise InputError(f"{odd} is not known, expected {', '.join(known)}")
+                    raise InputError(f"{odd} is not known", key=odd, expected=f"{', '.join(known)}")
             values: dict[str, Any] = {
                 key: read_number(value, _UNITS[key], key) if key in _UNITS else value
                 for key, value in keys.items()
@@ -100,7 +104,12 @@ class Paper(Declared):
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:
-                raise InputError(f"{hammer.path}: paper that varies, expected a hammer with {key}")
+                raise InputError(
+                    f"{hammer.path}: paper that varies",
+                    file=hammer.path,
+                    key=key,
+                    expected=f"a hammer with {key}",
+                )
         if not any(spread.values()):
             return (hammer,) * slots
         own = {key: hammer.constants[key].si for key, value in spread.items() if value}

@@ -78,7 +78,12 @@ class Settling(Declared):
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
     """Fire a hammer once from rest, its own waveform or another, and watch it settle."""
     if hammer.position is None:
-        raise InputError(f"{hammer.path}: the hammer has no backstop, expected one to settle on")
+        raise InputError(
+            f"{hammer.path}: the hammer has no backstop",
+            file=hammer.path,
+            key="backstop",
+            expected="one to settle on",
+        )
     rest = rest_state(hammer)
     motion = simulate(
         hammer, PulseTrain(pulse_of(hammer, waveform)), duration=CYCLE, points=2, tolerance=tolerance

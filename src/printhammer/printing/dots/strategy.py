@@ -49,7 +49,9 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
     the shape (2**order,); read-only.
     """
     if not 1 <= order <= 16:
-        raise InputError(f"order = {order!r} of a de Bruijn cycle, expected 1 to 16")
+        raise InputError(
+            f"order = {order!r} of a de Bruijn cycle", key="order", value=order, expected="1 to 16"
+        )
     cycle: list[int] = []
     word = [0]
     # Duval's algorithm: the Lyndon words up to a length, in order.
@@ -142,11 +144,15 @@ def checked_drives(
     """
     drives = strategy(hammer, patterns, rate)
     if len(drives) != len(patterns):
-        raise InputError(f"the strategy gives {len(drives)} drives, expected {len(patterns)}")
+        raise InputError(
+            f"the strategy gives {len(drives)} drives", key="strategy", expected=f"{len(patterns)}"
+        )
     for slots, count in zip(patterns, firings_of(drives).counts.tolist(), strict=True):
         if count != len(slots):
             raise InputError(
-                f"the strategy gives {count} firings for the slots {slots}, expected {len(slots)}"
+                f"the strategy gives {count} firings for the slots {slots}",
+                key="strategy",
+                expected=f"{len(slots)}",
             )
     return drives
 

@@ -115,7 +115,7 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
         return ImageFont.truetype(str(path), size, layout_engine=ImageFont.Layout.BASIC)
     except (OSError, ValueError):
         what = "a TrueType font" if path.is_file() else "a TrueType font file that is there"
-        raise InputError(f"{path}: expected {what}") from None
+        raise InputError(f"{path}: expected {what}", file=path) from None
 
 
 @lru_cache(maxsize=16)
@@ -128,7 +128,9 @@ def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
         down = max(0, *(math.ceil(box[3]) for box in boxes))
         if up + down <= wires:
             return font, up
-    raise InputError(f"{path}: {wires} wires are too few for this font, expected more")
+    raise InputError(
+        f"{path}: {wires} wires are too few for this font", file=path, key="wires", expected="more"
+    )
 
 
 @lru_cache(maxsize=16)
@@ -163,9 +165,9 @@ def lettered(
 ) -> BoolArray:
     """Set a text in dots, shape (lines, wires, slots), as `Pattern.from_text` does."""
     if columns < 1:
-        raise InputError(f"columns = {columns}, expected 1 or more characters in a line")
+        raise InputError.of("columns", columns, "1 or more characters in a line", written=str(columns))
     if not text.strip():
-        raise InputError(f"text = {text!r}, expected something to print")
+        raise InputError.of("text", text, "something to print")
     glyph: Callable[[str], BoolArray]
     lines = broken(text, columns)
     if font is None and wires == WIRES:
@@ -179,7 +181,9 @@ def lettered(
     if lacking:
         some = ", ".join(repr(mark) for mark in lacking[:_NAMED])
         more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
-        raise InputError(f"text: the font {name} has no {some}{more}, expected characters that it has")
+        raise InputError(
+            f"text: the font {name} has no {some}{more}", key="text", expected="characters that it has"
+        )
     dots = {mark: glyph(mark) for mark in set("".join(lines))}
     rows = [[dots[mark] for mark in line] for line in lines]
     wide = max(sum(block.shape[1] for block in row) for row in rows)

@@ -80,7 +80,7 @@ class Head(Declared):
             least = 0.0 if entry.name == "line_gap" else math.ulp(0.0)
             if isinstance(value, bool) or not (value >= least and math.isfinite(value)):
                 expected = "a positive number" if least else "a number not below 0"
-                raise InputError(f"head: {entry.name} = {value!r}, expected {expected}")
+                raise InputError.of(entry.name, value, expected, file="head")
 
     @property
     def line_pitch(self) -> float:
@@ -116,7 +116,7 @@ def head_of(
         than from wire to wire.
     """
     if wires < 1:
-        raise InputError(f"head: wires = {wires!r}, expected a positive number")
+        raise InputError.of("wires", wires, "a positive number", file="head")
     apart = _HEIGHT / wires
     usual = _STANDARD.get(wires, Head(wires, apart, apart, _THICKNESS * apart))
     return Head(
@@ -383,13 +383,15 @@ def print_page(
     """
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):
-        raise InputError(f"{what!r} is expected to be a pattern or a text")
+        raise InputError(f"{what!r} is expected to be a pattern or a text", value=what, key="pattern")
     slot_rate = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
-        raise InputError(f"{pattern.wanted} dots are wanted, expected {_MOST_DOTS} at most")
+        raise InputError(f"{pattern.wanted} dots are wanted", key="pattern", expected=f"{_MOST_DOTS} at most")
     print_head = head_of(pattern.wires) if head is None else head
     if print_head.wires != pattern.wires:
-        raise InputError(f"head: {print_head.wires} wires, expected {pattern.wires} as the pattern has")
+        raise InputError(
+            f"head: {print_head.wires} wires", key="head", expected=f"{pattern.wires} as the pattern has"
+        )
     bounds = PRESETS["slots"] if limits is None else limits
     single = nominal(hammer, waveform, tolerance=tolerance)
     if waveform is not None and strategy is open_loop:

@@ -59,10 +59,10 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolA
     if suffix in BITMAPS:
         return source.stem, _bitmap(source, lettering.WIRES if wires is None else wires)
     if suffix != ".toml":
-        raise InputError(f"{source}: expected a name that ends in one of {', '.join(SUFFIXES)}")
+        raise InputError(f"{source}: expected a name that ends in one of {', '.join(SUFFIXES)}", file=source)
     name, dots = pattern_from_toml(read_text(source, "the pattern file"), str(source))
     if wires is not None and wires != dots.shape[1]:
-        raise InputError(f"{source}: wires = {dots.shape[1]}, expected {wires}")
+        raise InputError.of("wires", dots.shape[1], wires, file=source, written=str(dots.shape[1]))
     return name, dots
 
 
@@ -71,24 +71,26 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArra
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{source}: expected TOML ({' '.join(str(error).split())})") from None
+        raise InputError(f"{source}: expected TOML ({' '.join(str(error).split())})", file=source) from None
     for key in data:
         if key not in _KEYS:
             odd = key if key.isprintable() else shown(key)
-            raise InputError(f"{source}: {odd} is not known, expected {', '.join(_KEYS)}")
+            raise InputError(
+                f"{source}: {odd} is not known", file=source, key=odd, expected=f"{', '.join(_KEYS)}"
+            )
     for key in _KEYS:
         if key not in data:
-            raise InputError(f"{source}: {key} is missing")
+            raise InputError(f"{source}: {key} is missing", file=source, key=key)
     if data["format"] != FORMAT or isinstance(data["format"], bool | float):
-        raise InputError(f"{source}: format = {shown(data['format'])}, expected {FORMAT}")
+        raise InputError.of("format", data["format"], FORMAT, file=source, written=shown(data["format"]))
     name, wires, rows = data["name"], data["wires"], data["rows"]
     if not isinstance(name, str) or not name.strip():
-        raise InputError(f"{source}: name = {shown(name)}, expected a name")
+        raise InputError.of("name", name, "a name", file=source, written=shown(name))
     if not isinstance(wires, int) or isinstance(wires, bool) or wires < 1:
-        raise InputError(f"{source}: wires = {shown(wires)}, expected a whole number from 1 on")
+        raise InputError.of("wires", wires, "a whole number from 1 on", file=source, written=shown(wires))
     if not isinstance(rows, list) or not rows or not all(isinstance(row, str) for row in rows):
-        raise InputError(
-            f"{source}: rows = {shown(rows)}, expected a list of rows of '{_DOT}' and '{_EMPTY}'"
+        raise InputError.of(
+            "rows", rows, f"a list of rows of '{_DOT}' and '{_EMPTY}'", file=source, written=shown(rows)
         )
     return name, _marked(rows, wires, source)
 
@@ -96,14 +98,27 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArra
 def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
     """Return the dots of rows of marks, print line by print line."""
     if len(rows) % wires:
-        raise InputError(f"{source}: rows has {len(rows)} rows, expected a multiple of wires = {wires}")
+        raise InputError(
+            f"{source}: rows has {len(rows)} rows",
+            file=source,
+            key="rows",
+            expected=f"a multiple of wires = {wires}",
+        )
     for number, row in enumerate(rows, 1):
         odd = [mark for mark in row if mark not in (_DOT, _EMPTY)]
         if odd:
-            raise InputError(f"{source}: rows: {odd[0]!r} in row {number}, expected '{_DOT}' and '{_EMPTY}'")
+            raise InputError(
+                f"{source}: rows: {odd[0]!r} in row {number}",
+                file=source,
+                key="rows",
+                expected=f"'{_DOT}' and '{_EMPTY}'",
+            )
         if len(row) != len(rows[0]):
             raise InputError(
-                f"{source}: rows: row {number} has {len(row)} slots, expected {len(rows[0])} as the first"
+                f"{source}: rows: row {number} has {len(row)} slots",
+                file=source,
+                key="rows",
+                expected=f"{len(rows[0])} as the first",
             )
     dots = np.array([[mark == _DOT for mark in row] for row in rows], np.bool_)
     return dots.reshape(-1, wires, len(rows[0]))
@@ -113,12 +128,15 @@ def _bitmap(path: Path, wires: int) -> BoolArray:
     from PIL import Image
 
     if wires < 1:
-        raise InputError(f"wires = {wires}, expected 1 or more")
+        raise InputError.of("wires", wires, "1 or more", written=str(wires))
     try:
         with Image.open(path, formats=sorted(set(BITMAPS.values()))) as image:
             if image.width * image.height > _MOST_PIXELS:
                 raise InputError(
-                    f"{path}: {image.width} x {image.height} pixels, expected at most {_MOST_PIXELS}"
+                    f"{path}: {image.width} x {image.height} pixels",
+                    file=path,
+                    key="pixels",
+                    expected=f"at most {_MOST_PIXELS}",
                 )
             pixels = np.asarray(image.convert("LA"))
     except (OSError, ValueError, SyntaxError) as error:
@@ -126,7 +144,7 @@ def _bitmap(path: Path, wires: int) -> BoolArray:
             raise
         reason = getattr(error, "strerror", None)
         why = f" ({reason})" if reason else ""
-        raise InputError(f"{path}: expected a bitmap that can be read{why}") from None
+        raise InputError(f"{path}: expected a bitmap that can be read{why}", file=path) from None
     dark = (pixels[:, :, 0] < 128) & (pixels[:, :, 1] >= 128)
     lines = -(-len(dark) // wires)
     dots = np.zeros((lines * wires, dark.shape[1]), np.bool_)
@@ -158,7 +176,7 @@ def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
         Image.fromarray(white).save(buffer, format=BITMAPS[suffix])
         content = buffer.getvalue()
     else:
-        raise InputError(f"{target}: expected a name that ends in one of {', '.join(SUFFIXES)}")
+        raise InputError(f"{target}: expected a name that ends in one of {', '.join(SUFFIXES)}", file=target)
     write_file(target, content)
 
 
@@ -192,11 +210,12 @@ class Pattern(Declared):
             dots = dots[np.newaxis]
         if dots.ndim != 3 or not 1 <= dots.shape[1] <= MOST_WIRES or dots.size > MOST_CELLS:
             raise InputError(
-                f"pattern {self.name!r}: an array of shape {np.shape(self.dots)}, expected print lines, up to"
-                f" {MOST_WIRES} wires and slots, {MOST_CELLS} cells at most"
+                f"pattern {self.name!r}: an array of shape {np.shape(self.dots)}",
+                key="dots",
+                expected=f"print lines, up to {MOST_WIRES} wires and slots, {MOST_CELLS} cells at most",
             )
         if not dots.any():
-            raise InputError(f"pattern {self.name!r}: no dot is wanted, expected at least one")
+            raise InputError(f"pattern {self.name!r}: no dot is wanted", key="dots", expected="at least one")
         dots.flags.writeable = False
         object.__setattr__(self, "dots", dots)
 
@@ -229,7 +248,7 @@ class Pattern(Declared):
             No text, characters that the font lacks, a font that cannot be read.
         """
         if not 1 <= wires <= MOST_WIRES:
-            raise InputError(f"wires = {wires}, expected 1 to {MOST_WIRES}")
+            raise InputError.of("wires", wires, f"1 to {MOST_WIRES}", written=str(wires))
         title = " ".join(text.split())
         short = title if len(title) <= _TITLE else f"{title[: _TITLE - 1]}…"
         return cls(short, lettered(text, wires, font, columns))

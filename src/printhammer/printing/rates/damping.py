@@ -68,7 +68,12 @@ class Material(Declared):
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise InputError(f"kind = {self.kind!r} of a material, expected one of {', '.join(KINDS)}")
+            raise InputError(
+                f"kind = {self.kind!r} of a material",
+                key="kind",
+                value=self.kind,
+                expected=f"one of {', '.join(KINDS)}",
+            )
 
 
 def materials(hammer: Hammer, single: Nominal) -> list[Material]:
@@ -277,14 +282,24 @@ def damping_study(
     grid = rate_grid(first, last, step)
     bounds = Limits() if limits is None else limits
     if hammer.backstop is None:
-        raise InputError(f"{hammer.path}: the hammer has no backstop, expected one of some material")
+        raise InputError(
+            f"{hammer.path}: the hammer has no backstop",
+            file=hammer.path,
+            key="backstop",
+            expected="one of some material",
+        )
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":
-        raise InputError(f"{hammer.path}: the waveform is a {pulse.quantity}, expected a current")
+        raise InputError(
+            f"{hammer.path}: the waveform is a {pulse.quantity}",
+            file=hammer.path,
+            key="waveform",
+            expected="a current",
+        )
     single = nominal(hammer, tolerance=tolerance)
     tried = tuple(materials(hammer, single) if others is None else others)
     if not tried:
-        raise InputError("others: expected at least one material")
+        raise InputError("others: expected at least one material", key="others")
     made, fate = changed(hammer, [(material.changes, material.label) for material in tried])
     status = np.array(fate, "U17")
     values = {name: np.full(len(tried), np.nan) for name in _NUMBERS}

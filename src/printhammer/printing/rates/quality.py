@@ -371,18 +371,20 @@ def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
     """Read a pattern as `quality` takes it: where dots are wanted, slot by slot."""
     if isinstance(pattern, str):
         if not pattern or set(pattern) - {"0", "1"}:
-            raise InputError(f"pattern = {pattern!r}, expected slots such as '10110111'")
+            raise InputError.of("pattern", pattern, "slots such as '10110111'")
         wanted = np.array([letter == "1" for letter in pattern])
     elif isinstance(pattern, int) and not isinstance(pattern, bool):
         if not 1 <= pattern <= MOST_SLOTS:
-            raise InputError(f"pattern = {pattern!r}, expected 1 to {MOST_SLOTS} dots")
+            raise InputError.of("pattern", pattern, f"1 to {MOST_SLOTS} dots")
         wanted = np.ones(pattern, dtype=np.bool_)
     else:
         wanted = np.asarray(pattern)
         if wanted.dtype != np.bool_ or wanted.ndim != 1:
-            raise InputError("pattern: expected text, a number of dots, or truth values in one row")
+            raise InputError(
+                "pattern: expected text, a number of dots, or truth values in one row", key="pattern"
+            )
     if not wanted.any() or len(wanted) > MOST_SLOTS:
-        raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots")
+        raise InputError(f"pattern: expected at least one dot and at most {MOST_SLOTS} slots", key="pattern")
     return wanted
 
 

@@ -276,11 +276,11 @@ def rate_grid(first: float | str, last: float | str, step: float | str) -> Float
         read_positive(value, "Hz", name) for value, name in ((first, "first"), (last, "last"), (step, "step"))
     )
     if high < low:
-        raise InputError(f"last = {last!r}: expected a rate not below the first one, {low:g} Hz")
+        raise InputError.of("last", last, f"a rate not below the first one, {low:g} Hz", said=": expected")
     # The last rate belongs to the grid also where the division is rounded down.
     count = math.floor((high - low) / apart * (1.0 + 1e-12)) + 1
     if count > MOST_RATES:
-        raise InputError(f"{count} rates, expected at most {MOST_RATES}")
+        raise InputError(f"{count} rates", key="rates", expected=f"at most {MOST_RATES}")
     return np.array([low + apart * number for number in range(count)])
 
 

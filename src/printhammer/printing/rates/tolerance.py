@@ -215,9 +215,9 @@ def tolerance_yield(
     """
     count = read_count(number, "number")
     if count > MOST:
-        raise InputError(f"number = {count}, expected at most {MOST} hammers")
+        raise InputError.of("number", count, f"at most {MOST} hammers", written=str(count))
     if judged_by not in get_args(Judged):
-        raise InputError(f"judged_by = {judged_by!r}, expected one of {', '.join(get_args(Judged))}")
+        raise InputError.of("judged_by", judged_by, f"one of {', '.join(get_args(Judged))}")
     grid = rate_grid(first, last, step) if rate is None else np.array([read_positive(rate, "Hz", "rate")])
     bounds = Limits() if limits is None else limits
     options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
@@ -288,10 +288,10 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
         if key not in constants:
             raise unknown(key, constants, f"{hammer.path}: spread")
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1.0:
-            raise InputError(f"spread of {key} = {value!r} is expected to be from 0 to below 1")
+            raise InputError.of(f"spread of {key}", value, "from 0 to below 1", said=" is expected to be")
     varying = {key: float(value) for key, value in wanted.items() if value > 0.0}
     if not varying:
-        raise InputError("spreads: expected at least one constant that varies")
+        raise InputError("spreads: expected at least one constant that varies", key="spreads")
     return varying
 
 
@@ -303,7 +303,7 @@ def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
     from scipy.stats import qmc
 
     if seed < 0:
-        raise InputError(f"seed = {seed}, expected 0 or more")
+        raise InputError.of("seed", seed, "0 or more", written=str(seed))
     sequence = qmc.Sobol(len(spreads), scramble=True, rng=np.random.default_rng(seed))
     points = sequence.random_base2(math.ceil(math.log2(number)) if number > 1 else 0)[:number]
     return np.asarray(1.0 + (2.0 * points - 1.0) * np.array(list(spreads.values())))

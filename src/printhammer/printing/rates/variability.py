@@ -69,22 +69,37 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
     changes: dict[str, Any] = {}
     for key, value in asdict(by).items():
         if not math.isfinite(value) or (key != "travel" and value <= -1.0):
-            raise InputError(f"perturbation: {key} = {value!r} is expected to be finite and above -1")
+            raise InputError.of(
+                key, value, "finite and above -1", file="perturbation", said=" is expected to be"
+            )
     magnet, pack, backstop = hammer.magnet, hammer.pack, hammer.backstop
     if by.current or by.magnet:
         if not isinstance(magnet, InverseRootMagnet):
             raise InputError(
-                f"{hammer.path}: perturbation of current or magnet, expected a magnet of law 'inverse-root'"
+                f"{hammer.path}: perturbation of current or magnet",
+                file=hammer.path,
+                key="magnet",
+                expected="a magnet of law 'inverse-root'",
             )
         changes["magnet.Bm"] = magnet.Bm * (1.0 + by.current)
         changes["magnet.Am"] = magnet.Am * (1.0 + by.magnet)
     if by.travel or by.forms:
         if pack is None:
-            raise InputError(f"{hammer.path}: perturbation of travel or forms, expected a hammer with a pack")
+            raise InputError(
+                f"{hammer.path}: perturbation of travel or forms",
+                file=hammer.path,
+                key="travel",
+                expected="a hammer with a pack",
+            )
         front = pack.front + by.travel
         if by.forms:
             if not isinstance(pack, PowerPack):
-                raise InputError(f"{hammer.path}: perturbation of forms, expected a pack of the law 'power'")
+                raise InputError(
+                    f"{hammer.path}: perturbation of forms",
+                    file=hammer.path,
+                    key="forms",
+                    expected="a pack of the law 'power'",
+                )
             front -= by.forms * pack.thickness
             changes["pack.thickness"] = pack.thickness * (1.0 + by.forms)
         changes["pack.front"] = front
@@ -97,7 +112,10 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
             changes["backstop.relaxation_time"] = backstop.relaxation_time * (1.0 + by.damping)
         else:
             raise InputError(
-                f"{hammer.path}: perturbation of damping, expected a backstop with damping or relaxation time"
+                f"{hammer.path}: perturbation of damping",
+                file=hammer.path,
+                key="damping",
+                expected="a backstop with damping or relaxation time",
             )
     return hammer.replace(changes, source=f"perturbed: {by.name}") if changes else hammer
 
@@ -157,8 +175,8 @@ class Variability(Declared):
             most = math.inf if name == "travel" else 1.0 / WIDEST
             if not (math.isfinite(value) and 0.0 <= value < most):
                 limit = "" if name == "travel" else " and below 1/3"
-                raise InputError(
-                    f"variability: {name} = {value!r} is expected to be a number not below 0{limit}"
+                raise InputError.of(
+                    name, value, f"a number not below 0{limit}", file="variability", said=" is expected to be"
                 )
 
     @classmethod
@@ -202,8 +220,10 @@ class Variability(Declared):
             if not there:
                 every = ", ".join(dict.fromkeys(key for group in CONSTANTS[name] for key in group))
                 raise InputError(
-                    f"{hammer.path}: variability of {name} = {value:g}, expected 0 for a hammer without any"
-                    f" of {every}"
+                    f"{hammer.path}: variability of {name} = {value:g}",
+                    file=hammer.path,
+                    key=name,
+                    expected=f"0 for a hammer without any of {every}",
                 )
             spread |= {key: value if name == "travel" else value * abs(known[key].si) for key in there}
         return spread
@@ -226,8 +246,13 @@ class Variability(Declared):
             if len(drawn) >= count:
                 return drawn[:count]
         raise InputError(
-            f"{hammer.path}: {len(drawn)} of {_TRIES * count} hammers drawn with {self.text} rest at the"
-            " backstop, expected a smaller variability"
+            (
+                f"{hammer.path}: {len(drawn)} of {_TRIES * count} hammers drawn with {self.text} rest"
+                " at the backstop"
+            ),
+            file=hammer.path,
+            key="variability",
+            expected="a smaller variability",
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:

@@ -242,15 +242,15 @@ class Results:
             return None
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or "not UTF-8"
-            raise InputError(f"{path}: the file cannot be read ({reason})") from None
+            raise InputError(f"{path}: the file cannot be read ({reason})", file=path) from None
         try:
             document = json.loads(text, parse_constant=_refuse)
         except ValueError as error:
-            raise InputError(f"{path}: expected JSON ({error})") from None
+            raise InputError(f"{path}: expected JSON ({error})", file=path) from None
         try:
             return model.model_validate(document)
         except ValidationError as error:
-            raise InputError(f"{path}: {_sentence(error, model)}") from None
+            raise _fault(error, model).within(path) from None
 
 
 def shipped_results() -> Results:
@@ -266,20 +266,20 @@ def _refuse(text: str) -> None:
     raise ValueError(f"{text} is no number of JSON")
 
 
-def _sentence(error: ValidationError, model: type[_Table]) -> str:
-    """Tell the first fault: key, value and what was expected."""
+def _fault(error: ValidationError, model: type[_Table]) -> InputError:
+    """Return the first fault as an error: key, value and what was expected."""
     fault = error.errors(include_url=False)[0]
     steps = [step for step in fault["loc"] if step != "[key]"]
     key = "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")
     if fault["type"] == "missing":
-        return f"{key} is missing"
+        return InputError(f"{key} is missing", key=key)
     if fault["type"] == "extra_forbidden":
         place = f", expected one of {', '.join(model.model_fields)}" if len(steps) == 1 else ""
-        return f"the key {shown(key, quotes=False)} is not known{place}"
+        return InputError(f"the key {shown(key, quotes=False)} is not known{place}", key=key)
     wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     wanted = wanted if wanted.startswith("expected") else f"expected {wanted}"
     if fault["type"] == "model_type":
-        return f"expected an object for {key or 'the whole file'}"
+        return InputError(f"expected an object for {key or 'the whole file'}", key=key or None)
     if isinstance(fault["input"], dict | list):
-        return f"{key}: {wanted}"
-    return f"{key} = {shown(fault['input'])}: {wanted}"
+        return InputError(f"{key}: {wanted}", key=key, value=fault["input"])
+    return InputError(f"{key} = {shown(fault['input'])}: {wanted}", key=key, value=fault["input"])

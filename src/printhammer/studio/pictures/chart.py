@@ -60,7 +60,9 @@ def try_map(state: State, known: State | None) -> State:
         The map would take too long, or its rates are not ascending.
     """
     if not state.low < state.high:
-        raise InputError(f"map: rates from {state.low:g} Hz to {state.high:g} Hz, expected ascending ones")
+        raise InputError(
+            f"map: rates from {state.low:g} Hz to {state.high:g} Hz", key="map", expected="ascending ones"
+        )
     if known is not None and alike(state, known):
         return known
     rates = tuple(np.linspace(state.low, state.high, _TRIED).tolist())

@@ -36,7 +36,9 @@ def check_line(state: State, pattern: Pattern) -> None:
     steps = runs * pattern.slots * tried.steps / _TRIED
     if steps > bounds.MOST_WORK:
         raise InputError(
-            f"the line would take about {steps:.2g} steps, expected at most {bounds.MOST_WORK:.2g}"
+            f"the line would take about {steps:.2g} steps",
+            key="line",
+            expected=f"at most {bounds.MOST_WORK:.2g}",
         )
 
 

@@ -115,15 +115,28 @@ def read_file(text: str, where: str, shelf: Shelf) -> Told:
         It is no state file.
     """
     if len(text) > LARGEST_MESSAGE:
-        raise InputError(f"{where}: {len(text)} characters, expected at most {LARGEST_MESSAGE}")
+        raise InputError(
+            f"{where}: {len(text)} characters",
+            file=where,
+            key="characters",
+            expected=f"at most {LARGEST_MESSAGE}",
+        )
     try:
         content = json.loads(text)
     except (ValueError, RecursionError):
         content = None
     if not isinstance(content, dict) or content.get("kind") != _KIND:
-        raise InputError(f"{where}: expected a state file of the studio, as its export saves it")
+        raise InputError(
+            f"{where}: expected a state file of the studio, as its export saves it", file=where, key="state"
+        )
     if content.get("format") != FORMAT:
-        raise InputError(f"{where}: format = {str(content.get('format'))[:40]}, expected {FORMAT}")
+        raise InputError.of(
+            "format",
+            str(content.get("format"))[:40],
+            FORMAT,
+            file=where,
+            written=str(str(content.get("format"))[:40]),
+        )
     return taken(content.get("state"), shelf)
 
 

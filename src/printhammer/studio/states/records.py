@@ -77,7 +77,12 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     columns, rows, line = _table(text, where)
     if told is not None:
         if len(told) != len(columns):
-            raise InputError(f"{where}: {len(columns)} columns, expected as many answers, not {len(told)}")
+            raise InputError(
+                f"{where}: {len(columns)} columns",
+                file=where,
+                key="columns",
+                expected=f"as many answers, not {len(told)}",
+            )
         columns = [
             column._replace(quantity=what, unit=unit)
             for column, (what, unit) in zip(columns, told, strict=True)
@@ -88,20 +93,27 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
         return columns
     for quantity in QUANTITIES:
         if known.count(quantity) > 1:
-            raise InputError(f"{where}: {known.count(quantity)} columns of {quantity}, expected one")
+            raise InputError(
+                f"{where}: {known.count(quantity)} columns of {quantity}",
+                file=where,
+                key=quantity,
+                expected="one",
+            )
     if "time" not in known or not set(known) - {"time", ""}:
         raise InputError(
-            f"{where}: expected a column of time and one of displacement, current, force or voltage"
+            f"{where}: expected a column of time and one of displacement, current, force or voltage",
+            file=where,
+            key="time",
         )
     curves = {}
     for place, column in enumerate(columns):
         if column.quantity:
             values = np.array([_number(row[place], f"{where}: row {line + k}") for k, row in enumerate(rows)])
-            with located(f"{where}: {column.name or column.quantity}"):
+            with located(f"{where}: {column.name or column.quantity}", file=where, key=column.name):
                 curves[column.quantity] = values * _factor(column.unit, QUANTITIES[column.quantity])
     times = curves.pop("time")
     if len(times) < 2 or (np.diff(times) <= 0.0).any():
-        raise InputError(f"{where}: expected at least 2 samples at increasing times")
+        raise InputError(f"{where}: expected at least 2 samples at increasing times", file=where, key="time")
     keep = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_SAMPLES)).astype(int))
     # Oscilloscopes count time from their trigger.
     record = Record(times[keep] - min(times[0], 0.0), {name: values[keep] for name, values in curves.items()})
@@ -113,32 +125,55 @@ def _checked(record: Record, where: str) -> Record:
     for name in {"current", "force", "voltage"} & set(record.curves):
         last, peak = float(record.times[-1]), float(np.abs(record.curves[name]).max())
         if last > LONGEST_TIME:
-            raise InputError(f"{where}: a {name} of {last:g} s, expected at most {LONGEST_TIME:g} s")
+            raise InputError(
+                f"{where}: a {name} of {last:g} s",
+                file=where,
+                key=name,
+                expected=f"at most {LONGEST_TIME:g} s",
+            )
         most = LARGEST_VOLTAGE if name == "voltage" else LARGEST_CURRENT
         if peak > most:
             unit = QUANTITIES[name]
-            raise InputError(f"{where}: a {name} of {peak:g} {unit}, expected at most {most:g} {unit}")
+            raise InputError(
+                f"{where}: a {name} of {peak:g} {unit}",
+                file=where,
+                key=name,
+                expected=f"at most {most:g} {unit}",
+            )
     return record
 
 
 def _table(text: str, where: str) -> tuple[list[Column], list[list[str]], int]:
     """Return the columns of a table, its rows of numbers, and the number of the first of these."""
     if not text.strip():
-        raise InputError(f"{where}: the file is empty, expected the heading {EXPECTED}")
+        raise InputError(
+            f"{where}: the file is empty", file=where, key="heading", expected=f"the heading {EXPECTED}"
+        )
     delimiter = _delimiter(text)
     rows = [_bare(cells) for _line, cells in sheet_of(text, where, delimiter=delimiter).rows]
     begin = next(
         (k for k, row in enumerate(rows) if len(row) > 1 and all(map(_NUMBER.fullmatch, row[:2]))), None
     )
     if begin is None:
-        raise InputError(f"{where}: expected columns of numbers below a heading such as {EXPECTED}")
+        raise InputError(
+            f"{where}: expected columns of numbers below a heading such as {EXPECTED}",
+            file=where,
+            key="heading",
+        )
     width = len(rows[begin])
     if width > MOST_COLUMNS:
-        raise InputError(f"{where}: {width} columns, expected at most {MOST_COLUMNS}")
+        raise InputError(
+            f"{where}: {width} columns", file=where, key="columns", expected=f"at most {MOST_COLUMNS}"
+        )
     numbers = rows[begin:]
     for k, row in enumerate(numbers):
         if len(row) != width:
-            raise InputError(f"{where}: row {begin + k + 1} has {len(row)} cells, expected {width} numbers")
+            raise InputError(
+                f"{where}: row {begin + k + 1} has {len(row)} cells",
+                file=where,
+                key=f"row {begin + k + 1}",
+                expected=f"{width} numbers",
+            )
     if delimiter != "," and any(_WHOLE.fullmatch(cell) for row in numbers[:50] for cell in row):
         numbers = [[cell.replace(",", ".") for cell in row] for row in numbers]
     above = [row for row in rows[:begin] if len(row) == width][-2:]
@@ -195,5 +230,5 @@ def _factor(unit: str, si: str) -> float:
 
 def _number(cell: str, where: str) -> float:
     if not _NUMBER.fullmatch(cell) or "," in cell:
-        raise InputError(f"{where} is expected to hold finite numbers, not {cell.strip()[:40]!r}")
+        raise InputError(f"{where} is expected to hold finite numbers, not {cell.strip()[:40]!r}", key=where)
     return float(cell)

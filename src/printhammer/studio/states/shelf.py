@@ -61,7 +61,7 @@ class Shelf:
         if self.guest is not None and name == self.guest.name:
             return self.guest
         if name not in self.names:
-            raise InputError(f"hammer = {name!r}, expected one of {', '.join(self.names)}")
+            raise InputError.of("hammer", name, f"one of {', '.join(self.names)}")
         return _shipped(name)
 
 

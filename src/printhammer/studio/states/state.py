@@ -101,7 +101,9 @@ class State(Declared):
         if self.waveform is None:
             if self.changed.waveform is None:
                 raise InputError(
-                    f"the hammer {self.base.name!r} has no [waveform], expected one set in the editor"
+                    f"the hammer {self.base.name!r} has no [waveform]",
+                    key="waveform",
+                    expected="one set in the editor",
                 )
             return self.changed.waveform
         return self._set_waveform
@@ -140,10 +142,12 @@ def check_constant(base: Hammer, key: str, value: float) -> None:
     if span is None:
         named = (*base.constants, *open_constants(base))
         known = ", ".join(name for name in named if not name.startswith("waveform."))
-        raise InputError(f"constants.{key} is not known, expected one of {known}")
+        raise InputError(f"constants.{key} is not known", key=f"constants.{key}", expected=f"one of {known}")
     if not span.low <= value <= span.high:
         unit = (base.constants.get(key) or open_constants(base)[key][0]).si_unit
-        raise InputError(f"{key} = {value:.9g} {unit}, expected {span.low:.6g} to {span.high:.6g}")
+        raise InputError(
+            f"{key} = {value:.9g} {unit}", key=key, value=value, expected=f"{span.low:.6g} to {span.high:.6g}"
+        )
 
 
 @lru_cache(maxsize=8)
@@ -158,14 +162,24 @@ def dropped_hammer(text: str) -> Hammer:
     # The time to read a key of many dots grows with the square of their number.
     if any(part.count(".") > bounds.MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
         most = bounds.MOST_DOTS
-        raise InputError(f"dropped file: expected a TOML file, without keys of more than {most} dots")
+        raise InputError(
+            f"dropped file: expected a TOML file, without keys of more than {most} dots",
+            file="dropped file",
+            key="dots",
+        )
     try:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"dropped file: expected a TOML file ({' '.join(str(error).split())})") from None
+        raise InputError(
+            f"dropped file: expected a TOML file ({' '.join(str(error).split())})", file="dropped file"
+        ) from None
     for name, section in document.items():
         if isinstance(section, Mapping) and "file" in section:
-            raise InputError(f"dropped file: {name}.file names another file, which the studio does not read")
+            raise InputError(
+                f"dropped file: {name}.file names another file, which the studio does not read",
+                file="dropped file",
+                key=f"{name}.file",
+            )
     hammer = Hammer.from_toml(text, name="dropped file")
     hammer.check()
     return hammer

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.errors import refused
 
-import printhammer as ph
 from printhammer.control.feedback.estimator.sensor import PositionSensor, normal, run_key
 
 STROKE = 150e-6
@@ -66,16 +66,16 @@ def test_a_perfect_sensor_shows_the_truth_and_a_coarse_one_its_steps() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "key"),
     [
-        ({"noise": -0.1}, "noise = -0.1"),
-        ({"delay": float("nan")}, "delay = nan s"),
-        ({"interval": 0.0}, "interval = 0.0 s"),
-        ({"step": float("inf")}, "step = inf"),
-        ({"seed": -1}, "seed = -1"),
-        ({"seed": 1.5}, "seed = 1.5"),
+        ({"noise": -0.1}, "sensor"),
+        ({"delay": float("nan")}, "sensor"),
+        ({"interval": 0.0}, "sensor"),
+        ({"step": float("inf")}, "sensor"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
     ],
 )
-def test_bad_sensors_are_refused(change: dict[str, float], told: str) -> None:
-    with pytest.raises(ph.InputError, match=told):
+def test_bad_sensors_are_refused(change: dict[str, float], key: str) -> None:
+    with refused(key):
         dataclasses.replace(PositionSensor(), **change)
