@@ -5,6 +5,8 @@ Pulses of a hammer with other widths.
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -80,3 +82,17 @@ def widest(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if peak(of_width(pulse, middle)) <= bound else (low, middle)
     return low
+
+
+def steepest_rise(waveform: Waveform) -> float:
+    """Return the steepest slope of a waveform while its value moves away from zero, A/s; may be infinite."""
+    edges = waveform.segments()[:, 0]
+    value = waveform.value(np.minimum(edges, np.nextafter(waveform.support, 0.0)))
+    before = waveform.value(np.nextafter(edges, -np.inf))
+    jumps = np.abs(value) - np.abs(before)
+    if jumps[:-1].max() > 1e-6 * waveform.peak:
+        return math.inf
+    fine = np.concatenate([np.linspace(low, high, 257)[:-1] for low, high in itertools.pairwise(edges)])
+    step = 1e-6 * float(np.diff(edges).min())
+    slopes = (np.abs(waveform.value(fine + step)) - np.abs(waveform.value(fine))) / step
+    return float(slopes.max())

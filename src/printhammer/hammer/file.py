@@ -348,7 +348,10 @@ def _check_order(contents: Contents) -> None:
             force = import_module(magnet.module).magnet_force(magnet.packed(0.0), place, 0.0)
             if not (low <= place <= high and math.isfinite(force)):
                 span = f"{low:g} to {high:g} m"
-                raise InputError(f"{written(key)}: expected a position where the magnet's law holds, {span}")
+                raise InputError(
+                    f"{written(key)}: expected a position where the magnet's law holds, {span}",
+                    key=written(key),
+                )
 
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"

@@ -17,12 +17,12 @@ from tests.errors import refused
 import printhammer as ph
 from printhammer.control.least_work import search
 from printhammer.control.least_work.bound import bound
-from printhammer.control.least_work.burst import LeastWork, NoBurstError, steepest_rise
+from printhammer.control.least_work.burst import LeastWork, NoBurstError
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.rates import least_work_rates
 from printhammer.control.least_work.search import printing_current
 from printhammer.control.least_work.slot import CoilForce, NodeCurrent, Outcomes, SlotState, Task, node_times
-from printhammer.control.pulses import widest
+from printhammer.control.pulses import steepest_rise, widest
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 from printhammer.printing.dots.nominal import nominal
 from printhammer.run.ensemble_group import Group

@@ -11,7 +11,6 @@ the force asked for at its time. After the last dot the coil lets it down on the
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from functools import cached_property
@@ -24,10 +23,11 @@ from printhammer.control.least_work.bound import Bound, bound
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import CoilForce, Task
+from printhammer.control.pulses import steepest_rise
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import PulseTrain
-from printhammer.drive.waveforms.shapes import Sampled, Waveform
+from printhammer.drive.waveforms.shapes import Sampled
 from printhammer.errors import InputError, PrinthammerError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.hammer import Hammer
@@ -494,17 +494,3 @@ def least_work(
         bound=limits,
         tolerance=tolerance,
     )
-
-
-def steepest_rise(waveform: Waveform) -> float:
-    """Return the steepest slope of a waveform while its value moves away from zero, A/s; may be infinite."""
-    edges = waveform.segments()[:, 0]
-    value = waveform.value(np.minimum(edges, np.nextafter(waveform.support, 0.0)))
-    before = waveform.value(np.nextafter(edges, -np.inf))
-    jumps = np.abs(value) - np.abs(before)
-    if jumps[:-1].max() > 1e-6 * waveform.peak:
-        return math.inf
-    fine = np.concatenate([np.linspace(low, high, 257)[:-1] for low, high in itertools.pairwise(edges)])
-    step = 1e-6 * float(np.diff(edges).min())
-    slopes = (np.abs(waveform.value(fine + step)) - np.abs(waveform.value(fine))) / step
-    return float(slopes.max())
