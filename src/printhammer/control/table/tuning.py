@@ -216,8 +216,7 @@ def tune(
         single=single,
         limits=bounds,
         brake=brake,
-        tolerance=effort.tolerance,
-        threads=effort.threads,
+        effort=effort.quiet,
         report=_counter(effort, steps),
         mean_square=variability is not None,
     )
