@@ -60,3 +60,27 @@ def test_parts_of_the_work_report_their_share() -> None:
     assert told == [(13, 40)]
     assert effort.alone.threads == 1
     assert effort.at(1e-7) == Effort(1e-7, 2)
+
+
+TOLERANCES = {
+    "basins": 1e-9,
+    "bifurcation": 1e-9,
+    "continuation": 1e-13,
+    "dead_time": 2e-11,
+    "feedback": 5e-7,
+    "frequency_map": 2e-11,
+    "judge_table": 5e-7,
+    "least_work": 1e-9,
+    "orbits": 1e-13,
+    "print_page": 5e-7,
+    "quench_map": 5e-7,
+    "safe_rate": 2e-11,
+    "sections": 2e-11,
+    "tolerance_yield": 5e-7,
+    "tune": 5e-7,
+}
+
+
+@pytest.mark.parametrize("name", [name for name in TOLERANCES if name in ph.__all__])
+def test_default_tolerances(name: str) -> None:
+    assert inspect.signature(getattr(ph, name)).parameters["tolerance"].default == TOLERANCES[name]

@@ -167,7 +167,7 @@ def computation(function: F) -> F:
 def _documented(text: str, names: Sequence[str]) -> str:
     """Return a docstring with entries of the parameters that it lacks, at the end of its Parameters."""
     text = inspect.cleandoc(text)
-    ends = [text.find(head) for head in ("\n**firing\n", "\n\nReturns\n-", "\n\nRaises\n-")]
+    ends = [text.find(head) for head in ("\nprogress : ", "\n**firing\n", "\n\nReturns\n-", "\n\nRaises\n-")]
     end = min((place for place in ends if place >= 0), default=len(text))
     lacking = [_ENTRIES[name] for name in names if _ENTRIES[name].partition("\n")[0] not in text.splitlines()]
     return "\n".join([text[:end], *lacking]) + text[end:]

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.basins.attractors import Attractor, Attractors
-from printhammer.chaos.bifurcation.columns import OK, run_columns, scales_of_columns
+from printhammer.chaos.bifurcation.columns import EFFORT, OK, run_columns, scales_of_columns
 from printhammer.chaos.strobe.map import possible
 from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
@@ -38,7 +38,7 @@ from printhammer.results.summary import (
     quantity,
     styled,
 )
-from printhammer.run.effort import DEFAULT, Effort, computation
+from printhammer.run.effort import Effort, computation
 from printhammer.run.regime import Fired, Regime
 from printhammer.run.start import AT_REST
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
@@ -274,7 +274,7 @@ def basins(
     v: Range | None = None,
     firings: SupportsIndex = FIRINGS,
     rounds: SupportsIndex = ROUNDS,
-    effort: Effort = DEFAULT,
+    effort: Effort = EFFORT,
     **firing: Unpack[Fired],
 ) -> Basins:
     """Find out which initial states lead to which attractor.

@@ -13,13 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.bifurcation.builder import DiagramBuilder
+from printhammer.chaos.bifurcation.columns import EFFORT
 from printhammer.chaos.bifurcation.diagram import Bifurcation
 from printhammer.chaos.strobe.train import FROM_REST
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import PERIOD, RATE
-from printhammer.run.effort import DEFAULT, Effort, computation
+from printhammer.run.effort import Effort, computation
 from printhammer.run.regime import Fired, Firing, Regime
 from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
@@ -68,7 +69,7 @@ def bifurcation(
     state: tuple[float, float] | None = None,
     refine: SupportsIndex = REFINE,
     exponents: bool = False,
-    effort: Effort = DEFAULT,
+    effort: Effort = EFFORT,
     **firing: Unpack[Fired],
 ) -> Bifurcation:
     """Compute a bifurcation diagram of a hammer under a periodic drive.
