@@ -23,12 +23,13 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 TOLERANCE: Final = 1e-9
-EFFORT: Final = Effort(TOLERANCE)
 """Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
 
 With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble` weakly stable orbits never settle to within 1e-6 of the
 window.
 """
+
+EFFORT: Final = Effort(TOLERANCE)
 
 OK: Final = "ok"
 NOT_RUN: Final = "not run"
