@@ -30,6 +30,7 @@ from printhammer.chaos.bifurcation.columns import (
     scales_of_columns,
 )
 from printhammer.chaos.strobe.map import IN_PACK
+from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 
 FIRINGS, TRANSIENT, TOLERANCE, TIGHT = 300, 100, 1e-9, 1e-11
@@ -74,7 +75,7 @@ def drawn(rng: np.random.Generator) -> Regime:
 def judged(regimes: list[Regime], further: int, counts: Counter[str]) -> list[str]:
     """Judge some trains and check the verdicts; return a line for each that is wrong."""
     begun = np.tile(np.array(FROM_REST), (len(regimes), 1))
-    columns = run_columns(regimes, begun, FIRINGS, TRANSIENT, TOLERANCE)
+    columns = run_columns(regimes, begun, FIRINGS, TRANSIENT, Effort(TOLERANCE))
     plain, cycles = cycles_of_all(columns, regimes)
     periodic = np.flatnonzero(cycles)
     ended = int((columns.status != OK).sum())
@@ -84,7 +85,7 @@ def judged(regimes: list[Regime], further: int, counts: Counter[str]) -> list[st
     counts["of these repeat, but not shown to have a period"] += int(((plain > 0) & (cycles == 0)).sum())
     counts["named otherwise than by agreement alone"] += int(((plain != cycles) & (cycles > 0)).sum())
     some = [regimes[row] for row in periodic]
-    later = run_columns(some, columns.last[periodic], further + POINTS, further, TIGHT)
+    later = run_columns(some, columns.last[periodic], further + POINTS, further, Effort(TIGHT))
     after, _ = cycles_of_all(later, some)
     lines = []
     for place, row in enumerate(periodic):
@@ -109,7 +110,7 @@ def cycles_of_all(columns: Columns, regimes: list[Regime]) -> tuple[np.ndarray, 
     scales = scales_of_columns(regimes)
     plain, distances = cycles_of(columns, fronts, scales)
     cycles = plain.copy()
-    confirm(columns, cycles, distances, regimes, scales, None)
+    confirm(columns, cycles, distances, regimes, scales, Effort())
     return plain, cycles
 
 

@@ -17,6 +17,7 @@ from printhammer.control.least_work.burst import least_work
 from printhammer.drive.waveforms.drivers import Capacitor, Chopper, Rail
 from printhammer.identify.bench.benches import _currents
 from printhammer.printing.rates.damping import damping_study
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.regime import Regime
 
@@ -82,8 +83,8 @@ def test_trains_hand_on_the_current(turn: bool) -> None:
     regime = Regime.of(hammer, period=0.7e-3, waveform=DRIVERS[0])
     with interpreted():
         rest = np.array([FROM_REST])
-        whole, half = (run_columns([regime], rest, count, 0, 1e-13, threads=1) for count in (6, 3))
-        other = run_columns([regime], half.last, 3, 0, 1e-13, threads=1)
+        whole, half = (run_columns([regime], rest, count, 0, Effort(1e-13, threads=1)) for count in (6, 3))
+        other = run_columns([regime], half.last, 3, 0, Effort(1e-13, threads=1))
         points = ph.strobe(regime, points=6, tolerance=1e-13, verdict=False)
     assert half.last[0, 4] > 1e-4
     assert half.last[0, 5] > 1e-4 or not turn

@@ -29,12 +29,12 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Column, Result, column, derived, part, provenance, scalar
+from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.regime import Firing, Regime, regimes_of
 from printhammer.run.simulate import touches_of
 from printhammer.run.start import initial_state
 from printhammer.support.arrays import FloatArray, IntArray
-from printhammer.support.threads import Progress, mapped
 
 Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
@@ -149,6 +149,7 @@ def section(
     return _section(train, surface, counts, tolerance)
 
 
+@computation
 def sections(
     hammers: Hammer | Regime | Sequence[Hammer | Regime],
     periods: Sequence[float | str] | npt.ArrayLike | None = None,
@@ -159,9 +160,8 @@ def sections(
     firings: SupportsIndex | None = None,
     waveform: Waveform | None = None,
     overlap: Overlap | None = None,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[Keywords],
 ) -> list[Section]:
     """Return the sections of many trains from rest, computed on all cores; see `section`.
 
@@ -169,10 +169,8 @@ def sections(
     ----------
     hammers, periods, waveform, overlap
         Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
-    surface, touches, transient, firings, tolerance
+    surface, touches, transient, firings
         As for `section`, for all trains.
-    threads, progress
-        As for `printhammer.chaos.strobes`.
 
     Returns
     -------
@@ -180,10 +178,9 @@ def sections(
         One for each train.
     """
     counts = _counts(touches, transient, firings)
-    check_tolerance(tolerance)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
     trains = [Train.of(regime, counts[1] + counts[2]) for regime in regimes]
-    return mapped(lambda train: _section(train, surface, counts, tolerance), trains, threads, progress)
+    return effort.mapped(lambda train: _section(train, surface, counts, effort.tolerance), trains)
 
 
 def _counts(

@@ -10,11 +10,11 @@ The C header of a dead time: rails, temperatures, tables of times, and a functio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Unpack
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from printhammer.results.summary import (
     quantity,
     styled,
 )
-from printhammer.run.problem import TOLERANCE
+from printhammer.run.effort import DEFAULT, Effort, InOneThread, computation
 from printhammer.support import c_code
 from printhammer.support.arrays import FloatArray, TextArray
 from printhammer.support.files import write_file
@@ -222,14 +222,15 @@ class _Fired:
     status: str = "ok"
 
 
+@computation
 def dead_time(
     hammer: Hammer,
     *,
     voltage: Sequence[float | str] = (),
     temperature: Sequence[float | str] = (),
     blow: float | str | None = None,
-    tolerance: float = TOLERANCE,
-    progress: Callable[[int, int], None] | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[InOneThread],
 ) -> DeadTime:
     """Find how long a hammer takes from switching on to impact, and which pulse gives the same blow.
 
@@ -244,10 +245,6 @@ def dead_time(
     blow : float or str, optional
         Speed of impact, m/s, whose pulse is sought; by default that of the hammer's own pulse at its own rail
         and temperature, which a lower rail or a warmer coil may not reach.
-    tolerance : float, optional
-        Of the integrator.
-    progress : callable, optional
-        Called with pairs done and of all.
 
     Raises
     ------
@@ -270,7 +267,7 @@ def dead_time(
         raise InputError(
             f"{rails.size} rails and {warm.size} temperatures", key="rails", expected=f"at most {MOST} pairs"
         )
-    reference, reach = _reference(hammer, waveform, tolerance)
+    reference, reach = _reference(hammer, waveform, effort.tolerance)
     wanted = reference.speed if blow is None else read_positive(blow, "m/s", "blow")
     shape = rails.size, warm.size
     names = ("time", "speed", "current", "heat", "strongest", "width", "width_time", "width_heat")
@@ -279,20 +276,20 @@ def dead_time(
     for j, degrees in enumerate(warm.tolist()):
         coil = hammer.replace("coil.temperature", degrees)
         for i, volts in enumerate(rails.tolist()):
-            if progress is not None:
-                progress(j * rails.size + i, rails.size * warm.size)
+            effort.report(j * rails.size + i, rails.size * warm.size)
             pulse = waveform.scaled(volts / own.voltage)
-            fired = _fire(coil, pulse, reach, tolerance)
+            fired = _fire(coil, pulse, reach, effort.tolerance)
             status[i, j] = fired.status
-            longest = _fire(coil, of_width(pulse, reach), reach, tolerance)
-            width = _same_blow(coil, pulse, wanted, longest, tolerance)
-            again = _Fired() if width is None else _fire(coil, of_width(pulse, width), reach, tolerance)
+            longest = _fire(coil, of_width(pulse, reach), reach, effort.tolerance)
+            width = _same_blow(coil, pulse, wanted, longest, effort.tolerance)
+            again = (
+                _Fired() if width is None else _fire(coil, of_width(pulse, width), reach, effort.tolerance)
+            )
             own_pulse = (fired.time, fired.speed, fired.current, fired.heat, longest.speed)
             values = (*own_pulse, np.nan if width is None else width, again.time, again.heat)
             for name, value in zip(names, values, strict=True):
                 arrays[name][i, j] = value
-    if progress is not None:
-        progress(rails.size * warm.size, rails.size * warm.size)
+    effort.report(rails.size * warm.size, rails.size * warm.size)
     return DeadTime(
         hammer=hammer,
         blow=wanted,

@@ -6,23 +6,22 @@ pulses at gradually rising rates.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from printhammer.drive.base import Overlap
 from printhammer.drive.batch import PulseTrains
-from printhammer.drive.input import PULSES, read_count, read_number
+from printhammer.drive.input import PULSES, read_count
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.maps.layout import hammer_attributes, map_dataset, matching, on_times
 from printhammer.results import Facts, Summary
 from printhammer.results.provenance import provenance
-from printhammer.run.problem import TOLERANCE
+from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import waveform_of
 from printhammer.support.arrays import FloatArray
 
@@ -48,6 +47,7 @@ MOST_CELLS: Final = 200_000_000
 """Number of displacements above which a map is refused."""
 
 
+@computation
 def frequency_map(
     hammer: Hammer,
     rates: npt.ArrayLike | None = None,
@@ -55,10 +55,9 @@ def frequency_map(
     pulses: SupportsIndex = PULSES,
     times: npt.ArrayLike | None = None,
     waveform: Waveform | None = None,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
     overlap: Overlap = "add",
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[Keywords],
 ) -> xr.Dataset:
     """Compute the displacement against time and firing rate, from rest, and what each firing does.
 
@@ -75,12 +74,6 @@ def frequency_map(
         1 ms after the last one at the lowest rate; by default 512.
     waveform : Waveform, optional
         What every firing does; by default the waveform of the hammer.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-    threads : int, optional
-        By default as many as there are cores; the map does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of rates done and of all.
     overlap : str, optional
         "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
 
@@ -106,8 +99,8 @@ def frequency_map(
         )
     drives = PulseTrains.at_rates(fired, grid, count, overlap)
     ends = np.maximum(moments[-1], (count - 1) / grid + TAIL)
-    runs = Ensemble(hammer, drives, ends, tolerance=tolerance)
-    result = runs.run(dots=True, times=moments, threads=threads, progress=progress)
+    runs = Ensemble(hammer, drives, ends, tolerance=effort.tolerance)
+    result = runs.run(dots=True, times=moments, **effort.running)
     dots, x = result.dots, result.x
     assert dots is not None
     assert x is not None
@@ -126,12 +119,7 @@ def frequency_map(
         "pulses": count,
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
         **hammer_attributes(hammer),
-        **provenance(
-            hammer=hammer,
-            waveform=fired,
-            overlap=overlap,
-            tolerance=read_number(tolerance, "1", "tolerance"),
-        ),
+        **provenance(hammer=hammer, waveform=fired, overlap=overlap, tolerance=effort.tolerance),
     }
     return map_dataset(grid, moments, variables, attributes, {"status": {"codes": codes}})
 

@@ -32,6 +32,7 @@ from printhammer.hammer.names import (
     unknown,
 )
 from printhammer.results import Declared, part, scalar
+from printhammer.run.effort import AtFixedTolerance, Keywords
 from printhammer.run.problem import scales_of
 from printhammer.support.arrays import BoolArray, FloatArray
 from printhammer.support.constants import Quantity, quantities
@@ -103,6 +104,14 @@ class Firing(TypedDict, total=False):
     drive: Drive | None
     overlap: Overlap | None
     phase: float | None
+
+
+class Fired(Firing, Keywords):
+    """What a verb takes to say how a hammer is fired, beside its effort."""
+
+
+class FiredAtFixedTolerance(Firing, AtFixedTolerance):
+    """What a verb that chooses its tolerances itself takes to say how a hammer is fired."""
 
 
 class Regime(Declared):
@@ -188,6 +197,11 @@ class Regime(Declared):
         # Refuses what no train can fire: an endless waveform, an unknown rule for overlapping pulses.
         regime.pulses(1)
         return regime
+
+    @classmethod
+    def of_firing(cls, hammer: Hammer | Regime, firing: Firing) -> Regime:
+        """Return the regime that the keywords of a verb mean, see `of`."""
+        return cls.of(hammer, **firing)
 
     @property
     def fired(self) -> Waveform:

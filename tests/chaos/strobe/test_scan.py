@@ -8,6 +8,7 @@ from printhammer.chaos import strobes
 from printhammer.chaos.strobe.scan import CLOSER, LARGEST_MULTIPLIER, largest_multiplier, scan
 from printhammer.chaos.strobe.train import Train, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, LAST
+from printhammer.run.effort import Effort
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def multiplier(hammer: "ph.Hammer", period: float, count: int) -> float:
     train = Train.of(Regime.of(hammer, period=period), 200)
-    (states,), _ = run_trains([train], np.arange(100, 201), TOLERANCE, None)
+    (states,), _ = run_trains([train], np.arange(100, 201), None, Effort())
     return largest_multiplier(train, states, count, TOLERANCE)
 
 

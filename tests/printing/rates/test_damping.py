@@ -12,6 +12,7 @@ from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.settling import settle
 from printhammer.printing.rates.damping import DampingStudy, Material, damping_study, materials, tuned
+from printhammer.run.effort import Effort
 
 GRID = {"first": 400.0, "last": 1200.0, "step": 400.0, "limits": Limits(force=0.2, arrival=80e-6)}
 
@@ -74,12 +75,12 @@ def test_a_dataset_holds_everything(found: DampingStudy, tmp_path: Path) -> None
 
 def test_amplitudes_are_those_at_which_the_force_is_reached(hammer: "ph.Hammer") -> None:
     target = 1.1 * nominal(hammer).force
-    (factor,) = tuned([hammer], target, tolerance=1e-9)
+    (factor,) = tuned([hammer], target, Effort(1e-9))
     pulse = hammer.waveform.scaled(float(factor))
     dot = ph.simulate(hammer, ph.PulseTrain(pulse), duration=4e-3).dots[0]
     assert dot.peak_force == pytest.approx(target, rel=1e-6)
-    assert np.isnan(tuned([hammer], 1e3 * target, tolerance=1e-7)).all()
-    assert tuned([], target, tolerance=1e-7).size == 0
+    assert np.isnan(tuned([hammer], 1e3 * target, Effort(1e-7))).all()
+    assert tuned([], target, Effort(1e-7)).size == 0
 
 
 def test_the_default_materials_change_one_thing_each(hammer: "ph.Hammer") -> None:

@@ -11,6 +11,7 @@ from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.rates.safe_rate import rate_grid, safe_rate, safe_rates
 from printhammer.printing.rates.tolerance import draw, spreads_of, tolerance_yield
+from printhammer.run.effort import DISPLAY
 
 WIDE = Limits(force=0.2, arrival=80e-6)
 
@@ -56,7 +57,7 @@ def test_safe_rates_of_many_are_those_of_each(hammer: "ph.Hammer") -> None:
     options = {"limits": WIDE, "tolerance": 5e-7}
     alone = [safe_rate(one, first=400.0, last=1000.0, step=200.0, **options) for one in (hammer, light)]
     singles = [SinglePulse(one.nominal.force, one.nominal.flight_time) for one in alone]
-    together = safe_rates([hammer, light], singles, grid, **options)
+    together = safe_rates([hammer, light], singles, grid, limits=WIDE, effort=DISPLAY)
     np.testing.assert_array_equal(together, [one.rate for one in alone])
 
 

@@ -13,6 +13,7 @@ from printhammer.chaos.orbits.settled import LIES_ON, approaches, noise_about, s
 from printhammer.chaos.strobe.train import exponents_onward
 from printhammer.chaos.strobe.verdict import is_positive
 from printhammer.results import Declared, part
+from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -60,7 +61,8 @@ class Attractors:
     """
 
     def __init__(self, regime: Regime, scales: FloatArray, tolerance: float) -> None:
-        self.regime, self.scales, self.tolerance = regime, scales, tolerance
+        self.regime, self.scales = regime, scales
+        self.effort = Effort(tolerance, threads=1)
         self.found: list[Attractor] = []
         self._trees: dict[int, tuple[cKDTree, float]] = {}
         self._attempts = 0
@@ -165,7 +167,7 @@ class Attractors:
         begin = columns.last[row : row + 1]
         if math.isnan(begin[0, 0]):
             return None
-        longer = run_columns([self.regime], begin, SETTLING + CLOUD, SETTLING, self.tolerance, threads=1)
+        longer = run_columns([self.regime], begin, SETTLING + CLOUD, SETTLING, self.effort)
         if longer.status[0] != OK:
             return None
         cycles, _ = self._cycles(longer)
@@ -178,7 +180,7 @@ class Attractors:
         x, v, branch, *_ = longer.last[0].tolist()
         if branch >= 0.0:
             return None
-        (exponent,) = exponents_onward([(self.regime, (x, v))], CLOUD, self.tolerance, threads=1)
+        (exponent,) = exponents_onward([(self.regime, (x, v))], CLOUD, self.effort)
         if not is_positive(exponent):
             return None
         cloud = self._scaled(longer.x[0], longer.v[0])

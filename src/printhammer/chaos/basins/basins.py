@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.basins.attractors import Attractor, Attractors
-from printhammer.chaos.bifurcation.columns import OK, TOLERANCE, run_columns, scales_of_columns
+from printhammer.chaos.bifurcation.columns import EFFORT, OK, run_columns, scales_of_columns
 from printhammer.chaos.strobe.map import possible
 from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
@@ -38,11 +38,10 @@ from printhammer.results.summary import (
     quantity,
     styled,
 )
-from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Firing, Regime
+from printhammer.run.effort import Effort, computation
+from printhammer.run.regime import Fired, Regime
 from printhammer.run.start import AT_REST
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
-from printhammer.support.threads import Progress, shifted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -267,6 +266,7 @@ class Basins(Result, rows="v x"):
         return table
 
 
+@computation
 def basins(
     hammer: Hammer | Regime,
     *,
@@ -274,10 +274,8 @@ def basins(
     v: Range | None = None,
     firings: SupportsIndex = FIRINGS,
     rounds: SupportsIndex = ROUNDS,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    **firing: Unpack[Firing],
+    effort: Effort = EFFORT,
+    **firing: Unpack[Fired],
 ) -> Basins:
     """Find out which initial states lead to which attractor.
 
@@ -298,22 +296,13 @@ def basins(
         Firings of a round, at least 4; the last ones, half of them and at most 128, are judged.
     rounds : int, optional
         Rounds that a cell is given, at most.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of rounds of cells done and of all that are known of so far.
-    **firing
-        How the hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
     Basins
         With a label for each cell; a run that could not go on is no exception.
     """
-    regime = Regime.of(hammer, **firing).at_firings
-    check_tolerance(tolerance)
+    regime = Regime.of_firing(hammer, firing).at_firings
     count, most = read_count(firings, "firings"), read_count(rounds, "rounds")
     if count < _FEWEST:
         raise InputError.of("firings", firings, f"at least {_FEWEST}")
@@ -325,7 +314,7 @@ def basins(
     cells[..., 0], cells[..., 1] = across, up[:, np.newaxis]
     cells[..., 2:] = AT_REST
     labels, used, status, attractors = _decided(
-        regime, cells.reshape(-1, cells.shape[-1]), (count, most, tolerance), threads, progress
+        regime, cells.reshape(-1, cells.shape[-1]), (count, most), effort
     )
     shape = up.size, across.size
     order = sorted(range(len(attractors)), key=lambda place: _key(attractors[place]))
@@ -342,21 +331,17 @@ def basins(
         attractors=tuple(attractors[place] for place in order),
         firings=used.reshape(shape),
         status=status.reshape(shape),
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
     )
 
 
 def _decided(
-    regime: Regime,
-    cells: FloatArray,
-    counts: tuple[int, int, float],
-    threads: int | None,
-    progress: Progress | None,
+    regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort
 ) -> tuple[IntArray, IntArray, TextArray, list[Attractor]]:
     """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings, statuses, attractors."""
-    firings, most, tolerance = counts
+    firings, most = counts
     (scales,) = scales_of_columns([regime])
-    attractors = Attractors(regime, scales, tolerance)
+    attractors = Attractors(regime, scales, effort.tolerance)
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
     status = np.full(len(cells), OK, "U16")
@@ -370,15 +355,8 @@ def _decided(
         left = np.flatnonzero((places == UNDECIDED - 1) & np.isfinite(states[:, 0]))
         for first in range(0, len(left), _PIECE):
             rows = left[first : first + _PIECE]
-            columns = run_columns(
-                [regime] * len(rows),
-                states[rows],
-                firings,
-                transient,
-                tolerance,
-                threads=threads,
-                progress=shifted(progress, done, known),
-            )
+            part = effort.within(done, known)
+            columns = run_columns([regime] * len(rows), states[rows], firings, transient, part)
             judged = attractors.judge(columns)
             places[rows] = np.where(columns.status != OK, FAILED - 1, judged)
             status[rows], states[rows] = columns.status, columns.last

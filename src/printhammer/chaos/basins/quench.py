@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from copy import copy
-from typing import Any, ClassVar, Final, Self
+from typing import Any, ClassVar, Final, Self, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -37,11 +37,11 @@ from printhammer.results.summary import (
     interval,
     quantity,
 )
-from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
+from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
+from printhammer.run.ensemble import Ensemble
 from printhammer.run.regime import waveform_of
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
-from printhammer.support.threads import Progress, shifted
 
 TAIL: Final = 1e-3
 """Time after the second firing, s, within which a second dot is waited for unless told otherwise."""
@@ -187,6 +187,7 @@ class TwoPulseDrive(Drive):
         return result
 
 
+@computation
 def quench_map(
     hammer: Hammer,
     *,
@@ -194,9 +195,8 @@ def quench_map(
     widths: Range | None = None,
     waveform: Waveform | None = None,
     tail: float | str = TAIL,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DISPLAY,
+    **_keywords: Unpack[Keywords],
 ) -> QuenchMap:
     """Fire twice from rest, and see what becomes of the second dot.
 
@@ -214,12 +214,6 @@ def quench_map(
         The first pulse; by default the waveform of the hammer. It needs a width.
     tail : float or str, optional
         Time after the second firing within which a dot counts as the second one, s, or text with a unit.
-    tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the map does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of cells done and of all.
 
     Returns
     -------
@@ -243,14 +237,16 @@ def quench_map(
             raise InputError(f"{name}: {axis[0]:.9g} s", key=name, expected="times above 0 s")
     wait = read_positive(tail, "s", "tail")
     check_cells(times.size, wide.size)
-    alone = simulate(hammer, PulseTrain(pulse), duration=pulse.support + wait, tolerance=tolerance).dots[0]
+    alone = simulate(
+        hammer, PulseTrain(pulse), duration=pulse.support + wait, tolerance=effort.tolerance
+    ).dots[0]
     seconds = [type(pulse)(**{**dict(pulse), "width": width}) for width in wide.tolist()]
     drives = two_pulse_drives(pulse, seconds, float(times[-1]) + max(wait, pulse.support))
     rows = max(1, _PIECE // wide.size)
     pieces = []
     for first in range(0, times.size, rows):
-        tell = shifted(progress, first * wide.size, times.size * wide.size)
-        pieces.append(_piece(hammer, drives, times[first : first + rows], wait, tolerance, threads, tell))
+        part = effort.within(first * wide.size, times.size * wide.size)
+        pieces.append(_piece(hammer, drives, times[first : first + rows], wait, part))
     struck, status, peak, force, flight = (
         np.concatenate(parts).reshape(times.size, wide.size) for parts in zip(*pieces, strict=True)
     )
@@ -267,7 +263,7 @@ def quench_map(
         single_force=math.nan if alone.peak_force is None else alone.peak_force,
         single_flight_time=math.nan if alone.flight_time is None else alone.flight_time,
         tail=wait,
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
     )
 
 
@@ -290,13 +286,7 @@ def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) 
 
 
 def _piece(
-    hammer: Hammer,
-    drives: Sequence[TwoPulseDrive],
-    gaps: FloatArray,
-    tail: float,
-    tolerance: float,
-    threads: int | None,
-    progress: Progress | None,
+    hammer: Hammer, drives: Sequence[TwoPulseDrive], gaps: FloatArray, tail: float, effort: Effort
 ) -> tuple[npt.NDArray[Any], ...]:
     """Return second dot, status, peak, force and flight time of some gaps, each for all widths."""
     begin, number = 0.0, 1
@@ -311,8 +301,8 @@ def _piece(
     ends = np.repeat(begin + gaps + tail, len(drives))
     span = float(gaps[-1] - gaps[0]) + tail
     grid = begin + float(gaps[0]) + np.linspace(0.0, span, max(4, math.ceil(span / _SPACING) + 1))
-    result = Ensemble(hammer, every, ends, starts=begin, tolerance=tolerance).run(
-        dots=True, times=grid, threads=threads, progress=progress
+    result = Ensemble(hammer, every, ends, starts=begin, tolerance=effort.tolerance).run(
+        dots=True, times=grid, **effort.running
     )
     dots, x = result.dots, result.x
     assert dots is not None

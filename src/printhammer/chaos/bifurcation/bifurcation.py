@@ -13,18 +13,17 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.bifurcation.builder import DiagramBuilder
-from printhammer.chaos.bifurcation.columns import TOLERANCE
+from printhammer.chaos.bifurcation.columns import EFFORT
 from printhammer.chaos.bifurcation.diagram import Bifurcation
 from printhammer.chaos.strobe.train import FROM_REST
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import PERIOD, RATE
-from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Firing, Regime
+from printhammer.run.effort import Effort, computation
+from printhammer.run.regime import Fired, Firing, Regime
 from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
-from printhammer.support.threads import Progress
 
 FIRINGS: Final = 300
 """Firings of a train unless told otherwise."""
@@ -56,6 +55,7 @@ class InterruptedDiagram(KeyboardInterrupt):
         self.diagram = diagram
 
 
+@computation
 def bifurcation(
     hammer: Hammer | Regime,
     *,
@@ -69,12 +69,12 @@ def bifurcation(
     state: tuple[float, float] | None = None,
     refine: SupportsIndex = REFINE,
     exponents: bool = False,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    **firing: Unpack[Firing],
+    effort: Effort = EFFORT,
+    **firing: Unpack[Fired],
 ) -> Bifurcation:
     """Compute a bifurcation diagram of a hammer under a periodic drive.
+
+    At a tolerance for pictures, trains that settle slowly pass for undecided.
 
     Parameters
     ----------
@@ -98,12 +98,6 @@ def bifurcation(
     exponents : bool, optional
         Compute the exponents of trains without a period, which tell strange ones from undecided ones; takes
         many times as long.
-    tolerance : float, optional
-        As for `printhammer.simulate`; with one for pictures, trains that settle slowly pass for undecided.
-    threads : int, optional
-        By default as many as there are cores; the diagram does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of trains done and of all that are known of so far.
     **firing
         How the hammer is fired, as for `printhammer.Regime.of`; period or rate only with another parameter.
 
@@ -127,7 +121,6 @@ def bifurcation(
     if direction not in DIRECTIONS:
         raise InputError.of("direction", direction, f"one of {', '.join(DIRECTIONS)}")
     halvings = read_count(refine, "refine", least=0)
-    check_tolerance(tolerance)
     ways = ("up", "down") if direction == "both" else (direction,)
     if len(grid) * len(ways) * (count - skipped) > MOST_STATES:
         raise InputError(
@@ -139,7 +132,7 @@ def bifurcation(
             *initial_state(regime.hammer, state[:2]),
             *state_beyond(regime.hammer, state, regime.fired.quantity),
         )
-    builder = DiagramBuilder(regime, name, ways, (count, skipped, tolerance), begin, threads, progress)
+    builder = DiagramBuilder(regime, name, ways, (count, skipped), begin, effort)
     try:
         builder.base(grid)
         for level in range(1, halvings + 1):
@@ -156,7 +149,7 @@ def _result(builder: DiagramBuilder) -> Bifurcation:
     order = np.argsort(builder.values, kind="stable")
     rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
     table = builder.table
-    firings, transient, tolerance = builder.counts
+    firings, transient = builder.counts
     return Bifurcation(
         regime=builder.regime,
         parameter=builder.name,
@@ -173,7 +166,7 @@ def _result(builder: DiagramBuilder) -> Bifurcation:
         standard_errors=builder.errors[rows],
         levels=builder.levels[order],
         carried=table.carried,
-        tolerance=tolerance,
+        tolerance=builder.effort.tolerance,
     )
 
 

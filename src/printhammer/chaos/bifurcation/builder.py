@@ -18,7 +18,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -37,9 +37,9 @@ from printhammer.chaos.bifurcation.columns import (
     state_or_rest,
 )
 from printhammer.chaos.strobe.train import exponents_onward, forgets
+from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
     from printhammer.chaos.strobe.train import State
@@ -166,10 +166,9 @@ class DiagramBuilder:
     regime: Regime
     name: str
     ways: tuple[str, ...]
-    counts: tuple[int, int, float]
+    counts: tuple[int, int]
     begin: State
-    threads: int | None
-    progress: Progress | None
+    effort: Effort
 
     def __post_init__(self) -> None:
         self.points = self.counts[0] - self.counts[1]
@@ -260,13 +259,8 @@ class DiagramBuilder:
         """Run trains from states; return their states, periods and distances."""
         regimes = [self.table.regimes[row] for row in rows]
         done = self.done
-        columns = run_columns(
-            regimes,
-            states,
-            *self.counts,
-            threads=self.threads,
-            progress=lambda part, _all: self.tell(done + part),
-        )
+        effort = replace(self.effort, progress=lambda part, _all: self.tell(done + part))
+        columns = run_columns(regimes, states, *self.counts, effort)
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
         scales = self.table.scales[list(rows)]
         cycles, distances = cycles_of(columns, fronts, scales)
@@ -275,9 +269,9 @@ class DiagramBuilder:
         open_rows = np.flatnonzero(able & (cycles == 0) & (columns.status == OK))
         if open_rows.size:
             own = [regimes[row] for row in open_rows]
-            put(columns, open_rows, run_in_stretches(own, states[open_rows], *self.counts, self.threads))
+            put(columns, open_rows, run_in_stretches(own, states[open_rows], *self.counts, self.effort))
             cycles, distances = cycles_of(columns, fronts, scales)
-        confirm(columns, cycles, distances, regimes, scales, self.threads)
+        confirm(columns, cycles, distances, regimes, scales, self.effort)
         return columns, cycles, distances
 
     def run(self, rows: Sequence[int], states: FloatArray) -> None:
@@ -290,8 +284,7 @@ class DiagramBuilder:
 
     def tell(self, done: int) -> None:
         """Tell how many trains are done; those that are run again to close joints do not count."""
-        if self.progress is not None:
-            self.progress(min(done, self.known), self.known)
+        self.effort.report(min(done, self.known), self.known)
 
     def measure(self) -> None:
         """Compute the exponents of the trains without a period, over as many firings as there are points."""
@@ -306,13 +299,8 @@ class DiagramBuilder:
                 begun[row] = regime, (x, v, *(electric if regime.fired.quantity == "voltage" else ()))
         self.known += len(begun)
         done = self.done
-        exponents = exponents_onward(
-            list(begun.values()),
-            self.points,
-            self.counts[2],
-            threads=self.threads,
-            progress=lambda part, _all: self.tell(done + part),
-        )
+        effort = replace(self.effort, progress=lambda part, _all: self.tell(done + part))
+        exponents = exponents_onward(list(begun.values()), self.points, effort)
         for row, exponent in zip(begun, exponents, strict=True):
             if exponent.ok and exponent.smooth:
                 self.exponents[row], self.errors[row] = exponent.value, exponent.standard_error

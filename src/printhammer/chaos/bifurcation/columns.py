@@ -15,12 +15,12 @@ from printhammer.chaos.strobe.verdict import AGREEMENT, LARGEST_PERIOD
 from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.results import Declared, column, part
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.regime import Regime, window_of
 from printhammer.run.start import AT_REST, check_branch, initial_state
 from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
-from printhammer.support.threads import Progress, mapped, shifted
 
 TOLERANCE: Final = 1e-9
 """Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
@@ -28,6 +28,8 @@ TOLERANCE: Final = 1e-9
 With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble` weakly stable orbits never settle to within 1e-6 of the
 window.
 """
+
+EFFORT: Final = Effort(TOLERANCE)
 
 OK: Final = "ok"
 NOT_RUN: Final = "not run"
@@ -91,14 +93,7 @@ def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> No
 
 
 def run_columns(
-    regimes: Sequence[Regime],
-    states: FloatArray,
-    firings: int,
-    transient: int,
-    tolerance: float,
-    *,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
     """Fire many trains and keep their states at the last `firings` - `transient` firings.
 
@@ -118,21 +113,16 @@ def run_columns(
         for first in range(0, len(rows), piece):
             some = rows[first : first + piece]
             own = [regimes[row] for row in some]
-            tell = shifted(progress, done, len(regimes))
-            put(columns, some, _run(own, states[some], (firings, transient, tolerance), threads, tell))
+            part = effort.within(done, len(regimes))
+            put(columns, some, _run(own, states[some], firings, transient, part))
             done += len(some)
     return columns
 
 
 def _run(
-    regimes: Sequence[Regime],
-    states: FloatArray,
-    counts: tuple[int, int, float],
-    threads: int | None,
-    progress: Progress | None,
+    regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
     """Run trains that begin alike: all from rest, all inside the pack, or all elsewhere."""
-    firings, transient, tolerance = counts
     rest = bool(np.isnan(states[0, 0]))
     # Cells of a basin share one regime, columns of a diagram have one each.
     known = {id(regime): regime for regime in regimes}
@@ -152,9 +142,9 @@ def _run(
         [float(times[-1]) + regime.period for regime, (_drive, times) in zip(regimes, trains, strict=True)],
         states=None if rest else states[:, places],
         starts=[float(times[0]) for _drive, times in trains],
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
     )
-    result = ensemble.run(strobes=moments, threads=threads, progress=progress)
+    result = ensemble.run(strobes=moments, **effort.running)
     table = result.strobes
     assert table is not None
     reached = np.isfinite(table.x[:, -1])
@@ -181,12 +171,7 @@ def _run(
 
 
 def run_in_stretches(
-    regimes: Sequence[Regime],
-    states: FloatArray,
-    firings: int,
-    transient: int,
-    tolerance: float,
-    threads: int | None = None,
+    regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
     """Do as `run_columns` for trains that `forgets` allows, a period at a time.
 
@@ -210,10 +195,10 @@ def run_in_stretches(
             [drives[int(row)] for row in left],
             2.0 * periods[left],
             states=now,
-            tolerance=tolerance,
+            tolerance=effort.tolerance,
         )
         marks = np.column_stack([phases[left] * periods[left], periods[left]])
-        result = ensemble.run(strobes=list(marks), threads=threads)
+        result = ensemble.run(strobes=list(marks), threads=effort.threads)
         table = result.strobes
         assert table is not None
         if firing >= transient:
@@ -302,7 +287,7 @@ def confirm(
     distances: FloatArray,
     regimes: Sequence[Regime],
     scales: FloatArray,
-    threads: int | None,
+    effort: Effort,
 ) -> None:
     """Put right the periods from `cycles_of`, and the distances, where the states alone do not show them.
 
@@ -318,7 +303,7 @@ def confirm(
         points = np.column_stack([columns.x[row], columns.v[row]])
         return settled(regimes[row], points, int(cycles[row]), scales[row, :2])
 
-    for row, ends_at in zip(doubtful, mapped(settled_of, doubtful, threads), strict=True):
+    for row, ends_at in zip(doubtful, effort.quiet.mapped(settled_of, doubtful), strict=True):
         q = cycles[row] = ends_at.period or 0
         parts = (columns.x, columns.v, columns.memory, columns.current)
         points = np.column_stack([part[row] for part in parts]) / scales[row]

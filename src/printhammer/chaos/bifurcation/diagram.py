@@ -30,6 +30,7 @@ from printhammer.results.summary import (
     Grid,
     Summary,
 )
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
@@ -356,7 +357,7 @@ class Bifurcation(Result, rows="direction column"):
         if self.status[row, k] != "ok" or self.phase or (front is not None and x > front):
             return False
         points = self.x.shape[2]
-        (exponent,) = exponents_onward([(regime, (x, v))], points, self.tolerance, threads=1)
+        (exponent,) = exponents_onward([(regime, (x, v))], points, Effort(self.tolerance, threads=1))
         return is_positive(exponent)
 
 

@@ -18,20 +18,20 @@ from printhammer.chaos.continuation.branch import MOST, Branch
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbits
-from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.chaos.strobe.map import MAP_EFFORT
 from printhammer.chaos.strobe.points import strobes
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Firing, Regime
+from printhammer.run.effort import Effort, computation
+from printhammer.run.regime import Fired, Regime
 from printhammer.support.arrays import FloatArray
-from printhammer.support.threads import Progress
 
 _SETTLE: Final = 500
 """Firings after which a train from rest is taken to have settled."""
 
 
+@computation
 def continuation(
     start: Hammer | Regime | Orbit,
     parameter: str,
@@ -41,10 +41,8 @@ def continuation(
     state: tuple[float, float] | None = None,
     most: SupportsIndex = MOST,
     steps: Steps | None = None,
-    tolerance: float = MAP_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    **firing: Unpack[Firing],
+    effort: Effort = MAP_EFFORT,
+    **firing: Unpack[Fired],
 ) -> Branch:
     """Follow a periodic orbit of a hammer through the values of one constant.
 
@@ -70,12 +68,6 @@ def continuation(
     steps : Steps, optional
         Instead: how the curve is followed, in units of half-widths of the strobe window and of a fifth of the
         range of the constant.
-    tolerance : float, optional
-        Error allowed in one step of the runs.
-    threads : int, optional
-        By default as many as there are cores; the branch does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of steps that are done and the largest that may be.
     **firing
         How the hammer is fired, as for `printhammer.Regime.of`; beside an orbit at most its own phase.
 
@@ -85,7 +77,6 @@ def continuation(
         In both directions from the start to the bounds or to another stop, which is named. Folds are located
         to about 1e-10 of the range or better, grazings to about 1e-8.
     """
-    check_tolerance(tolerance)
     if isinstance(start, Orbit):
         fired = [value for name, value in firing.items() if name not in ("phase", "overlap")]
         if any(value is not None for value in (*fired, state, firings)):
@@ -101,7 +92,7 @@ def continuation(
         if phase is not None and phase != start.phase:
             raise InputError.of("phase", phase, f"that of the orbit, {start.phase!r}, or none")
     else:
-        regime = Regime.of(start, **firing)
+        regime = Regime.of_firing(start, firing)
         ends, own = read_bounds(regime, parameter, bounds), regime.value(parameter)
         if not ends[0] <= own <= ends[1]:
             raise InputError(
@@ -113,25 +104,25 @@ def continuation(
         wanted = None if firings is None else read_count(firings, "firings")
         if state is None:
             fixed = isinstance(start, Regime) or firing.get("phase") is not None
-            regime, point, count = _orbit_to_start_from(regime, wanted, fixed, threads)
+            regime, point, count = _orbit_to_start_from(regime, wanted, fixed, effort)
         else:
             point, count = np.array(state, dtype=np.float64), wanted or 1
-    tracer = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), tolerance, threads)
+    tracer = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), effort.quiet)
     chosen = steps or Steps(most=read_count(most, "most"), precision=PRECISION)
-    return tracer.branch(point, count, chosen, progress)
+    return tracer.branch(point, count, chosen, effort.progress)
 
 
 def _orbit_to_start_from(
-    regime: Regime, firings: int | None, phase_given: bool, threads: int | None
+    regime: Regime, firings: int | None, phase_given: bool, effort: Effort
 ) -> tuple[Regime, FloatArray, int]:
     """Return the regime at the phase of an orbit of it, a state of the orbit and its number of firings."""
     judged = (_SETTLE // 2, _SETTLE)
-    (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=threads)
+    (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=effort.threads)
     period = None if settled.verdict is None or not settled.ok else settled.verdict.period
     if period is not None and firings in (None, period):
         return regime, np.array([settled.x[0], settled.v[0]]), period
     many = firings or 1
-    for orbit in orbits(regime, longest=many, threads=threads):
+    for orbit in orbits(regime, longest=many, threads=effort.threads):
         if orbit.firings == many and (orbit.phase == regime.phase or not phase_given):
             return orbit.regime, np.array(orbit.section), many
     raise InputError(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from printhammer.chaos.continuation.arclength import Steps
 from printhammer.chaos.continuation.branch import MOST, Branch, branches_table
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.search import orbits
-from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.chaos.strobe.map import MAP_EFFORT
 from printhammer.drive.base import Overlap
 from printhammer.drive.input import period_of_rate, read_count, read_positive
 from printhammer.drive.waveforms.shapes import Waveform
@@ -32,9 +32,9 @@ from printhammer.results.summary import (
     Summary,
     styled,
 )
+from printhammer.run.effort import Effort, Keywords, computation
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -135,6 +135,7 @@ class InterruptedBranches(KeyboardInterrupt):
         self.branches = branches
 
 
+@computation
 def regimes(
     hammer: Hammer | Regime,
     rates: tuple[float | str, float | str],
@@ -145,9 +146,8 @@ def regimes(
     waveform: Waveform | None = None,
     overlap: Overlap | None = None,
     most: SupportsIndex = MOST,
-    tolerance: float = MAP_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = MAP_EFFORT,
+    **_keywords: Unpack[Keywords],
 ) -> Branches:
     """Return which printing regimes of a hammer exist at which rate, stable or not.
 
@@ -165,10 +165,8 @@ def regimes(
         How often the orbits born at period doublings are followed as well.
     waveform, overlap
         Of a hammer: as for `printhammer.Regime.of`.
-    most, tolerance, threads
+    most
         As for `printhammer.continuation`, for every branch.
-    progress : callable, optional
-        Called now and then with the amount of work that is done and of all that is known yet.
 
     Returns
     -------
@@ -190,23 +188,21 @@ def regimes(
         raise InputError.of("rates", rates, "the least and the largest rate, ascending")
     count, levels = read_count(seeds, "seeds"), read_count(doublings, "doublings", least=0)
     steps = Steps(most=read_count(most, "most"), precision=PRECISION)
-    collected = _Collected((low, high), steps, tolerance, threads)
+    collected = _Collected((low, high), steps, effort.quiet)
     many = read_count(longest, "longest")
     period = None if isinstance(hammer, Regime) else period_of_rate(low)
     start = Regime.of(hammer, period=period, waveform=waveform, overlap=overlap)
     with collected.kept_at_interrupt():
         for k in range(count):
             rate = low + (high - low) * (k + 0.5) / count
-            search = orbits(start.with_(RATE, rate), longest=many, threads=threads)
+            search = orbits(start.with_(RATE, rate), longest=many, threads=effort.threads)
             if not search.found:
                 collected.refused.append(f"at {rate:.9g} Hz {search.message}")
             collected.add(list(search.found))
-            if progress is not None:
-                progress(k + 1, count + levels)
+            effort.report(k + 1, count + levels)
         for k in range(levels):
             collected.double(k)
-            if progress is not None:
-                progress(count + k + 1, count + levels)
+            effort.report(count + k + 1, count + levels)
     return collected.result()
 
 
@@ -221,7 +217,7 @@ def follow_doublings(
         At an interrupt (Ctrl-C), with the branches that were followed by then.
     """
     steps = Steps(most=most, precision=PRECISION)
-    collected = _Collected(branch.bounds, steps, branch.tolerance, threads)
+    collected = _Collected(branch.bounds, steps, Effort(branch.tolerance, threads))
     collected.found.append(branch)
     with collected.kept_at_interrupt():
         for k in range(levels):
@@ -232,10 +228,8 @@ def follow_doublings(
 class _Collected:
     """Branches found so far."""
 
-    def __init__(
-        self, bounds: tuple[float, float], steps: Steps, tolerance: float, threads: int | None
-    ) -> None:
-        self.bounds, self.steps, self.tolerance, self.threads = bounds, steps, tolerance, threads
+    def __init__(self, bounds: tuple[float, float], steps: Steps, effort: Effort) -> None:
+        self.bounds, self.steps, self.effort = bounds, steps, effort
         self.found: list[Branch] = []
         self.refused: list[str] = []
         self.done: set[tuple[int, int]] = set()
@@ -258,7 +252,7 @@ class _Collected:
         while left:
             left = [orbit for orbit in left if not self.known(orbit)]
             now, left = left[:_TOGETHER], left[_TOGETHER:]
-            for orbit, branch in zip(now, mapped(self.followed, now, self.threads, length=1), strict=True):
+            for orbit, branch in zip(now, self.effort.mapped(self.followed, now, length=1), strict=True):
                 if isinstance(branch, str):
                     self.refused.append(branch)
                 elif not self.known(orbit):
@@ -267,9 +261,9 @@ class _Collected:
     def followed(self, orbit: Orbit) -> Branch | str:
         """Return the branch through an orbit, or why there is none."""
         bounds = read_bounds(orbit.regime, RATE, self.bounds)
-        tracer = Tracer(orbit.regime, RATE, bounds, self.tolerance, 1)
+        tracer = Tracer(orbit.regime, RATE, bounds, self.effort.alone)
         try:
-            return tracer.branch(np.array(orbit.section), orbit.firings, self.steps, None)
+            return tracer.branch(np.array(orbit.section), orbit.firings, self.steps)
         except InputError as error:
             return f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
 
@@ -288,7 +282,7 @@ class _Collected:
                 if any(_ends_at(other, event.value, event.state) for other in self.found):
                     continue
                 try:
-                    born = branch.doubled(event, most=self.steps.most, threads=self.threads)
+                    born = branch.doubled(event, most=self.steps.most, threads=self.effort.threads)
                 except InputError as error:
                     self.refused.append(f"level {level + 1}, period doubling at {event.value:.9g}: {error}")
                     continue
@@ -330,7 +324,9 @@ def _at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
     values = branch.values
     there = (branch.phases[:-1] == phase) & (branch.phases[1:] == phase)
     between = np.flatnonzero(((values[:-1] - value) * (values[1:] - value) <= 0.0) & there)
-    work = Tracer(branch.regime, branch.parameter, branch.bounds, branch.tolerance, 1).at_phase(phase)
+    work = Tracer(
+        branch.regime, branch.parameter, branch.bounds, Effort(branch.tolerance, threads=1)
+    ).at_phase(phase)
     for i in between:
         for k in range(branch.firings):
             # A rough look at the chord first, then the orbit itself.

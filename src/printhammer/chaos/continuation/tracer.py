@@ -25,6 +25,7 @@ from printhammer.chaos.continuation.flights import grazing_of, near_touches
 from printhammer.chaos.strobe.map import quiet_section
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
+from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import Progress, mapped
@@ -69,8 +70,7 @@ class Tracer:
     regime: Regime
     parameter: str
     bounds: tuple[float, float]
-    tolerance: float
-    threads: int | None
+    effort: Effort
 
     def __post_init__(self) -> None:
         part = (self.bounds[1] - self.bounds[0]) / _PARTS
@@ -78,9 +78,11 @@ class Tracer:
 
     def family(self, firings: int) -> RegimeFamily:
         """Return the strobe map over so many firings."""
-        return RegimeFamily(self.regime, self.parameter, firings, self.tolerance)
+        return RegimeFamily(self.regime, self.parameter, firings, self.effort.tolerance)
 
-    def branch(self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None) -> Branch:
+    def branch(
+        self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None = None
+    ) -> Branch:
         """Return the branch through an orbit."""
         family = self.family(firings)
         curve = follow(
@@ -90,13 +92,13 @@ class Tracer:
             scales=self.scales,
             bounds=self.bounds,
             steps=steps,
-            watch=self.watch(firings, steps, progress),
+            watch=self.watch(firings, steps, replace(self.effort, progress=progress)),
         )
         curve = self.grazed(family, curve)
         pieces, (first, last) = [(family, curve.nodes)], curve.stops
         before, first = self.resumed(family, curve.nodes, first, steps, backward=True)
         after, last = self.resumed(family, curve.nodes, last, steps, backward=False)
-        return self.described([*reversed(before), *pieces, *after], (first, last), steps, self.threads)
+        return self.described([*reversed(before), *pieces, *after], (first, last), steps, self.effort.threads)
 
     def resumed(
         self, family: RegimeFamily, nodes: list[Node], stop: Stop, steps: Steps, *, backward: bool
@@ -110,7 +112,7 @@ class Tracer:
         while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
             node = nodes[0] if backward else nodes[-1]
             regime = family.regime.with_(self.parameter, node.parameter)
-            quiet = quiet_section(regime, node.state, family.firings, self.tolerance)
+            quiet = quiet_section(regime, node.state, family.firings, self.effort.tolerance)
             if quiet is None or abs(quiet[0].phase - regime.phase) < _SAME_PHASE:
                 break
             tracer = self.at_phase(quiet[0].phase)
@@ -126,7 +128,7 @@ class Tracer:
                     steps=steps,
                     directions="up",
                     row=np.array([0.0, 0.0, 1.0 if up else -1.0]),
-                    watch=tracer.watch(family.firings, steps, None),
+                    watch=tracer.watch(family.firings, steps, self.effort),
                 )
             except InputError:
                 break
@@ -159,9 +161,9 @@ class Tracer:
     def grazing_near(self, family: RegimeFamily, node: Node) -> float | None:
         """Return where the orbit that is nearly grazing grazes; None where it is far from that."""
         regime = family.regime.with_(self.parameter, node.parameter)
-        for touch in near_touches(regime, node.state, family.firings, self.tolerance)[:1]:
+        for touch in near_touches(regime, node.state, family.firings, self.effort.tolerance)[:1]:
             width = float(self.scales[-1])
-            place = grazing_of(regime, self.parameter, touch, family.firings, self.tolerance, width)
+            place = grazing_of(regime, self.parameter, touch, family.firings, self.effort.tolerance, width)
             if touch.gap < _GENTLE and place is not None and abs(place - node.parameter) < _NEAR * width:
                 return place
         return None
@@ -178,7 +180,7 @@ class Tracer:
             scales=self.scales,
             bounds=self.bounds,
             steps=steps,
-            watch=self.watch(2 * firings, steps, None),
+            watch=self.watch(2 * firings, steps, self.effort),
         )
         value, state = event.value, event.point.node.state
         sentence = f"the orbit is born at {self.at_value(value)}, where one of half its period doubles"
@@ -201,7 +203,7 @@ class Tracer:
         """Return a value of the constant with name and unit."""
         return f"{self.parameter} = {value:{_DIGITS}} {self.regime.quantity(self.parameter).si}"
 
-    def watch(self, firings: int, steps: Steps, progress: Progress | None) -> Any:
+    def watch(self, firings: int, steps: Steps, effort: Effort) -> Any:
         """Return what is asked between any two nodes: whether the branch ends there."""
         half, whole = None, self.family(firings)
         if firings % 2 == 0:
@@ -213,8 +215,7 @@ class Tracer:
         def watched(here: Node, ahead: Node) -> Stop | None:
             nonlocal taken
             taken += 1
-            if progress is not None:
-                progress(min(taken, 2 * steps.most), 2 * steps.most)
+            effort.report(min(taken, 2 * steps.most), 2 * steps.most)
             if rigid and here.value.label != ahead.value.label:
                 why = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
                 return Stop("grazing", here.parameter, here.state, why, here)
@@ -307,7 +308,7 @@ class Tracer:
             unit=self.regime.quantity(self.parameter).si,
             bounds=self.bounds,
             firings=family.firings,
-            tolerance=self.tolerance,
+            tolerance=self.effort.tolerance,
             values=np.array([node.parameter for node in nodes]),
             phases=np.array([own.regime.phase for own, _ in owned]),
             x=states[:, :, 0],

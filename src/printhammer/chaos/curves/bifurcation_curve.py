@@ -31,6 +31,7 @@ from printhammer.results.summary import (
     Summary,
     multiplier,
 )
+from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -248,7 +249,7 @@ def settled_plane(
         moved = regime.with_(names[1], float(value))
         regimes = [moved.with_(names[0], float(first)) for first in axes[0]]
         trains = [Train.of(at.at_firings, _FIRINGS) for at in regimes]
-        every, _ = run_trains(trains, judged, GRID_TOLERANCE, None, threads=threads)
+        every, _ = run_trains(trains, judged, None, Effort(GRID_TOLERANCE, threads))
         settled[row] = [
             _period(states, train) if states.status == "ok" else -1
             for train, states in zip(trains, every, strict=True)

@@ -33,9 +33,9 @@ from printhammer.results import Column, Result, column, derived, part, provenanc
 from printhammer.results.summary import (
     Summary,
 )
-from printhammer.run.regime import Firing, Regime
+from printhammer.run.effort import DEFAULT, Effort, computation
+from printhammer.run.regime import FiredAtFixedTolerance, Firing, Regime
 from printhammer.support.arrays import FloatArray, IntArray
-from printhammer.support.threads import Progress, mapped, thread_count
 
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch import BranchEvent
@@ -123,6 +123,7 @@ class StabilityChart(Result):
         return own
 
 
+@computation
 def stability_chart(
     branch: Branch | Regime | Hammer,
     second: str,
@@ -131,9 +132,8 @@ def stability_chart(
     first: tuple[str, float | str, float | str] | None = None,
     grid: tuple[int, int] = GRID,
     most: SupportsIndex = MOST,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    **firing: Unpack[Firing],
+    effort: Effort = DEFAULT,
+    **firing: Unpack[FiredAtFixedTolerance],
 ) -> StabilityChart:
     """Follow the limits of stability of a branch through a second constant.
 
@@ -152,12 +152,6 @@ def stability_chart(
         Numbers of values of the two constants at which trains from rest are judged; (0, 0) for none.
     most : int, optional
         Number of steps of a curve in either direction.
-    threads : int, optional
-        By default as many as there are cores; the chart does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of curves that are done and of all.
-    **firing
-        How a hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
@@ -175,7 +169,8 @@ def stability_chart(
             "first is missing", key="first", expected="the first constant with its least and largest value"
         )
     else:
-        branch = continuation(branch, first[0], first[1:], threads=threads, **firing)
+        fired: Firing = firing
+        branch = continuation(branch, first[0], first[1:], threads=effort.threads, **fired)
     regime = branch.regime
     check_two(branch.parameter, second)
     ends = read_bounds(regime, second, bounds)
@@ -186,8 +181,8 @@ def stability_chart(
     # The other multiplier lies inside the unit circle there.
     lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
     limits = [event for event in lost if event.kind in TESTS]
-    curves, refused = chart.curves(limits, thread_count(threads), progress)
-    axes, settled = settled_plane(regime, chart.plane.names, chart.plane.bounds, grid, threads)
+    curves, refused = chart.curves(limits, effort)
+    axes, settled = settled_plane(regime, chart.plane.names, chart.plane.bounds, grid, effort.threads)
     return StabilityChart(
         regime=regime,
         names=(branch.parameter, second),
@@ -210,9 +205,7 @@ class _Chart:
         self.plane = Plane(branch.regime, names, own, branch.firings, branch.tolerance)
         self.value = branch.regime.value(second)
 
-    def curves(
-        self, limits: list[BranchEvent], threads: int, progress: Progress | None
-    ) -> tuple[list[BifurcationCurve], list[str]]:
+    def curves(self, limits: list[BranchEvent], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
         """Return a curve through each limit, but those that lie on one already."""
         curves: list[BifurcationCurve] = []
         refused: list[str] = []
@@ -221,13 +214,12 @@ class _Chart:
             left = [start for start in left if not any(self.on(curve, start) for curve in curves)]
             # As many at once whatever the number of threads, so that the outcome is the same.
             now, left = left[:2], left[2:]
-            for start, curve in zip(now, mapped(self.curve, now, threads, length=1), strict=True):
+            for start, curve in zip(now, effort.quiet.mapped(self.curve, now, length=1), strict=True):
                 if isinstance(curve, str):
                     refused.append(curve)
                 elif not any(self.on(other, start) for other in curves):
                     curves.append(curve)
-            if progress is not None:
-                progress(len(limits) - len(left), len(limits))
+            effort.report(len(limits) - len(left), len(limits))
         return curves, refused
 
     def curve(self, start: Start) -> BifurcationCurve | str:

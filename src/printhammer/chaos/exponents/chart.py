@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, SupportsIndex
+from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -41,10 +41,9 @@ from printhammer.results.summary import (
     Grid,
     Summary,
 )
-from printhammer.run.problem import TOLERANCE
+from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import Regime, regimes_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,6 +137,7 @@ class LyapunovChart(Result, rows="period"):
         return table
 
 
+@computation
 def lyapunovs(
     hammers: Hammer | Regime | Sequence[Hammer | Regime],
     periods: Sequence[float | str] | npt.ArrayLike | None = None,
@@ -146,9 +146,8 @@ def lyapunovs(
     transient: SupportsIndex = TRANSIENT,
     waveform: Waveform | None = None,
     overlap: Overlap | None = None,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[Keywords],
 ) -> LyapunovChart:
     """Return the Lyapunov exponents of many trains from rest, computed on all cores; see `lyapunov`.
 
@@ -156,10 +155,8 @@ def lyapunovs(
     ----------
     hammers, periods, waveform, overlap
         Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
-    firings, transient, tolerance
+    firings, transient
         As for `lyapunov`, for all trains.
-    threads, progress
-        As for `printhammer.chaos.strobes`.
 
     Returns
     -------
@@ -170,9 +167,9 @@ def lyapunovs(
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
     trains = [Train.of(regime.at_firings, sum(counts) + 1) for regime in regimes]
     # Only a row is kept of each train, so that memory does not grow with their length.
-    rows = mapped(lambda train: _row(exponents_of_train(train, counts, tolerance)), trains, threads, progress)
+    rows = effort.mapped(lambda train: _row(exponents_of_train(train, counts, effort.tolerance)), trains)
     first = counts[1] + 1
-    return _chart(trains[0].hammer, trains[0].drive, (first, first + counts[0]), tolerance, rows)
+    return _chart(trains[0].hammer, trains[0].drive, (first, first + counts[0]), effort.tolerance, rows)
 
 
 def _row(train: Lyapunov) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from printhammer.results.summary import (
     judged,
     styled,
 )
+from printhammer.run.effort import Effort
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime
 from printhammer.run.supply import current_of
@@ -337,7 +338,7 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
     """Return the exponents of a train over a number of firings, after another number that is left out."""
     first = counts[1] + 1
     last = first + counts[0]
-    (exponent,) = exponents_of([train], (first, last), tolerance, threads=1)
+    (exponent,) = exponents_of([train], (first, last), Effort(tolerance, threads=1))
     points = _points(train, first, last, exponent, tolerance)
     factors = np.column_stack([exponent.factors, exponent.second_factors])
     judged = points.verdict

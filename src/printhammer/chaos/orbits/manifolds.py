@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Any, Final, SupportsIndex
+from typing import Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -27,9 +27,9 @@ from printhammer.chaos.orbits.orbit import SADDLE, Orbit, multipliers_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.results import Column, Result, column, part
+from printhammer.run.effort import DEFAULT, AtFixedTolerance, Effort, computation
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray, IntArray
-from printhammer.support.threads import Progress, mapped
 
 KINDS: Final = ("stable", "unstable")
 LENGTH: Final = 10.0
@@ -90,6 +90,7 @@ class Manifolds(Result, rows="point"):
         return own
 
 
+@computation
 def manifolds(
     orbit: Orbit,
     *,
@@ -97,8 +98,8 @@ def manifolds(
     points: SupportsIndex = POINTS,
     spacing: float = SPACING,
     kinds: tuple[str, ...] = KINDS,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[AtFixedTolerance],
 ) -> Manifolds:
     """Return the stable and unstable manifolds of a saddle, at the phase of its section.
 
@@ -114,8 +115,6 @@ def manifolds(
         Distance of neighbouring points that is aimed at, in the same unit.
     kinds : tuple of str, optional
         "stable", "unstable", or both.
-    threads, progress
-        As for `printhammer.chaos.strobes`; of the curves.
 
     Returns
     -------
@@ -145,11 +144,8 @@ def manifolds(
         states.append(own.image(states[-1], 1)[0])
     tasks = list(product(kinds, states, (1.0, -1.0)))
     grow = {"stable": _stable, "unstable": _unstable}
-    made = mapped(
-        lambda i: grow[tasks[i][0]](own, tasks[i][1], tasks[i][2], orbit.firings, limits),
-        range(len(tasks)),
-        threads,
-        progress,
+    made = effort.mapped(
+        lambda i: grow[tasks[i][0]](own, tasks[i][1], tasks[i][2], orbit.firings, limits), range(len(tasks))
     )
     curves = [own.outward(curve.points) for curve in made]
     return Manifolds(
@@ -183,7 +179,7 @@ class Scaled:
     """The strobe map in half-widths of the window, with its derivative."""
 
     def __init__(self, regime: Regime, tolerance: float) -> None:
-        self.maps, self.scales = ExactMaps(regime, tolerance, 1), regime.window.half_widths
+        self.maps, self.scales = ExactMaps(regime, Effort(tolerance, threads=1)), regime.window.half_widths
 
     def inward(self, states: FloatArray) -> FloatArray:
         """Return states, m and m/s, in half-widths."""

@@ -30,11 +30,11 @@ from printhammer.chaos.strobe.map import (
     usable,
 )
 from printhammer.results import Declared, part
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.regime import Regime
 from printhammer.run.supply import current_scale
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
-from printhammer.support.threads import mapped, thread_count
 
 CLOSED: Final = ""
 """What is told of an orbit that closes; of others it is the reason why it does not."""
@@ -243,18 +243,17 @@ _PIECE: Final = 30_000
 class ExactMaps:
     """Images with derivatives from the tangent flow, one at a time in threads."""
 
-    def __init__(self, regime: Regime, tolerance: float, threads: int | None = None) -> None:
-        self.regime, self.tolerance = regime, tolerance
-        self.threads = thread_count(threads)
+    def __init__(self, regime: Regime, effort: Effort) -> None:
+        self.regime, self.effort = regime, effort.quiet
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
         """Return the images of states, each after its own number of firings."""
 
         def image(i: int) -> Image:
-            return image_of(self.regime, states[i], int(firings[i]), self.tolerance, contacts=False)
+            return image_of(self.regime, states[i], int(firings[i]), self.effort.tolerance, contacts=False)
 
         images = Images.empty(len(states))
-        for i, own in enumerate(mapped(image, range(len(states)), self.threads)):
+        for i, own in enumerate(self.effort.mapped(image, range(len(states)))):
             images.states[i], images.jacobians[i], images.smooth[i] = own.state, own.jacobian, own.smooth
             images.reasons[i] = CLOSED if own.ok else own.status
         return images
@@ -263,9 +262,9 @@ class ExactMaps:
 class FastMaps:
     """Images after `longest` firings at most with derivatives from differences, in an ensemble."""
 
-    def __init__(self, regime: Regime, tolerance: float, longest: int, threads: int | None = None) -> None:
+    def __init__(self, regime: Regime, longest: int, effort: Effort) -> None:
         regime.check_planar()
-        self.regime, self.tolerance, self.threads = regime, tolerance, threads
+        self.regime, self.effort = regime, effort
         self.drive, _ = regime.train(longest)
         self.moments = regime.moments(self.drive, longest)
         self.scales = regime.window.half_widths
@@ -291,10 +290,10 @@ class FastMaps:
                 ends,
                 states=neighbours[rows].reshape(-1, 2),
                 starts=float(self.moments[0]),
-                tolerance=self.tolerance,
+                tolerance=self.effort.tolerance,
             )
             strobes: Any = ends[:, np.newaxis]
-            result = ensemble.run(strobes=strobes, threads=self.threads)
+            result = ensemble.run(strobes=strobes, threads=self.effort.threads)
             table = result.strobes
             assert table is not None
             shape = (len(rows), 3)

@@ -10,13 +10,12 @@ import numpy.typing as npt
 from printhammer.chaos.orbits.newton import ExactMaps, close_orbits
 from printhammer.chaos.orbits.orbit import Orbit, no_orbit, orbit_of
 from printhammer.chaos.orbits.stages import LONE, Search, shortest
-from printhammer.chaos.strobe.map import MAP_TOLERANCE, read_state
+from printhammer.chaos.strobe.map import MAP_EFFORT, read_state
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.run.problem import check_tolerance
-from printhammer.run.regime import Firing, Regime
-from printhammer.support.threads import Progress, thread_count
+from printhammer.run.effort import Effort, InThreads, computation
+from printhammer.run.regime import Fired, Regime
 
 if TYPE_CHECKING:
     from printhammer.chaos.orbits.collection import Orbits
@@ -32,6 +31,7 @@ FOLLOW: Final = 2
 orbits through which branches are followed."""
 
 
+@computation
 def orbits(
     hammer: Hammer | Regime,
     *,
@@ -39,10 +39,8 @@ def orbits(
     starts: SupportsIndex = STARTS,
     guesses: SupportsIndex = GUESSES,
     follow: SupportsIndex = FOLLOW,
-    tolerance: float = MAP_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
-    **firing: Unpack[Firing],
+    effort: Effort = MAP_EFFORT,
+    **firing: Unpack[Fired],
 ) -> Orbits:
     """Search for the periodic orbits of a hammer under a periodic drive, stable and unstable.
 
@@ -66,38 +64,30 @@ def orbits(
     follow : int, optional
         Through orbits of up to so many firings branches are followed over 5 % of the period on either side:
         where they come by the period again there are further orbits. None for 0.
-    tolerance : float, optional
-        Error allowed in one step of the runs that the orbits are found with in the end.
-    threads : int, optional
-        By default as many as there are cores.
-    progress : callable, optional
-        Called now and then with the amount of work that is done and of all.
-    **firing
-        How the hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
     Orbits
         With a count of what became of the guesses; a search that finds nothing is no exception.
     """
-    regime = Regime.of(hammer, **firing)
+    regime = Regime.of_firing(hammer, firing)
     most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
     count = read_count(starts, "starts")
     if most > MOST_FIRINGS:
         raise InputError.of("longest", most, f"at most {MOST_FIRINGS} firings", written=str(most))
-    check_tolerance(tolerance)
     onward = read_count(follow, "follow", least=0)
-    return Search(regime, most, several, onward, tolerance, thread_count(threads), progress).run(count)
+    return Search(regime, most, several, onward, effort).run(count)
 
 
+@computation
 def orbit(
     regime: Regime,
     state: npt.ArrayLike,
     *,
     firings: SupportsIndex = 1,
     phase: float | None = None,
-    tolerance: float = MAP_TOLERANCE,
-    threads: int | None = None,
+    effort: Effort = MAP_EFFORT,
+    **_keywords: Unpack[InThreads],
 ) -> Orbit:
     """Return the periodic orbit near a strobe point.
 
@@ -112,8 +102,6 @@ def orbit(
     phase : float, optional
         Instead of that of the regime. The armature must not be on its way out of the pack there, where the
         state has a memory.
-    tolerance, threads
-        As for `orbits`.
 
     Returns
     -------
@@ -122,12 +110,11 @@ def orbit(
         none near is no exception.
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
-    check_tolerance(tolerance)
     states = [read_state(state)]
     if count > MOST_FIRINGS:
         raise InputError.of("firings", count, f"at most {MOST_FIRINGS}", written=str(count))
     scales = regime.window.half_widths
-    exact = ExactMaps(regime, tolerance, threads)
+    exact = ExactMaps(regime, effort)
     for _ in range(count - 1):
         images = exact(states[-1][np.newaxis], np.ones(1, np.int64))
         if images.reasons[0] or not np.isfinite(images.states).all():
@@ -138,5 +125,5 @@ def orbit(
     guess = np.array(states[: len(segments)])
     (closing,) = close_orbits(exact, guess[np.newaxis], segments[np.newaxis], scales, **LONE)
     if not closing.closed:
-        return no_orbit(regime, count, tolerance, closing.reason)
-    return orbit_of(regime, shortest(closing, scales), tolerance)
+        return no_orbit(regime, count, effort.tolerance, closing.reason)
+    return orbit_of(regime, shortest(closing, scales), effort.tolerance)

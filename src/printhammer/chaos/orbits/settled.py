@@ -22,7 +22,7 @@ import numpy as np
 
 from printhammer.chaos.orbits.newton import ExactMaps, close_orbits
 from printhammer.chaos.orbits.orbit import multipliers_of
-from printhammer.chaos.strobe.map import MAP_TOLERANCE
+from printhammer.chaos.strobe.map import MAP_EFFORT
 from printhammer.results import Declared, part
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
@@ -87,7 +87,7 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
             return Settled(count, states[-count:].copy())
     if not regime.is_planar:
         return _by_states(points, scaled, period)
-    maps = ExactMaps(regime, MAP_TOLERANCE, 1)
+    maps = ExactMaps(regime, MAP_EFFORT.alone)
     for count in divisors:
         if count < period and _apart(scaled, count, period)[1][0] > NEAR:
             continue

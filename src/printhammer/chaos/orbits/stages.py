@@ -33,10 +33,10 @@ from printhammer.chaos.orbits.newton import Closing, ExactMaps, FastMaps, Guess,
 from printhammer.chaos.orbits.orbit import KINDS, Orbit, orbit_of
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD
+from printhammer.run.effort import Effort
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
-from printhammer.support.threads import Progress, mapped
 
 if TYPE_CHECKING:
     from printhammer.chaos.orbits.orbit import Orbit
@@ -126,9 +126,7 @@ class Search:
     longest: int
     several: int
     follow: int
-    tolerance: float
-    threads: int
-    progress: Progress | None
+    effort: Effort
 
     def __post_init__(self) -> None:
         self.scales = self.regime.window.half_widths
@@ -142,9 +140,9 @@ class Search:
         self.blocks, self.batches = _steps(_BLOCKS, starts), _steps(_BATCHES, self.several)
         rest = np.array([first_state(self.regime)])
         self.all = 3 + 2 * self.longest * len(self.blocks) * len(self.batches)
-        (settling, *_others) = record(self.regime, rest, 1, _LONG, self.threads)
+        (settling, *_others) = record(self.regime, rest, 1, _LONG, self.effort.threads)
         begun = np.vstack([rest, spread(self.regime, self.blocks[-1], settling.states[0])])
-        records = record(self.regime, begun, 2 * self.longest, _LONG, self.threads)
+        records = record(self.regime, begun, 2 * self.longest, _LONG, self.effort.threads)
         self._tell(1)
         known: list[tuple[Regime, _Known]] = []
         for place, (phase, kept) in enumerate(zip(PHASES, records, strict=True)):
@@ -173,17 +171,16 @@ class Search:
             repeats=self.repeats,
             hits=tuple(hits for _orbit, hits in ordered),
             failures=dict(self.failures),
-            tolerance=self.tolerance,
+            tolerance=self.effort.tolerance,
         )
 
     def _tell(self, more: int) -> None:
         self.done += more
-        if self.progress is not None:
-            self.progress(self.done, self.all)
+        self.effort.report(self.done, self.all)
 
     def _through(self, regime: Regime, records: Records) -> list[_Known]:
         """Return the different orbits through one section."""
-        fast = FastMaps(regime, TOLERANCE, self.longest, self.threads)
+        fast = FastMaps(regime, self.longest, self.effort.at(TOLERANCE))
         different: list[_Known] = []
         ends = np.cumsum([1 + self.blocks[0], *np.diff(self.blocks)])
         for block, (begin, end) in enumerate(itertools.pairwise([0, *ends.tolist()])):
@@ -228,7 +225,7 @@ class Search:
 
     def _refined(self, regime: Regime, different: list[_Known]) -> list[_Known]:
         """Return orbits closed with the tolerance that was asked for."""
-        exact = ExactMaps(regime, self.tolerance, self.threads)
+        exact = ExactMaps(regime, self.effort)
         refined: list[_Known] = []
         closings = _closed(exact, [orbit.closing for orbit in different], self.scales, _EXACT)
         for orbit, closing in zip(different, closings, strict=True):
@@ -262,7 +259,8 @@ class Search:
 
     def _describe(self, described: list[tuple[Orbit, int]], known: Sequence[tuple[Regime, _Known]]) -> None:
         """Add all about orbits, without those that were found at another section too."""
-        orbits = mapped(lambda pair: orbit_of(pair[0], pair[1].closing, self.tolerance), known, self.threads)
+        quiet = self.effort.quiet
+        orbits = quiet.mapped(lambda pair: orbit_of(pair[0], pair[1].closing, quiet.tolerance), known)
         for orbit, (_regime, own) in zip(orbits, known, strict=True):
             if not orbit.ok:
                 self.failures[orbit.status] += 1
@@ -282,9 +280,9 @@ class Search:
         """Add the orbits to which branches through the known ones lead, and what these are joined to."""
         first = [orbit for orbit, _hits in described]
         short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
-        states = mapped(crossings, short, self.threads)
+        states = self.effort.quiet.mapped(crossings, short)
         for orbit, ways in zip(short, states, strict=True):
-            exact = ExactMaps(orbit.regime, self.tolerance, 1)
+            exact = ExactMaps(orbit.regime, self.effort.alone)
             different: list[_Known] = []
             firings = np.array([orbit.firings])
             self._try(exact, different, [Guess(state[np.newaxis], firings) for state in ways], (0, 0))
@@ -298,7 +296,7 @@ class Search:
             if old == len(every):
                 continue
             known = set(itertools.combinations(range(old), 2))
-            exact = ExactMaps(every[0].regime, self.tolerance, self.threads)
+            exact = ExactMaps(every[0].regime, self.effort)
             closings = [_guess(orbit, exact) for orbit in every]
             tried = [
                 guess

@@ -30,6 +30,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, part
 from printhammer.run.contacts import touches_of
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import Problem, Record
 from printhammer.run.regime import Regime
@@ -39,6 +40,8 @@ from printhammer.support.arrays import FloatArray
 
 MAP_TOLERANCE: Final = 1e-13
 """Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""
+
+MAP_EFFORT: Final = Effort(MAP_TOLERANCE)
 
 IN_PACK: Final = "in the pack"
 """Status where the state at a section has a memory of the pack beside displacement and velocity."""

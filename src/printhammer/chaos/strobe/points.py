@@ -38,6 +38,7 @@ from printhammer.results.summary import (
     repeated,
     styled,
 )
+from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime, Window, regimes_of, window_of
@@ -185,6 +186,7 @@ def strobe(
     return points_of_train
 
 
+@computation
 def strobes(
     hammers: Hammer | Regime | Sequence[Hammer | Regime],
     periods: Sequence[float | str] | npt.ArrayLike | None = None,
@@ -196,12 +198,11 @@ def strobes(
     drives: Sequence[Drive] | None = None,
     overlap: Overlap | None = None,
     states: Sequence[tuple[float, float]] | npt.ArrayLike | None = None,
-    tolerance: float = TOLERANCE,
     verdict: bool = True,
     firings: tuple[int, int] = (FIRST, LAST),
     every_exponent: bool = False,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[Keywords],
 ) -> list[Strobe]:
     """Return the strobe points of many trains, computed on all cores; see `strobe`.
 
@@ -209,7 +210,7 @@ def strobes(
     ----------
     hammers, periods, drives, waveform, overlap, phase
         Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
-    points, transient, tolerance, verdict
+    points, transient, verdict
         As for `strobe`, for all trains.
     states : sequence, optional
         Displacement, m, velocity, m/s, and what else belongs to the state at the first firing of each train,
@@ -219,10 +220,6 @@ def strobes(
     every_exponent : bool, optional
         Whether to compute the exponent of periodic trains too, which takes several times as long as their
         points and does not change the verdict.
-    threads : int, optional
-        By default as many as there are cores; the results do not depend on it.
-    progress : callable, optional
-        Called now and then with the amount of work that is done and of all.
 
     Returns
     -------
@@ -244,16 +241,10 @@ def strobes(
     trains = [Train.of(many[i % len(many)], fired, begun[i % len(begun)]) for i in range(size)]
     chosen = np.arange(skipped + 1, skipped + count + 1)
     every, verdicts = run_trains(
-        trains,
-        chosen,
-        tolerance,
-        firings if verdict else None,
-        every_exponent=every_exponent,
-        threads=threads,
-        progress=progress,
+        trains, chosen, firings if verdict else None, effort, every_exponent=every_exponent
     )
     return [
-        strobe_of(train, chosen, states_of_train, tolerance, judged)
+        strobe_of(train, chosen, states_of_train, effort.tolerance, judged)
         for train, states_of_train, judged in zip(trains, every, verdicts, strict=True)
     ]
 

@@ -18,7 +18,7 @@ standard errors, more than the verdict asks for; where it is not, it is computed
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -27,9 +27,8 @@ from printhammer.chaos.orbits.settled import shown
 from printhammer.chaos.strobe.train import States, Train, exponents_of, exponents_onward, run_trains
 from printhammer.chaos.strobe.verdict import AGREEMENT, FIRST, LAST, Verdict, period_of, verdict
 from printhammer.hammer.hammer import Hammer
-from printhammer.run.problem import TOLERANCE
+from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import Regime
-from printhammer.support.threads import Progress, mapped
 
 STAGES: Final = (32, 128)
 """Numbers of firings after which a train may count as periodic."""
@@ -45,14 +44,14 @@ _SURE: Final = 5.0
 """Firings over which an exponent counts at first, and standard errors that it takes then."""
 
 
+@computation
 def scan(
     hammer: Hammer,
     periods: npt.ArrayLike,
     *,
-    tolerance: float = TOLERANCE,
     exponents: bool = True,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[Keywords],
 ) -> list[Verdict]:
     """Return the verdicts on the trains of a hammer from rest, one for each period.
 
@@ -62,14 +61,8 @@ def scan(
         The hammer.
     periods : array
         Times between firings, s.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
     exponents : bool, optional
         Whether to compute exponents; without them, trains that have no period are left undecided.
-    threads : int, optional
-        By default as many as there are cores.
-    progress : callable, optional
-        Called now and then with the number of trains that are judged and of all.
 
     Returns
     -------
@@ -85,32 +78,24 @@ def scan(
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64)).tolist()
     regimes = [Regime.of(hammer, period=time) for time in times]
     verdicts: dict[int, Verdict] = {}
-
-    def tell() -> None:
-        if progress is not None:
-            progress(len(verdicts), len(times))
-
+    quiet = effort.quiet
     for last in STAGES:
         left = [i for i in range(len(times)) if i not in verdicts]
         trains = [Train.of(regimes[i], last) for i in left]
         window = (last // 2 + 1, last)
-        states, _ = run_trains(trains, np.arange(window[0], last + 1), tolerance, None, threads=threads)
-        settled = _settled(trains, states, window, tolerance, threads)
+        states, _ = run_trains(trains, np.arange(window[0], last + 1), None, quiet)
+        settled = _settled(trains, states, window, quiet)
         verdicts |= {i: judged for i, judged in zip(left, settled, strict=True) if judged is not None}
-        tell()
+        effort.report(len(verdicts), len(times))
     left = [i for i in range(len(times)) if i not in verdicts]
     trains = [Train.of(regimes[i], LAST) for i in left]
-    verdicts |= dict(zip(left, _followed(trains, tolerance, exponents, threads), strict=True))
-    tell()
+    verdicts |= dict(zip(left, _followed(trains, exponents, quiet), strict=True))
+    effort.report(len(verdicts), len(times))
     return [verdicts[i] for i in range(len(times))]
 
 
 def _settled(
-    trains: Sequence[Train],
-    states: Sequence[States],
-    firings: tuple[int, int],
-    tolerance: float,
-    threads: int | None,
+    trains: Sequence[Train], states: Sequence[States], firings: tuple[int, int], effort: Effort
 ) -> list[Verdict | None]:
     """Return the verdicts on trains that have settled, None for the others."""
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
@@ -121,12 +106,13 @@ def _settled(
         if period is not None and close and shown(states[i].scaled(trains[i])[np.newaxis], period)[0]:
             periods[i] = period
     candidates = list(periods)
-    largest = mapped(
-        lambda i: largest_multiplier(trains[i], states[i], periods[i], tolerance), candidates, threads
+    largest = effort.mapped(
+        lambda i: largest_multiplier(trains[i], states[i], periods[i], effort.tolerance), candidates
     )
     stable = {i for i, size in zip(candidates, largest, strict=True) if size <= LARGEST_MULTIPLIER}
     return [
-        verdict(distances[i], firings, tolerance, None) if i in stable else None for i in range(len(trains))
+        verdict(distances[i], firings, effort.tolerance, None) if i in stable else None
+        for i in range(len(trains))
     ]
 
 
@@ -155,18 +141,14 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
     return float(np.abs(np.linalg.eigvals(tangent.matrix)).max())
 
 
-def _followed(
-    trains: Sequence[Train], tolerance: float, exponents: bool, threads: int | None
-) -> list[Verdict]:
+def _followed(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
     """Return the verdicts on trains that are followed to the end."""
-    judged = (FIRST, LAST)
-    states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), tolerance, None, threads=threads)
+    judged, tolerance = (FIRST, LAST), effort.tolerance
+    states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), None, effort)
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
     stopped = ["" if own.status == "ok" else own.status for own in states]
-    ends_at = mapped(
-        lambda i: None if stopped[i] else states[i].settled(trains[i], distances[i]),
-        range(len(trains)),
-        threads,
+    ends_at = effort.mapped(
+        lambda i: None if stopped[i] else states[i].settled(trains[i], distances[i]), range(len(trains))
     )
     verdicts = {
         i: verdict(row, judged, tolerance, None, why, ends_at[i])
@@ -177,13 +159,11 @@ def _followed(
     # A start inside the pack would need its memory; such a train gets its exponent the long way.
     on_it = [i for i in left if not _in_pack(trains[i], states[i], 0)]
     begun = [(trains[i].regime, _state(states[i], 0)) for i in on_it]
-    for i, exponent in zip(on_it, exponents_onward(begun, _SHORT, tolerance, threads=threads), strict=True):
+    for i, exponent in zip(on_it, exponents_onward(begun, _SHORT, effort), strict=True):
         if exponent.smooth and exponent.value > _SURE * exponent.standard_error:
             verdicts[i] = verdict(distances[i], judged, tolerance, exponent)
     left = [i for i in left if i not in verdicts]
-    for i, exponent in zip(
-        left, exponents_of([trains[i] for i in left], judged, tolerance, threads=threads), strict=True
-    ):
+    for i, exponent in zip(left, exponents_of([trains[i] for i in left], judged, effort), strict=True):
         verdicts[i] = verdict(distances[i], judged, tolerance, exponent)
     return [verdicts[i] for i in range(len(trains))]
 

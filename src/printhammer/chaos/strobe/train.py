@@ -19,12 +19,12 @@ from printhammer.derivatives.states import Exponent
 from printhammer.drive.trains import Drive
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, part
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.regime import Regime, window_of
 from printhammer.run.start import AT_REST, HELD_BRANCHES, state_to_begin
 from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray
-from printhammer.support.threads import Progress, mapped, shifted
 
 State = tuple[float, ...]
 """Displacement, m, velocity, m/s, and what belongs to a state beside them: `printhammer.run.start.Beyond`."""
@@ -155,12 +155,10 @@ def _scales(train: Train) -> FloatArray:
 def run_trains(
     trains: Sequence[Train],
     chosen: IntArray,
-    tolerance: float,
     judged: tuple[int, int] | None,
+    effort: Effort,
     *,
     every_exponent: bool = False,
-    threads: int | None = None,
-    progress: Progress | None = None,
 ) -> tuple[list[States], list[Verdict | None]]:
     """Return the states of trains at chosen firings, each at the phase of its regime, and verdicts on them.
 
@@ -176,12 +174,12 @@ def run_trains(
     every = [np.union1d(mine, other) for mine, other in zip(own, theirs, strict=True)]
     after = np.array([max(int(chosen.max(initial=1)), int(firings.max(initial=1))) + 1])
     ends = [float(train.times(after)[0]) for train in trains]
-    tell = shifted(progress, 0, total if judged is None else 2 * total)
+    runs = effort.within(0, total if judged is None else 2 * total)
     current: FloatArray | None = None
     if all(forgets(train.regime) for train in trains):
-        x, v, branch, memory, names, reached = _in_stretches(trains, every, tolerance, threads, tell)
+        x, v, branch, memory, names, reached = _in_stretches(trains, every, runs)
     else:
-        result = _ensemble(trains, ends, tolerance).run(strobes=every, threads=threads, progress=tell)
+        result = _ensemble(trains, ends, runs.tolerance).run(strobes=every, **runs.running)
         table, names, reached = result.strobes, result.status_names, result.reached
         assert table is not None
         x, v, branch, memory, current = table.x, table.v, table.branch, table.memory, table.current
@@ -200,22 +198,20 @@ def run_trains(
     stopped = [names[i] if reached[i] < theirs[i][-1] else "" for i in range(total)]
     watched = [at(i, times) for i, times in enumerate(theirs)]
     distances = [of_train.distances(train) for of_train, train in zip(watched, trains, strict=True)]
-    ends_at = mapped(
-        lambda i: None if stopped[i] else watched[i].settled(trains[i], distances[i]), range(total), threads
+    ends_at = effort.quiet.mapped(
+        lambda i: None if stopped[i] else watched[i].settled(trains[i], distances[i]), range(total)
     )
     open_cases = [
         i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
     ]
-    tell = shifted(progress, 2 * total - len(open_cases), 2 * total)
-    exponents = exponents_of(
-        [trains[i] for i in open_cases], judged, tolerance, threads=threads, progress=tell
-    )
+    onward = effort.within(2 * total - len(open_cases), 2 * total)
+    exponents = exponents_of([trains[i] for i in open_cases], judged, onward)
     growth = dict(zip(open_cases, exponents, strict=True))
     return states, [
         verdict(
             distances[i],
             judged,
-            tolerance,
+            effort.tolerance,
             growth.get(i),
             stopped[i],
             ends_at[i],
@@ -240,11 +236,7 @@ def _ensemble(
 
 
 def _in_stretches(
-    trains: Sequence[Train],
-    every: Sequence[FloatArray],
-    tolerance: float,
-    threads: int | None,
-    progress: Progress | None,
+    trains: Sequence[Train], every: Sequence[FloatArray], effort: Effort
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, list[str], FloatArray]:
     """Return states of trains at times, s, a row each, how the runs ended, and up to when they got.
 
@@ -268,8 +260,8 @@ def _in_stretches(
             np.append(np.clip(every[i][some] - begin * trains[i].period, 0.0, end), end)
             for i, some, end in zip(left, columns, ends, strict=True)
         ]
-        result = _ensemble([trains[i] for i in left], ends, tolerance, states).run(
-            strobes=strobes, threads=threads
+        result = _ensemble([trains[i] for i in left], ends, effort.tolerance, states).run(
+            strobes=strobes, threads=effort.threads
         )
         table = result.strobes
         assert table is not None
@@ -286,20 +278,14 @@ def _in_stretches(
                 reached[i] = begin * trains[i].period + result.reached[row]
         going = [row for row, state in enumerate(onward) if state is not FROM_REST]
         left, states = [left[row] for row in going], np.array([onward[row][:2] for row in going])
-        if progress is not None:
-            progress(min(len(trains) * (begin + STRETCH) // (last + 1), len(trains)), len(trains))
+        effort.report(min(len(trains) * (begin + STRETCH) // (last + 1), len(trains)), len(trains))
         if not left:
             break
     return x, v, branch, memory, names, reached
 
 
 def exponents_onward(
-    begun: Sequence[tuple[Regime, tuple[float, ...]]],
-    points: int,
-    tolerance: float,
-    *,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    begun: Sequence[tuple[Regime, tuple[float, ...]]], points: int, effort: Effort
 ) -> list[Exponent]:
     """Return the largest exponents of trains that go on from states at a firing.
 
@@ -308,21 +294,14 @@ def exponents_onward(
     window = _BEFORE + 1, _BEFORE + points
     # What is left of the pulses before is left out: it is the same for all neighbouring motions.
     trains = [Train(regime, regime.pulses(window[1] + 2), state) for regime, state in begun]
-    return exponents_of(trains, window, tolerance, threads=threads, progress=progress)
+    return exponents_of(trains, window, effort)
 
 
-def exponents_of(
-    trains: Sequence[Train],
-    firings: tuple[int, int],
-    tolerance: float,
-    *,
-    threads: int | None = None,
-    progress: Progress | None = None,
-) -> list[Exponent]:
+def exponents_of(trains: Sequence[Train], firings: tuple[int, int], effort: Effort) -> list[Exponent]:
     """Return the largest exponents of trains, from the first to the last of some firings, on all cores."""
     from printhammer.derivatives.states import strobe_exponent
 
-    return mapped(
+    return effort.mapped(
         lambda train: strobe_exponent(
             train.hammer,
             train.drive,
@@ -330,9 +309,7 @@ def exponents_of(
             first=firings[0],
             last=firings[1],
             state=train.state,
-            tolerance=tolerance,
+            tolerance=effort.tolerance,
         ),
         trains,
-        threads,
-        progress,
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +20,7 @@ from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.estimator.sensor import PositionSensor
 from printhammer.control.feedback.plant import LARGEST_CURRENT, Driver, driver_of
 from printhammer.control.feedback.policy import OFFSETS, STEPS
-from printhammer.drive.input import read_number, read_positive
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
@@ -36,11 +36,10 @@ from printhammer.results.summary import (
     Summary,
     interval,
 )
-from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
     from printhammer.results.result import Entries
@@ -147,6 +146,7 @@ class Feedback(Result, rows=_DOTS):
         return self.plot(picture="run", **options)
 
 
+@computation
 def feedback(
     hammer: Hammer,
     rate: float | str,
@@ -158,9 +158,8 @@ def feedback(
     limits: Limits | None = None,
     beside: Sequence[Strategy] = (),
     gaps: npt.ArrayLike | None = None,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DISPLAY,
+    **_keywords: Unpack[Keywords],
 ) -> Feedback:
     """Drive a hammer with feedback, and compare it with the open loop.
 
@@ -178,18 +177,13 @@ def feedback(
         Largest current of the driver to either side, A.
     edge : float or str, optional
         Time constant of the driver, s; by default that with which the hammer's own waveform decays.
-    limits, threads
+    limits
         As for `printhammer.safe_rate`.
     beside : sequence of Strategy, optional
         Further ways to drive, for instance a compensation table.
     gaps : array, optional
         Times between the two slots of the double-pulse test, s; by default 46 from one and a half to six
         times the flight time of the single pulse.
-    tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
-    progress : callable, optional
-        Called now and then with the number of steps done and of all; most of them are tables of the
-        controller.
 
     Returns
     -------
@@ -207,16 +201,15 @@ def feedback(
     steps = tables + 2 * (2 + len(beside))
 
     def tell(done: int, _all: int) -> None:
-        if progress is not None:
-            progress(done, steps)
+        effort.report(done, steps)
 
     tell(0, steps)
-    controller = Controller(hammer, driver, bounds, threads=threads, progress=tell)
-    own = FeedbackStrategy(controller, position_sensor, tolerance=tolerance, threads=threads)
+    controller = Controller(hammer, driver, bounds, threads=effort.threads, progress=tell)
+    own = FeedbackStrategy(controller, position_sensor, tolerance=effort.tolerance, threads=effort.threads)
     every: list[Strategy] = [open_loop, *beside, own]
     if between is None:
         between = np.linspace(*_GAPS) * controller.single.flight_time
-    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
+    options: dict[str, Any] = {"limits": bounds, "effort": effort.quiet}
     patterns = from_rest(every=False)
     single = controller.single
     cases = [Case(actual, single, 1.0 / gap) for gap in between.tolist()]
@@ -245,8 +238,8 @@ def feedback(
         gaps=between,
         gap_force=np.array([double.judgement.force_deviation[:, 1] for double in doubles]),
         gap_arrival=np.array([double.judgement.arrival_deviation[:, 1] for double in doubles]),
-        run=_observed(actual, own, slot_rate, tolerance),
-        tolerance=read_number(tolerance, "1", "tolerance"),
+        run=_observed(actual, own, slot_rate, effort.tolerance),
+        tolerance=effort.tolerance,
     )
 
 

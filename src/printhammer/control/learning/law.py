@@ -253,11 +253,10 @@ class LearningLaw:
                 limits=task.limits,
                 brake=task.brake,
                 largest_current=task.largest,
-                tolerance=task.tolerance,
-                threads=task.threads,
+                effort=task.effort,
             )
             base = np.array([getattr(table, name)[0] for name in COLUMNS])
-            sooner = nominal(struck, tolerance=task.tolerance).flight_time - single.flight_time
+            sooner = nominal(struck, tolerance=task.effort.tolerance).flight_time - single.flight_time
             base[ADVANCE] += sooner
             base[DELAY] = np.where(base[DELAY] > 0.0, np.maximum(base[DELAY] - sooner, task.brake_from), 0.0)
             return replace(self, entries=self.entries.started_from(base))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, SupportsIndex
+from typing import Any, NamedTuple, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from printhammer.results.summary import (
     Grid,
     Summary,
 )
+from printhammer.run.effort import DEFAULT, AtFixedTolerance, Effort, computation
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import together
 
@@ -178,6 +179,7 @@ class Learning(Result, rows=_DOTS):
         }
 
 
+@computation
 def learn(
     hammer: Hammer,
     unit: Hammer | None = None,
@@ -195,8 +197,8 @@ def learn(
     doubt: float = DOUBT,
     serial: str = "unit",
     seed: int = 1983,
-    threads: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[AtFixedTolerance],
 ) -> Learning:
     """Let a hammer that nobody has measured calibrate its compensation table, from one number a dot.
 
@@ -213,7 +215,7 @@ def learn(
         The hammer that is driven; by default one drawn from the variability with the seed.
     rate : float or str
         Slots per second, Hz, or text with a unit.
-    driver, limits, history, reach, largest_current, threads
+    driver, limits, history, reach, largest_current
         As for `printhammer.tune`; by default a fast switch. "own" for a hammer whose coil a driver switches:
         advance and time on the rail are then learned.
     sensor : ImpactSensor, optional
@@ -232,8 +234,6 @@ def learn(
         Serial number of the unit; the table is refused for another one.
     seed : int, optional
         Of the simulated hammers, and of the unit where none is given.
-    progress : callable, optional
-        Called now and then with the number of steps done and of all.
 
     Returns
     -------
@@ -252,8 +252,7 @@ def learn(
     steps, total = iter(range(1, 3)), 2 + len(RUNS)
 
     def report() -> None:
-        if progress is not None:
-            progress(next(steps, total), total)
+        effort.report(next(steps, total), total)
 
     law, base = law_for(
         hammer,
@@ -269,7 +268,7 @@ def learn(
         forgetting=forgetting,
         doubt=doubt,
         seed=seed,
-        threads=threads,
+        threads=effort.threads,
         report=report,
     )
     driven = spread.draw(hammer, 1, seed + 1)[0] if unit is None else unit

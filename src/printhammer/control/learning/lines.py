@@ -34,6 +34,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Judgement, judge
 from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.strategy import cycle_with_lead_in, slot_times, slots_of
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import DotTable, Ensemble
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import BoolArray, FloatArray
@@ -122,7 +123,9 @@ def candidates(task: Task) -> list[Rung]:
         if first > widest:
             continue
         drive = PulseTrain(of_width(task.pulse, first * task.width))
-        contacts = simulate(hammer, drive, duration=task.single.settled, tolerance=task.tolerance).contacts
+        contacts = simulate(
+            hammer, drive, duration=task.single.settled, tolerance=task.effort.tolerance
+        ).contacts
         dot = next((contact for contact in contacts if contact.surface == "pack"), None)
         if dot is None or dot.t_out is None:
             continue
@@ -266,10 +269,10 @@ class Press:
 
 def printed(work: Printing[T], task: Task) -> T:
     """Do a work to its end, and print what it asks for."""
-    return answered(work, partial(_run, tolerance=task.tolerance, threads=task.threads))
+    return answered(work, partial(_run, effort=task.effort))
 
 
-def _run(orders: Sequence[Order], tolerance: float, threads: int | None) -> list[Printed]:
+def _run(orders: Sequence[Order], effort: Effort) -> list[Printed]:
     """Print what is ordered, in few ensembles."""
     done: list[Printed] = []
     while len(done) < len(orders):
@@ -284,8 +287,8 @@ def _run(orders: Sequence[Order], tolerance: float, threads: int | None) -> list
             [hammer for order in batch for hammer in order.hammers],
             [drive for order in batch for drive in order.drives],
             np.repeat([order.end for order in batch], [len(order.hammers) for order in batch]),
-            tolerance=tolerance,
-        ).run(dots=True, threads=threads)
+            tolerance=effort.tolerance,
+        ).run(dots=True, threads=effort.threads)
         assert result.dots is not None
         first = 0
         for order in batch:

@@ -19,6 +19,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.rates.variability import Variability
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.threads import together
 
@@ -74,8 +75,7 @@ def law_for(
         single=single_of(driven, pulse, DISPLAY_TOLERANCE),
         limits=bounds,
         brake=True,
-        tolerance=DISPLAY_TOLERANCE,
-        threads=threads,
+        effort=Effort(DISPLAY_TOLERANCE, threads),
         report=report,
     )
     base = np.array([getattr(table, name)[0] for name in COLUMNS])

@@ -12,9 +12,8 @@ the force asked for at its time. After the last dot the coil lets it down on the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, SupportsIndex, Unpack, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +45,7 @@ from printhammer.results.summary import (
     styled,
 )
 from printhammer.run.contacts import Contact
+from printhammer.run.effort import Effort, InOneThread, computation
 from printhammer.run.energy import CoilWork, Ledger, coil_power, stored_energy
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.motion import Motion
@@ -346,6 +346,10 @@ class LeastWork(Result, rows="node"):
         return frame(columns, ("node",), plain(self.attributes))
 
 
+_SEARCH: Final = Effort(1e-9)
+
+
+@computation
 def least_work(
     hammer: Hammer,
     rate: float | str = 1000.0,
@@ -357,10 +361,12 @@ def least_work(
     least: Least = "positive work",
     shape: Shape = "free",
     spacing: float | str | None = None,
-    tolerance: float = 1e-9,
-    progress: Callable[[int, int], None] | None = None,
+    effort: Effort = _SEARCH,
+    **_keywords: Unpack[InOneThread],
 ) -> LeastWork:
     """Find the current that prints a burst of adequate dots with least work, rest to rest.
+
+    The tolerance is that of the search; the drive it finds is run at the tolerance of the ledger.
 
     Parameters
     ----------
@@ -385,10 +391,6 @@ def least_work(
     spacing : float or str, optional
         Time between nodes of the current, s, or text with a unit, rounded so that a period holds a whole
         number of them; by default `SPACING` of the time in which a single pulse indents the pack.
-    tolerance : float, optional
-        As for `printhammer.simulate`, in the search; what it found is run at the tolerance of the ledger.
-    progress : callable, optional
-        Called with the number of slots planned and of all, the landing among them.
 
     Returns
     -------
@@ -449,7 +451,14 @@ def least_work(
     limits = bound(hammer, single, share, top)
     wanted = share * (1.0 + _SPARE) * single.force
     task = Task(
-        hammer, CoilForce(hammer, top), top, steepest, wanted, limits.loading, least == "heat", tolerance
+        hammer,
+        CoilForce(hammer, top),
+        top,
+        steepest,
+        wanted,
+        limits.loading,
+        least == "heat",
+        effort.tolerance,
     )
     touch = next(contact for contact in alone.contacts if contact.surface == "pack")
     indenting = touch.t_peak - touch.t_in
@@ -470,11 +479,9 @@ def least_work(
                 f"no {what} dot {slot + 1} of {count} with {share:g} of the force of the single pulse at"
                 f" {1.0 / period:.6g} Hz"
             )
-        if progress is not None:
-            progress(slot + 1, count + 1)
+        effort.report(slot + 1, count + 1)
     plan.land()
-    if progress is not None:
-        progress(count + 1, count + 1)
+    effort.report(count + 1, count + 1)
     drive = plan.drive()
     motion = simulate(hammer, drive, duration=drive.end + CYCLE, tolerance=TOLERANCE, ledger=True)
     return LeastWork(
@@ -492,5 +499,5 @@ def least_work(
         single=single,
         single_work=alone.coil_work,
         bound=limits,
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any, Final, Unpack
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from printhammer.results.summary import (
     Summary,
     styled,
 )
-from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray
 
 PERTURBATIONS: Final = (
@@ -114,6 +114,7 @@ class TableReport(Result, rows=_AXES):
         return {"force_limit": self.limits.force, "arrival_limit": self.limits.arrival}
 
 
+@computation
 def judge_table(
     hammer: Hammer,
     table: CompensationTable,
@@ -122,9 +123,8 @@ def judge_table(
     perturbations: Sequence[Perturbation] = PERTURBATIONS,
     limits: Limits | None = None,
     seed: int = 1983,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    effort: Effort = DISPLAY,
+    **_keywords: Unpack[Keywords],
 ) -> TableReport:
     """Judge a table beside open loop.
 
@@ -143,14 +143,10 @@ def judge_table(
         that lie between them.
     perturbations : sequence of Perturbation, optional
         How the hammers differ; by default `PERTURBATIONS`.
-    limits, threads
+    limits
         As for `printhammer.safe_rate`.
     seed : int, optional
         Of the random patterns.
-    tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
-    progress : callable, optional
-        Called now and then with the number of trials done and of all.
 
     Returns
     -------
@@ -170,7 +166,7 @@ def judge_table(
     if not asked.size or not perturbations:
         raise InputError("rates, perturbations: expected at least one of each", key="rates")
     bounds = Limits() if limits is None else limits
-    single: Nominal = nominal(hammer, tolerance=tolerance)
+    single: Nominal = nominal(hammer, tolerance=effort.tolerance)
     driven = [perturbed(hammer, by) for by in perturbations]
     sets = [from_rest(every=True), [slots_of(cycle_with_lead_in())], random_patterns(seed)]
     shape = len(strategies), len(driven), asked.size, len(sets)
@@ -186,8 +182,7 @@ def judge_table(
                     strategy,
                     limits=bounds,
                     judged_from=LEAD_IN if p == 1 else 0,
-                    tolerance=tolerance,
-                    threads=threads,
+                    effort=effort.quiet,
                 )
                 judgement = trial.judgement
                 for c in range(len(driven)):
@@ -203,8 +198,7 @@ def judge_table(
                         (judgement.force_deviation[0][wanted], judgement.arrival_deviation[0][wanted])
                     )
                 done += 1
-                if progress is not None:
-                    progress(done, len(strategies) * len(sets) * asked.size)
+                effort.report(done, len(strategies) * len(sets) * asked.size)
     return TableReport(
         table=table,
         hammer=hammer,
@@ -219,7 +213,7 @@ def judge_table(
         force_deviation=np.array([force for force, _arrival in deviations]),
         arrival_deviation=np.array([late for _force, late in deviations]),
         seed=seed,
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
     )
 
 

@@ -19,6 +19,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.settling import settled_from, touches
+from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import BoolArray, FloatArray
@@ -81,8 +82,7 @@ class Task:
     single: Single
     limits: Limits
     brake: bool
-    tolerance: float
-    threads: int | None
+    effort: Effort
     report: Callable[[], None]
     mean_square: bool = False
     """Whether the cost of a way is the root of the mean square over all hammers, not that of the worst."""
@@ -139,8 +139,10 @@ class Task:
         off, crowded = np.full((*slots.shape, 2), np.nan), np.zeros(slots.shape, np.bool_)
         for start in range(0, len(drives), _PIECE):
             rows = slice(start, start + _PIECE)
-            ensemble = Ensemble(hammer, list(drives[rows]), ends[rows] + _TAIL, tolerance=self.tolerance)
-            result = ensemble.run(dots=True, threads=self.threads)
+            ensemble = Ensemble(
+                hammer, list(drives[rows]), ends[rows] + _TAIL, tolerance=self.effort.tolerance
+            )
+            result = ensemble.run(dots=True, threads=self.effort.threads)
             dots = result.dots
             assert dots is not None
             own = rows, slice(dots.fired_at.shape[1])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Final, SupportsIndex
+from typing import Final, SupportsIndex, Unpack
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.rates.variability import Perturbation, Variability, perturbed
-from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray, IntArray
 
 HALVINGS: Final = 3  # How often the step between two rates is halved at most
@@ -123,6 +123,7 @@ _POOR: Final = 0.5  # Deviation, in parts of the limits, above which a given rat
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
 
 
+@computation
 def tune(
     hammer: Hammer,
     *,
@@ -136,9 +137,8 @@ def tune(
     driver: str = "own",
     variability: Variability | None = None,
     largest_current: float | str = LARGEST_CURRENT,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    effort: Effort = DISPLAY,
+    **_keywords: Unpack[Keywords],
 ) -> CompensationTable:
     """Tune a compensation table: pulse width and advance as a function of the last gaps between dots.
 
@@ -181,12 +181,6 @@ def tune(
         off in the mean square, over this hammer and the sigma points of the variability.
     largest_current : float or str, optional
         Bound on the current, A, or text with a unit.
-    tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
-    threads : int, optional
-        By default as many as there are cores; the table does not depend on it.
-    progress : callable, optional
-        Called now and then with the number of steps done and of all, at most.
 
     Returns
     -------
@@ -198,7 +192,7 @@ def tune(
     largest = read_positive(largest_current, "A", "largest_current")
     driven = driven_by(hammer, driver, largest)
     pulse, widest = print_pulse(driven, largest)
-    single = single_of(driven, pulse, tolerance)
+    single = single_of(driven, pulse, effort.tolerance)
     if rate is not None and rates is not None:
         raise InputError("rate and rates are given", key="rates", expected="one of them")
     asked = [rate] if rate is not None else rates
@@ -222,9 +216,8 @@ def tune(
         single=single,
         limits=bounds,
         brake=brake,
-        tolerance=tolerance,
-        threads=threads,
-        report=_counter(progress, steps),
+        effort=effort.quiet,
+        report=_counter(effort, steps),
         mean_square=variability is not None,
     )
     draft = _tuned(task, grid, open_ended=asked is None)
@@ -252,14 +245,13 @@ def _spread(hammer: Hammer) -> list[Hammer]:
     return hammers
 
 
-def _counter(progress: Callable[[int, int], None] | None, total: int) -> Callable[[], None]:
+def _counter(effort: Effort, total: int) -> Callable[[], None]:
     """Return a function that reports one more step of the work each time that it is called."""
     steps = iter(range(1, total + 1))
 
     def count() -> None:
         step = next(steps, total)
-        if progress is not None:
-            progress(step, total)
+        effort.report(step, total)
 
     return count
 

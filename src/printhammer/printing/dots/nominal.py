@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Unpack
 
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, scalar
+from printhammer.run.effort import DEFAULT, Effort, InThreads, computation
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
@@ -76,12 +77,13 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
     return Nominal(*known)
 
 
+@computation
 def single_pulses(
     hammers: Sequence[Hammer],
     waveforms: Sequence[Waveform] | None = None,
     *,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[InThreads],
 ) -> list[SinglePulse | None]:
     """Fire many hammers that have packs once each from rest, their own waveforms or others.
 
@@ -92,7 +94,9 @@ def single_pulses(
     pulses = [pulse_of(hammer) for hammer in hammers] if waveforms is None else waveforms
     drives = [PulseTrain(pulse) for pulse in pulses]
     wait = max(wait_of(pulse) for pulse in pulses)
-    result = Ensemble(list(hammers), drives, wait, tolerance=tolerance).run(dots=True, threads=threads)
+    result = Ensemble(list(hammers), drives, wait, tolerance=effort.tolerance).run(
+        dots=True, threads=effort.threads
+    )
     dots = result.dots
     assert dots is not None
     good = result.ok & dots.struck[:, 0]

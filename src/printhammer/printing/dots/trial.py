@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from printhammer.printing.dots.judging import Judgement, Limits, judge
 from printhammer.printing.dots.nominal import WAIT, SinglePulse
 from printhammer.printing.dots.strategy import FIRST_SLOT, Strategy, checked_drives, open_loop
 from printhammer.results import Declared, column, part
+from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.ensemble import DotTable, Ensemble, ExtraDots
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-from printhammer.support.threads import Progress
 
 
 class Case(NamedTuple):
@@ -53,17 +53,17 @@ class Trial(Declared):
         return slice(case * len(self.patterns), (case + 1) * len(self.patterns))
 
 
+@computation
 def attempt(
     cases: Sequence[Case],
     patterns: Sequence[tuple[int, ...]],
     strategy: Strategy = open_loop,
     *,
     limits: Limits,
-    tolerance: float,
     judged_from: int = 0,
     extra: bool = False,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[Keywords],
 ) -> Trial:
     """Print all of some patterns in all of some cases, from rest.
 
@@ -82,8 +82,8 @@ def attempt(
     # A drive may fire its last dot ahead of the slot, or after it.
     ends = np.maximum(firings_of(drives).last, due.max(axis=1)) + WAIT
     hammers = [case.hammer for case in cases for _ in patterns]
-    result = Ensemble(hammers, drives, ends, tolerance=tolerance).run(
-        dots=True, extra=extra, threads=threads, progress=progress
+    result = Ensemble(hammers, drives, ends, tolerance=effort.tolerance).run(
+        dots=True, extra=extra, **effort.running
     )
     dots = result.dots
     assert dots is not None

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -42,9 +42,8 @@ from printhammer.results.summary import (
     Summary,
     quantity,
 )
-from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
-from printhammer.support.threads import Progress
 
 if TYPE_CHECKING:
     from printhammer.results.result import Entries
@@ -341,6 +340,7 @@ def darkness(density: npt.ArrayLike) -> FloatArray:
     return np.asarray(1.0 - 10.0 ** -np.asarray(density, dtype=np.float64))
 
 
+@computation
 def print_page(
     hammer: Hammer,
     what: Pattern | str,
@@ -350,9 +350,8 @@ def print_page(
     strategy: Strategy = open_loop,
     head: Head | None = None,
     limits: Limits | None = None,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DISPLAY,
+    **_keywords: Unpack[Keywords],
 ) -> Page:
     """Print a pattern, or a text in the built-in font, with a hammer on every wire.
 
@@ -367,14 +366,10 @@ def print_page(
         in a slot.
     waveform : Waveform, optional
         What every firing does in open loop, and the single pulse; by default the hammer's own.
-    strategy, limits, threads
+    strategy, limits
         As for `printhammer.safe_rate`.
     head : Head, optional
         Where the wires are, and how thick; by default `printhammer.printing.page.page.head_of` their number.
-    tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
-    progress : callable, optional
-        Called now and then with the number of runs done and of all.
 
     Returns
     -------
@@ -393,26 +388,20 @@ def print_page(
             f"head: {print_head.wires} wires", key="head", expected=f"{pattern.wires} as the pattern has"
         )
     bounds = PRESETS["slots"] if limits is None else limits
-    single = nominal(hammer, waveform, tolerance=tolerance)
+    single = nominal(hammer, waveform, tolerance=effort.tolerance)
     if waveform is not None and strategy is open_loop:
         strategy = OpenLoop(waveform)
-    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     run_line, run_wire = np.nonzero(pattern.dots.any(axis=2))
     rows = [slots_of(row) for row in pattern.dots[run_line, run_wire]]
     pieces = []
     for first in range(0, len(rows), _PIECE):
-
-        def tell(done: int, _all: int, begun: int = first) -> None:
-            if progress is not None:
-                progress(begun + done, len(rows))
-
         trial = attempt(
             [Case(hammer, single, slot_rate)],
             rows[first : first + _PIECE],
             strategy,
-            progress=tell,
+            limits=bounds,
             extra=True,
-            **options,
+            effort=effort.within(first, len(rows)),
         )
         pieces.append(_dots_of(trial))
     counts = np.array([len(slots) for slots in rows])
@@ -433,7 +422,7 @@ def print_page(
         slot=np.concatenate([np.asarray(slots) for slots in rows]),
         run_line=run_line,
         run_wire=run_wire,
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
         **joined,
     )
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, Unpack
 
 import numpy as np
 
@@ -36,9 +36,8 @@ from printhammer.results.summary import (
     Summary,
     styled,
 )
-from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray, TextArray
-from printhammer.support.threads import Progress
 
 KINDS: Final = ("as it is", "hard", "elastomer", "pack")
 """What may be changed: nothing, the constants of the hard backstop, the backstop for an elastomer, the
@@ -242,6 +241,7 @@ class DampingStudy(Result):
 _NUMBERS: Final = tuple(name for name, note in columns_of(DampingStudy).items() if note.dims and note.unit)
 
 
+@computation
 def damping_study(
     hammer: Hammer,
     others: Sequence[Material] | None = None,
@@ -251,11 +251,13 @@ def damping_study(
     first: float | str = FIRST,
     last: float | str = LAST,
     step: float | str = STEP,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DISPLAY,
+    **_keywords: Unpack[Keywords],
 ) -> DampingStudy:
     """Exchange the materials of backstop and pack, and see what settles sooner and prints faster.
+
+    The tolerance is that of print forces and safe rates. Settling is always computed at the default tolerance
+    of `printhammer.simulate`.
 
     Parameters
     ----------
@@ -265,13 +267,8 @@ def damping_study(
         What is exchanged; by default those of `printhammer.printing.rates.damping.materials`.
     current : float or str, optional
         Largest current allowed, A, or text with a unit.
-    limits, first, last, step, threads
+    limits, first, last, step
         As for `printhammer.safe_rate`.
-    tolerance : float, optional
-        As for `printhammer.simulate`, of print forces and safe rates; by default that for pictures. Settling
-        is always computed with the default one of `printhammer.simulate`.
-    progress : callable, optional
-        Called now and then with the number of materials done and of all.
 
     Returns
     -------
@@ -296,7 +293,7 @@ def damping_study(
             key="waveform",
             expected="a current",
         )
-    single = nominal(hammer, tolerance=tolerance)
+    single = nominal(hammer, tolerance=effort.tolerance)
     tried = tuple(materials(hammer, single) if others is None else others)
     if not tried:
         raise InputError("others: expected at least one material", key="others")
@@ -304,7 +301,7 @@ def damping_study(
     status = np.array(fate, "U17")
     values = {name: np.full(len(tried), np.nan) for name in _NUMBERS}
     resting = np.flatnonzero(status == "ok")
-    factors = tuned([made[k] for k in resting], single.force, tolerance=tolerance, threads=threads)
+    factors = tuned([made[k] for k in resting], single.force, effort.quiet)
     values["amplitude"][resting] = factors
     status[resting[np.isnan(factors)]] = "force not reached"
     values["peak_current"] = pulse.peak * values["amplitude"]
@@ -313,7 +310,7 @@ def damping_study(
     for k, factor in zip(left.tolist(), values["amplitude"][left].tolist(), strict=True):
         larger = pulse_of(made[k]).scaled(factor)
         driven.append(made[k].replace("waveform", larger, source="the same print force"))
-    dots = single_pulses(driven, tolerance=tolerance, threads=threads)
+    dots = single_pulses(driven, effort=effort.quiet)
     for k, exchanged, dot in zip(left.tolist(), driven, dots, strict=True):
         # At the default tolerance: energies of single runs are not worth a risk.
         settling = settle(exchanged)
@@ -336,9 +333,7 @@ def damping_study(
             values[name][k] = math.nan if value is None else value
     run = [n for n, k in enumerate(left.tolist()) if status[k] == "ok"]
     hammers, singles = [driven[n] for n in run], [dot for n in run if (dot := dots[n]) is not None]
-    values["safe_rate"][left[run]] = safe_rates(
-        hammers, singles, grid, limits=bounds, tolerance=tolerance, threads=threads, progress=progress
-    )
+    values["safe_rate"][left[run]] = safe_rates(hammers, singles, grid, limits=bounds, effort=effort)
     over = (status == "ok") & (values["peak_current"] > allowed)
     status[over] = "current limit"
     return DampingStudy(
@@ -350,13 +345,11 @@ def damping_study(
         status=status,
         **values,
         grid=grid,
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
     )
 
 
-def tuned(
-    hammers: Sequence[Hammer], force: float, *, tolerance: float, threads: int | None = None
-) -> FloatArray:
+def tuned(hammers: Sequence[Hammer], force: float, effort: Effort) -> FloatArray:
     """Return factors on the amplitudes of waveforms with which single pulses print with a force.
 
     The factor is looked for from `LEAST` to `MOST` on a grid, then on ever finer ones: where the force first
@@ -377,8 +370,7 @@ def tuned(
         dots = single_pulses(
             [hammer for hammer, _ in trials],
             [pulse_of(hammer).scaled(scale) for hammer, scale in trials],
-            tolerance=tolerance,
-            threads=threads,
+            effort=effort,
         )
         forces = np.array([0.0 if dot is None else dot.force for dot in dots]).reshape(scales.shape)
         rises = (forces[:, :-1] < force) & (forces[:, 1:] >= force)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any, Final, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -40,9 +40,8 @@ from printhammer.results.summary import (
     Summary,
     styled,
 )
-from printhammer.run.problem import TOLERANCE
+from printhammer.run.effort import DEFAULT, Effort, InThreads, computation
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
-from printhammer.support.threads import Progress
 
 FIRST: Final = 100.0  # First rate of the grid, Hz
 
@@ -171,6 +170,7 @@ class SafeRate(Result):
         }
 
 
+@computation
 def safe_rate(
     hammer: Hammer,
     strategy: Strategy = open_loop,
@@ -182,9 +182,9 @@ def safe_rate(
     step: float | str = STEP,
     stop: bool = True,
     cycle: bool = True,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
     progress: Callable[[float], None] | None = None,
+    effort: Effort = DEFAULT,
+    **_keywords: Unpack[InThreads],
 ) -> SafeRate:
     """Find the largest rate up to which a hammer prints every pattern well.
 
@@ -206,10 +206,6 @@ def safe_rate(
         as well, for a chart.
     cycle : bool, optional
         Whether the dots of the cycle have to be within limits too, beside those of the patterns from rest.
-    tolerance : float, optional
-        As for `printhammer.simulate`.
-    threads : int, optional
-        By default as many as there are cores; the result does not depend on it.
     progress : callable, optional
         Called with the rate, Hz, up to which all is run.
 
@@ -220,10 +216,10 @@ def safe_rate(
     """
     grid = rate_grid(first, last, step)
     bounds = Limits() if limits is None else limits
-    single = single_pulse(hammer, tolerance=tolerance) if nominal is None else nominal
+    single = single_pulse(hammer, tolerance=effort.tolerance) if nominal is None else nominal
     patterns = from_rest(every=strategy is not open_loop)
     around_it = [slots_of(cycle_with_lead_in())]
-    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
+    options: dict[str, Any] = {"limits": bounds, "effort": effort}
     rows: list[dict[str, Any]] = []
     failure: Failure | None = None
     safe = math.nan
@@ -265,7 +261,7 @@ def safe_rate(
             (drive.peak for trial, case in best for drive in trial.drives[trial.rows(case)]), default=math.nan
         ),
         step=read_positive(step, "Hz", "step"),
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
         **{name: np.array([row[name] for row in rows]) for name in rows[0]},
     )
 
@@ -353,14 +349,13 @@ def all_pass(
     strategy: Strategy = open_loop,
     *,
     limits: Limits,
-    tolerance: float,
-    threads: int | None = None,
+    effort: Effort,
 ) -> BoolArray:
     """Return whether all patterns from rest, and the cycle, are within limits, for each hammer at a rate.
 
     Arguments as for `printhammer.printing.dots.trial.attempt`.
     """
-    options: dict[str, Any] = {"limits": limits, "tolerance": tolerance, "threads": threads}
+    options: dict[str, Any] = {"limits": limits, "effort": effort}
     patterns = from_rest(every=strategy is not open_loop)
     cycle = [slots_of(cycle_with_lead_in())]
     passed = np.zeros(len(cases), dtype=np.bool_)
@@ -381,24 +376,21 @@ def safe_rates(
     strategy: Strategy = open_loop,
     *,
     limits: Limits,
-    tolerance: float,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort,
 ) -> FloatArray:
     """Return the safe rates of some hammers on a grid of ascending rates, Hz; arguments as for `all_pass`.
 
-    Each hammer is judged by its own one of `singles`; `progress` is called with the number of hammers whose
-    rate is found, and of all. The rate is NaN where not even the first one of the grid passes, and the last
+    Each hammer is judged by its own one of `singles`; progress is the number of hammers whose rate
+    is found, and of all. The rate is NaN where not even the first one of the grid passes, and the last
     one where all pass.
     """
     rates = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))
     for rate in grid.tolist():
         cases = [Case(hammers[k], singles[k], rate) for k in alive.tolist()]
-        alive = alive[all_pass(cases, strategy, limits=limits, tolerance=tolerance, threads=threads)]
+        alive = alive[all_pass(cases, strategy, limits=limits, effort=effort.quiet)]
         rates[alive] = rate
-        if progress is not None:
-            progress(len(hammers) - alive.size, len(hammers))
+        effort.report(len(hammers) - alive.size, len(hammers))
         if not alive.size:
             break
     return rates

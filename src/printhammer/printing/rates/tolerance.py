@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any, Final, Literal, SupportsIndex, get_args
+from typing import Any, Final, Literal, SupportsIndex, Unpack, get_args
 
 import numpy as np
 
@@ -25,9 +25,8 @@ from printhammer.results.summary import (
     Summary,
     styled,
 )
-from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
-from printhammer.support.threads import Progress
 
 SPREAD: Final = 0.01  # Relative spread of a constant, to either side, by default
 
@@ -163,6 +162,7 @@ class ToleranceYield(Result):
         return float((self.safe_rates >= rate).mean())
 
 
+@computation
 def tolerance_yield(
     hammer: Hammer,
     rate: float | str | None = None,
@@ -176,9 +176,8 @@ def tolerance_yield(
     first: float | str = FIRST,
     last: float | str = LAST,
     step: float | str = STEP,
-    tolerance: float = DISPLAY_TOLERANCE,
-    threads: int | None = None,
-    progress: Progress | None = None,
+    effort: Effort = DISPLAY,
+    **_keywords: Unpack[Keywords],
 ) -> ToleranceYield:
     """Draw hammers whose constants are spread about those of a design, and see which print well.
 
@@ -201,12 +200,8 @@ def tolerance_yield(
     judged_by : str, optional
         "own": the dots of a hammer are judged by its own single pulse, as if each were adjusted; "design": by
         that of the design.
-    strategy, limits, first, last, step, threads
+    strategy, limits, first, last, step
         As for `printhammer.safe_rate`.
-    tolerance : float, optional
-        As for `printhammer.simulate`; by default that for pictures.
-    progress : callable, optional
-        Called now and then with the number of hammers done and of all.
 
     Returns
     -------
@@ -220,9 +215,8 @@ def tolerance_yield(
         raise InputError.of("judged_by", judged_by, f"one of {', '.join(get_args(Judged))}")
     grid = rate_grid(first, last, step) if rate is None else np.array([read_positive(rate, "Hz", "rate")])
     bounds = Limits() if limits is None else limits
-    options: dict[str, Any] = {"limits": bounds, "tolerance": tolerance, "threads": threads}
     spread = spreads_of(hammer, spreads)
-    design = nominal(hammer, tolerance=tolerance)
+    design = nominal(hammer, tolerance=effort.tolerance)
     factors = draw(spread, count, int(seed))
     made, fate = changed(
         hammer, [(row, "drawn within its spread") for row in _changes(hammer, spread, factors)]
@@ -230,7 +224,7 @@ def tolerance_yield(
     status = np.array(fate, "U16")
     resting = np.flatnonzero(status == "ok")
     force, flight = np.full(count, np.nan), np.full(count, np.nan)
-    alone = single_pulses([made[k] for k in resting], tolerance=tolerance, threads=threads)
+    alone = single_pulses([made[k] for k in resting], effort=effort.quiet)
     for k, dot in zip(resting.tolist(), alone, strict=True):
         if dot is None:
             status[k] = "makes no dot"
@@ -242,13 +236,12 @@ def tolerance_yield(
     judges = [design] * len(left) if judged_by == "design" else singles
     passed, rates = np.zeros(count, dtype=np.bool_), np.full(count, np.nan)
     if rate is None:
-        rates[left] = safe_rates(hammers, judges, grid, strategy, progress=progress, **options)
+        rates[left] = safe_rates(hammers, judges, grid, strategy, limits=bounds, effort=effort)
         passed = ~np.isnan(rates)
     elif left.size:
         cases = [Case(other, judge, float(grid[0])) for other, judge in zip(hammers, judges, strict=True)]
-        passed[left] = all_pass(cases, strategy, **options)
-        if progress is not None:
-            progress(count, count)
+        passed[left] = all_pass(cases, strategy, limits=bounds, effort=effort.quiet)
+        effort.report(count, count)
     return ToleranceYield(
         hammer=hammer,
         strategy=name_of(strategy),
@@ -264,7 +257,7 @@ def tolerance_yield(
         safe_rates=rates,
         grid=grid,
         seed=int(seed),
-        tolerance=tolerance,
+        tolerance=effort.tolerance,
     )
 
 

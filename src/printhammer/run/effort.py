@@ -1,0 +1,173 @@
+"""Effort: the tolerance, the threads and the progress of a computation, in one object.
+
+A public function takes them as the keywords `tolerance`, `threads` and `progress`. It is decorated by
+`computation`, which declares and documents the keywords, checks their values once and passes one `Effort` on.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, TypedDict, TypeVar
+
+from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.run.problem import TOLERANCE, check_tolerance
+from printhammer.support.threads import Progress, mapped, shifted, thread_count
+
+A = TypeVar("A")
+B = TypeVar("B")
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class OfTolerance(TypedDict, total=False):
+    """The keyword `tolerance` of a public function."""
+
+    tolerance: float
+
+
+class OfThreads(TypedDict, total=False):
+    """The keyword `threads` of a public function."""
+
+    threads: int | None
+
+
+class OfProgress(TypedDict, total=False):
+    """The keyword `progress` of a public function."""
+
+    progress: Progress | None
+
+
+class InThreads(OfTolerance, OfThreads):
+    """Keywords of a public function without progress."""
+
+
+class InOneThread(OfTolerance, OfProgress):
+    """Keywords of a public function that works in the calling thread."""
+
+
+class AtFixedTolerance(OfThreads, OfProgress):
+    """Keywords of a public function that chooses its tolerances itself."""
+
+
+class Keywords(OfTolerance, OfThreads, OfProgress):
+    """The keywords `tolerance`, `threads` and `progress` of a public function."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Tolerance, threads and progress of a computation. Only the tolerance changes its result."""
+
+    tolerance: float = TOLERANCE
+    """Error allowed in one integration step."""
+    threads: int | None = None
+    """Number of threads; None for one per core."""
+    progress: Progress | None = None
+    """Called with the number of steps done and of all."""
+
+    def __post_init__(self) -> None:
+        check_tolerance(self.tolerance)
+        thread_count(self.threads)
+
+    @property
+    def quiet(self) -> Effort:
+        """The same effort without progress, for a part of the work."""
+        return replace(self, progress=None)
+
+    @property
+    def alone(self) -> Effort:
+        """The same effort in the calling thread and without progress, for work inside a thread."""
+        return Effort(self.tolerance, threads=1)
+
+    @property
+    def running(self) -> AtFixedTolerance:
+        """Keywords of a run of an ensemble, which has its tolerance already."""
+        return {"threads": self.threads, "progress": self.progress}
+
+    def at(self, tolerance: float) -> Effort:
+        """Return the same effort at another tolerance, without progress."""
+        return Effort(tolerance, self.threads)
+
+    def within(self, begun: int, total: int) -> Effort:
+        """Return the effort of a part of the work, whose progress counts on from `begun` of `total`."""
+        return replace(self, progress=shifted(self.progress, begun, total))
+
+    def report(self, done: int, total: int) -> None:
+        """Report progress, if it was asked for."""
+        if self.progress is not None:
+            self.progress(done, total)
+
+    def mapped(self, function: Callable[[A], B], items: Sequence[A], *, length: int | None = None) -> list[B]:
+        """Return the values of a function at some items, as `printhammer.support.threads.mapped`."""
+        return mapped(function, items, self.threads, self.progress, length=length)
+
+
+DEFAULT: Final = Effort()
+DISPLAY: Final = Effort(DISPLAY_TOLERANCE)
+
+_ENTRIES: Final = {
+    "tolerance": """tolerance : float, optional
+    Error allowed in one integration step, relative to the stroke and to a typical speed, as for
+    `printhammer.simulate`.""",
+    "threads": """threads : int, optional
+    Number of threads, by default one per core. The result does not depend on it.""",
+    "progress": """progress : callable, optional
+    Called now and then, in the calling thread, with the number of steps done and the number of all steps,
+    as far as it is known.""",
+    "firing": """**firing
+    How the hammer is fired, as for `printhammer.Regime.of`.""",
+}
+_TYPES: Final = {"tolerance": "float", "threads": "int | None", "progress": "Progress | None"}
+
+
+def computation(function: F) -> F:
+    """Let a public function take the keywords of an effort, and pass it one `Effort`.
+
+    The function has a parameter `effort`, whose default is that of the keywords, and names those it takes by
+    the type of its `**`: `Unpack[Keywords]`, or a dictionary with further keys, which stay in its `**`. The
+    signature and the docstring show the keywords and not the parameter `effort`, by which functions of the
+    package pass theirs on. Entries that the docstring has of its own are kept.
+    """
+    signature = inspect.signature(function)
+    *own, rest = signature.parameters.values()
+    default: Effort = signature.parameters["effort"].default
+    keys = vars(sys.modules[function.__module__])[rest.annotation[7:-1]].__annotations__
+    names = [name for name in _TYPES if name in keys]
+    allowed = {each.name for each in own} | (keys.keys() - _TYPES.keys())
+
+    @functools.wraps(function)
+    def call(*args: Any, **keywords: Any) -> Any:
+        stated = {name: keywords.pop(name) for name in names if name in keywords}
+        if stated:
+            keywords["effort"] = replace(keywords.get("effort", default), **stated)
+        unknown = keywords.keys() - allowed
+        if unknown:
+            raise TypeError(f"{function.__name__}() got an unexpected keyword argument {min(unknown)!r}")
+        return function(*args, **keywords)
+
+    fired = rest.name == "firing"
+    shown = [each for each in own if each.name != "effort"]
+    shown += [
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=getattr(default, name), annotation=_TYPES[name]
+        )
+        for name in names
+    ]
+    if fired:
+        shown.append(rest.replace(annotation="Unpack[Firing]"))
+    typed: Any = call
+    typed.__signature__ = signature.replace(parameters=shown)
+    typed.__doc__ = _documented(function.__doc__ or "", [*names, "firing"] if fired else names)
+    result: F = typed
+    return result
+
+
+def _documented(text: str, names: Sequence[str]) -> str:
+    """Return a docstring with entries of the parameters that it lacks, at the end of its Parameters."""
+    text = inspect.cleandoc(text)
+    ends = [text.find(head) for head in ("\nprogress : ", "\n**firing\n", "\n\nReturns\n-", "\n\nRaises\n-")]
+    end = min((place for place in ends if place >= 0), default=len(text))
+    lacking = [_ENTRIES[name] for name in names if _ENTRIES[name].partition("\n")[0] not in text.splitlines()]
+    return "\n".join([text[:end], *lacking]) + text[end:]
