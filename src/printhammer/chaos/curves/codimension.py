@@ -156,7 +156,10 @@ def points_along(
         pair = coefficients[after : after + 2]
         if kind == "period doubling" and pair[0] * pair[1] < 0.0:
             _, node = zero_between(follower, here, ahead, lambda node: coefficient(place_of(node)))
-            if node is not None:
+            # At a resonance or fold-flip the coefficient changes sign through infinity.
+            if node is not None and (
+                not named or abs(coefficient(place_of(node))) < float(np.abs(pair).min())
+            ):
                 points.append(point_of("degenerate doubling", place_of(node), after))
     return points
 
