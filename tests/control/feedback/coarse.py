@@ -1,6 +1,6 @@
 """A controller with coarse tables, which are computed in half a second. Helpers only.
 
-What it prints is poor; that its tables are what a run does, and that it keeps its bounds, must hold all the same.
+What it prints is poor; its tables must be what runs do all the same, and it must keep its bounds.
 """
 
 import functools

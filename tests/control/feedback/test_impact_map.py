@@ -61,7 +61,7 @@ def test_a_longer_push_into_the_pack_prints_harder() -> None:
 
 
 def test_ways_lead_where_single_runs_do() -> None:
-    forces, _, table = coarse.tables()
+    _, _, table = coarse.tables()
     plant = coarse.plant()
     known = np.argwhere(np.isfinite(table.next_touch))
     rng = np.random.default_rng(2)
