@@ -37,7 +37,6 @@ def grids() -> Iterator[None]:
         patch.setattr(soft_landing, "_STARTS", STARTS)
         patch.setattr(soft_landing, "_WIDTHS", WIDTHS)
         patch.setattr(soft_landing, "_NEAR", NEAR)
-        patch.setattr(soft_landing, "_WIDTHS_LAUNCH", np.linspace(0.2, 1.0, 9))
         yield
 
 
