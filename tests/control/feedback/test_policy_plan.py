@@ -174,6 +174,25 @@ def test_a_throw_that_is_decided_anew_keeps_what_was_done() -> None:
     np.testing.assert_allclose(later[:, :, 1], expected, rtol=1e-12)
 
 
+def test_a_throw_that_is_decided_anew_leads_somewhere_or_is_none() -> None:
+    """Also where every way is far too late, so that a way that leads nowhere costs as much."""
+    policy = policy_of(7)
+    committed = Committed(np.full(6, -2.0), np.linspace(0.9, 1.1, 6), np.full(6, 3.5e-4))
+    for wait in (0.2 * PERIOD, 5.0 * PERIOD):
+        way, cost, choice = policy.best(
+            KINDS,
+            np.zeros(6),
+            SPEEDS,
+            np.full(6, wait),
+            np.zeros(6, int),
+            np.zeros(6),
+            np.zeros(6),
+            committed,
+        )
+        assert np.isfinite(choice.next_touch[np.arange(6), way]).all()
+        assert np.isfinite(cost).all()
+
+
 @given(st.floats(-0.1, 0.1), st.floats(0.8, 1.2))
 def test_ways_between_speeds_and_fronts_are_interpolated(front: float, speed: float) -> None:
     policy = policy_of(2)
