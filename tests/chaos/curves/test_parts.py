@@ -17,6 +17,7 @@ from printhammer.chaos.curves import bifurcation_curve as module
 from printhammer.chaos.curves.bifurcation_curve import BifurcationCurve, curve_of, settled_plane
 from printhammer.chaos.curves.codimension import resonance_test
 from printhammer.chaos.curves.normal_forms import MOST_PERIODS, grazing_sides, root_coefficient
+from printhammer.chaos.curves.starts import start_of
 from printhammer.chaos.curves.systems import TESTS, MultiplierSystem, Place, check_two
 from printhammer.chaos.curves.tracing import PRECISION, CurveTracer, Traced
 from printhammer.errors import InputError
@@ -183,11 +184,39 @@ def test_a_curve_ends_where_it_leaves_the_plane_or_the_steps_are_used_up() -> No
     assert [stop.reason for stop in curve.stops] == ["bound", "bound"]
     ends = curve.first[[0, -1]] - SHIFT
     assert sorted(ends) == [pytest.approx(0.6), pytest.approx(1.0)]
+    # In order along the curve, and none beyond its end.
+    assert abs(np.sign(np.diff(curve.first)).sum()) == len(curve) - 1
     np.testing.assert_allclose(curve.second[[0, -1]], 1.0 - np.sqrt(ends / 0.75), atol=1e-9)
     assert f"{NAMES[0]} = 21 N is the bound" in curve.message
     short = henon_curve(most=2)
     assert len(short) == 5
     assert "the number of steps was used up at" in short.message
+
+
+def test_a_curve_is_begun_at_any_of_its_points_from_a_file(tmp_path: Path) -> None:
+    curve = henon_curve()
+    curve.save(tmp_path / "curve.nc")
+    curve.save(tmp_path / "curve.json")
+    regime = known_maps.regime()
+    last = len(curve) - 1
+    for name in ("curve.nc", "curve.json"):
+        path = tmp_path / name
+        for asked, number in ((None, 0), (0, 0), ("first", 0), ("last", last), (3, 3), (last, last)):
+            begin = start_of(path, asked, regime)
+            assert (begin.kind, begin.first, begin.firings) == ("period doubling", NAMES[0], 1)
+            assert (begin.value, begin.other) == (curve.first[number], curve.second[number])
+            assert begin.state.tolist() == curve.state[number].tolist()
+            assert begin.bounds == curve.bounds[0]
+            assert begin.regime.phase == curve.phase[number]
+            assert begin.tolerance == curve.tolerance
+        for asked in (last + 1, "fold", -2):
+            with pytest.raises(InputError, match=f"expected a point of the curve from 0 to {last}"):
+                start_of(path, asked, regime)
+        with pytest.raises(InputError, match="expected a regime beside the file"):
+            start_of(path, 0, None)
+        other = dataclasses.replace(regime, hammer=regime.hammer.replace("mass", 2.0))
+        with pytest.raises(InputError, match="hammer_fingerprint = "):
+            start_of(path, 0, other)
 
 
 def test_what_a_curve_says_and_saves(tmp_path: Path) -> None:

@@ -95,6 +95,16 @@ def test_ways_lead_where_single_runs_do() -> None:
     assert kinds == {PUSHED, FREE}
 
 
+def test_the_coil_has_settled_at_the_next_touch() -> None:
+    """Two and a half time constants after it was switched, so that a touch is either pushed or free."""
+    _, _, table = coarse.tables()
+    pushed = table.width == ALWAYS
+    since = table.next_touch - table.fire - np.where(pushed, 0.0, table.width)
+    # The time of the touch is that of a run, whose beginning lies before it by about `AHEAD`.
+    assert np.nanmin(since) > 2.5 * coarse.plant().driver.edge - AHEAD
+    assert (table.width[~pushed] < 1e-3).all()
+
+
 def test_ways_print_the_force_that_they_are_for() -> None:
     forces, _, table = coarse.tables()
     shape = (len(forces.kind), len(forces.back), len(FORCES), -1)
