@@ -89,6 +89,10 @@ def _resonance(passages: int) -> Callable[[Node], float]:
     return lambda node: test(_matrix(node))
 
 
+def _along(direction: FloatArray) -> Callable[[Node], float]:
+    return lambda node: float(node.tangent[-2:] @ direction)
+
+
 def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], float]]:
     """Return what vanishes at points of codimension two, by their kind and number of passages."""
     if kind == "fold":
@@ -143,14 +147,19 @@ def points_along(
                 share, node = zero_between(follower, here, ahead, test)
                 place = place_of(node if node is not None else (here, ahead)[int(share > 0.5)])
                 points.append(point_of(name, place, after, passages))
-        if kind == "fold" and (here.tangent[-2:] * ahead.tangent[-2:] < 0.0).all():
-            _, node = zero_between(follower, here, ahead, lambda node: float(node.tangent[-1]))
-            if node is not None and abs(node.tangent[-2]) < _LEVEL:
+        if kind == "fold" and float(here.tangent[-2:] @ ahead.tangent[-2:]) < 0.0:
+            # The curve turns back in the plane, whatever the direction in which the cusp points.
+            turn = ahead.tangent[-2:] - here.tangent[-2:]
+            _, node = zero_between(follower, here, ahead, _along(turn))
+            if node is not None and float(np.linalg.norm(node.tangent[-2:])) < _LEVEL:
                 points.append(point_of("cusp", place_of(node), after))
         pair = coefficients[after : after + 2]
         if kind == "period doubling" and pair[0] * pair[1] < 0.0:
             _, node = zero_between(follower, here, ahead, lambda node: coefficient(place_of(node)))
-            if node is not None:
+            # At a resonance or fold-flip the coefficient changes sign through infinity.
+            if node is not None and (
+                not named or abs(coefficient(place_of(node))) < float(np.abs(pair).min())
+            ):
                 points.append(point_of("degenerate doubling", place_of(node), after))
     return points
 

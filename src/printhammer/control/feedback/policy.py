@@ -231,7 +231,8 @@ class Policy:
             open_ways = self.table.back == done.back[:, np.newaxis]
             open_ways &= self.table.fire > done.time[:, np.newaxis]
             cost = np.where(open_ways, cost, np.inf)
-        cost = np.where(np.isnan(cost), np.inf, cost)
+        # A way that leads nowhere after what was done may still have a known force.
+        cost = np.where(np.isnan(cost) | np.isnan(choice.next_touch), np.inf, cost)
         way = np.argmin(cost, axis=1)
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
 

@@ -1,0 +1,63 @@
+"""A controller with coarse tables, which are computed in half a second. Helpers only.
+
+What it prints is poor; its tables must be what runs do all the same, and it must keep its bounds.
+"""
+
+import functools
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+from printhammer.control.feedback import impact_map, soft_landing
+from printhammer.control.feedback.controller import Controller
+from printhammer.control.feedback.impact_map import ForceMap, ImpactMap
+from printhammer.control.feedback.plant import Plant, driver_of
+from printhammer.control.feedback.soft_landing import Launch
+from printhammer.printing.dots.nominal import nominal
+
+HAMMER = Path(__file__).parents[2] / "data" / "bucked.toml"
+
+STARTS, WIDTHS, NEAR = np.linspace(0.85, 1.75, 4), np.linspace(0.1, 0.75, 3), np.linspace(-1.0, 1.0, 3)
+"""Brake pulses of the first grid, and grid about the best."""
+
+
+@contextmanager
+def grids() -> Iterator[None]:
+    """Make every table of the controller coarse."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(impact_map, "_PUSHED_SPEEDS", np.linspace(0.3, 1.1, 3))
+        patch.setattr(impact_map, "_FREE_SPEEDS", np.linspace(0.6, 1.25, 3))
+        patch.setattr(impact_map, "_RELEASES", np.linspace(0.0, 0.85, 8))
+        patch.setattr(impact_map, "_EARLY", np.linspace(0.14, 1.07, 5))
+        patch.setattr(impact_map, "_LATE", np.linspace(1.1, 2.9, 5))
+        patch.setattr(soft_landing, "_STARTS", STARTS)
+        patch.setattr(soft_landing, "_WIDTHS", WIDTHS)
+        patch.setattr(soft_landing, "_NEAR", NEAR)
+        yield
+
+
+@functools.cache
+def plant() -> Plant:
+    """A hammer whose magnet the driver all but bucks."""
+    hammer = ph.load(HAMMER)
+    return Plant(hammer, driver_of(hammer), nominal(hammer), 1)
+
+
+@functools.cache
+def tables() -> tuple[ForceMap, Launch, ImpactMap]:
+    """Forces, launch and impact map of the nominal hammer."""
+    with grids():
+        forces = impact_map.force_map(plant())
+        start = soft_landing.launch(plant(), forces)
+        return forces, start, impact_map.impact_map(plant(), forces, start.width)
+
+
+@functools.cache
+def controller() -> Controller:
+    """The controller of the nominal hammer."""
+    with grids():
+        return Controller(plant().hammer, plant().driver, threads=1)
