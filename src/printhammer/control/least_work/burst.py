@@ -381,8 +381,7 @@ def least_work(
     largest : float or str, optional
         Largest current of either sign, A, or text with a unit.
     slew : float, optional
-        Largest slope of the current of either sign, A/s; by default the steepest rise of the waveform of the
-        hammer.
+        Largest slope of the current, A/s; by default the steepest rise of the hammer's waveform.
     least : str, optional
         "positive work" of the coil, or its "heat".
     shape : str, optional
@@ -399,8 +398,6 @@ def least_work(
 
     Raises
     ------
-    InputError
-        An argument is not what is described above, or the hammer lacks a part or does not print.
     NoBurstError
         No current within the bounds was found.
     """
