@@ -262,8 +262,8 @@ def test_the_plane_of_trains_from_rest(monkeypatch: pytest.MonkeyPatch) -> None:
         def settled(self, _train: Any, _distances: Any) -> Any:
             return self if self.period != 2 else None
 
-    def run_trains(trains: Any, _judged: Any, _tolerance: float, _ticks: None, *, threads: int) -> Any:
-        assert threads == 1
+    def run_trains(trains: Any, _judged: Any, _ticks: None, effort: Any) -> Any:
+        assert effort.threads == 1
         pairs = [(each.value(NAMES[0]), each.value(NAMES[1])) for each in trains]
         asked.extend(pairs)
         return [States(*pair) for pair in pairs], None
