@@ -5,7 +5,14 @@ import pytest
 
 import printhammer as ph
 from printhammer.claims import Context, NotMeasurableError, claims, judge
-from printhammer.claims.bursts import _exceeds, onsets, sensitivity, spreads
+from printhammer.claims.bursts import (
+    _exceeds,
+    erratic_pairs,
+    erratic_share,
+    onsets,
+    sensitivity,
+    spreads,
+)
 
 
 def test_the_change_per_hertz_is_that_of_two_records(context: Context) -> None:
@@ -68,3 +75,44 @@ def test_a_sample_above_the_limit_is_enough(context: Context) -> None:
     for rate in (500.0, 4000.0, 5550.0, 5555.0, 6000.0):
         drive = ph.PulseTrain(context.waveform, rate=rate, pulses=9)
         assert _exceeds(drive, 2.0) == (drive.peak > 2.0)
+
+
+SETTINGS = {"first_dot": 3, "flight_time_change_s": 20.0, "flight_time_spread_s": 5.0}
+
+
+def test_pairs_of_rates_between_which_a_late_dot_changes() -> None:
+    flights = np.full((6, 4), 100.0)
+    struck = np.ones((6, 4), dtype=bool)
+    flights[1, 1] = 150.0  # the second dot does not count as a late one
+    flights[2, 2] = 119.0  # less than a change
+    flights[3, 3] = 121.0
+    struck[4, 2] = False
+    flights[5] = 90.0  # all dots alike, however early
+    erratic, varies = erratic_pairs(struck, flights, SETTINGS)
+    assert erratic.tolist() == [False, False, True, True, True]
+    assert varies.tolist() == [False, True, True, True, True, False]
+    rates = np.arange(6) * 10.0 + 700.0
+    assert erratic_share(rates, erratic, varies, None) == (0.75, 710.0)
+    assert erratic_share(rates, erratic, varies, 730.0) == (0.5, 710.0)
+    assert erratic_share(rates, erratic, varies, 715.0) == (None, 710.0)
+    assert erratic_share(rates, erratic, ~np.ones(6, dtype=bool), None) == (None, None)
+
+
+def test_a_rate_without_a_dot_is_lost() -> None:
+    none = np.zeros((2, 4), dtype=bool)
+    erratic, varies = erratic_pairs(none, np.full((2, 4), np.nan), SETTINGS)
+    assert varies.all()
+    assert not erratic.any()
+
+
+def test_the_chaotic_region_is_that_of_the_map(context: Context) -> None:
+    """The same share from a map of the hammer, counted cell by cell."""
+    rates = np.arange(700.0, 1499.0, 3.0)
+    table = ph.frequency_map(context.hammer, rates=rates)
+    flights, struck = table.flight_time.values, table.struck.values
+    count = 0
+    for k in range(len(rates) - 1):
+        pairs = [(struck[k, d], struck[k + 1, d], flights[k, d], flights[k + 1, d]) for d in range(3, 9)]
+        count += any(a != b or (a and abs(f - g) > 20e-6) for a, b, f, g in pairs)
+    value = judge(context, claims()["chaotic_region"]).value
+    assert value["erratic_share_of_all"] == pytest.approx(count / (len(rates) - 1))

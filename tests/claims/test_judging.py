@@ -117,3 +117,17 @@ def test_the_claims_file_is_toml_of_tables() -> None:
 
     text = files("printhammer").joinpath("claims", "claims.toml").read_text("utf-8")
     assert all(isinstance(table, dict) for table in tomllib.loads(text).values())
+
+
+def test_each_text_of_a_list_is_a_statement() -> None:
+    claim = claims()["poincare"]
+    printed = list(claim.band["verdicts"])
+    some = ["strange", *printed[1:]]
+    judged = JudgedClaim(claim, {"verdicts": some}, "fails", "")
+    assert judged.statements == (len(printed) - 1, len(printed)) == (11, 12)
+    assert JudgedClaim(claim, None, "fails", "").statements == (0, 12)
+    other = claims()["settle_out"]
+    assert JudgedClaim(other, None, "fails", "").statements == (0, 1)
+    assert JudgedClaim(other, {}, "holds", "").statements == (1, 1)
+    made = sum(JudgedClaim(each, None, "fails", "").statements[1] for each in claims().values())
+    assert made == len(claims()) - 1 + len(printed) == 47

@@ -85,3 +85,14 @@ def test_slow_trains_come_to_one_point(context: Context) -> None:
     result = judge(context, claims()["low_rate_fixed_point"])
     last = strobes.strobe_points(context, 3e-3, 60)[-2:]
     assert result.value["scaled_distances"]["3 ms"] >= np.linalg.norm(np.diff(strobes.scaled(last), axis=0))
+
+
+def test_the_deepest_point_behind_the_backstop(context: Context, given_panels) -> None:
+    claim = claims()["behind_the_backstop"]
+    for depth, verdict in ((2.9e-6, "fails"), (3.1e-6, "holds"), (12.6e-6, "holds"), (12.8e-6, "fails")):
+        before = np.array([[context.position, 0.0], [context.position + 1e-6, 0.1]])
+        given_panels([before, before - [depth, 0.0]])
+        result = judge(context, claim)
+        assert result.value["depth_m"] == pytest.approx(depth)
+        assert result.value["depths_m"] == pytest.approx({"0 ms": 0.0, "1 ms": depth}, abs=1e-15)
+        assert result.verdict == verdict

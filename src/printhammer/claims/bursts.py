@@ -6,6 +6,7 @@ The claim about the frequency-time map, Figs. 8 and 9: how fast the response cha
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,6 +18,7 @@ from printhammer.claims.verdicts import panel_name, printed_verdicts
 from printhammer.drive.trains import Drive, PulseTrain
 from printhammer.maps.frequency import TAIL
 from printhammer.run.motion import Motion
+from printhammer.support.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
@@ -50,7 +52,8 @@ def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
     )
 
 
-def _rates(settings: Any) -> list[float]:
+def rates_of(settings: Mapping[str, Any]) -> list[float]:
+    """Return the rates of a claim, Hz, from the first to the last."""
     first, last, step = (settings[name] for name in ("first_rate_Hz", "last_rate_Hz", "rate_step_Hz"))
     return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
 
@@ -61,7 +64,7 @@ def onsets(context: Context) -> dict[str, float]:
     By the names "flight_time", "force" and "lost"; what does not happen up to the first lost dot is missing.
     """
     settings = claims()["order_of_onset"].settings
-    rates, pulses = _rates(settings), settings["pulses"]
+    rates, pulses = rates_of(settings), settings["pulses"]
     first: dict[str, float] = {}
     for start in range(0, len(rates), _TOGETHER):
         some = rates[start : start + _TOGETHER]
@@ -106,7 +109,7 @@ def second_dot_lost(context: Context, claim: Claim) -> Measured:
     settings = claim.settings
     waveform, front, _ = context.waveform, context.front, context.dot
     begins = ends = None
-    for rate in _rates(settings):
+    for rate in rates_of(settings):
         # The third firing ends the interval of the second.
         motion = context.run(PulseTrain(waveform, rate=rate, pulses=2), 2.0 / rate)
         peak = motion.peak_after(1)
@@ -319,6 +322,61 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
         f" {bands['low'][1]:.0f} Hz, {texts['erratic']} from {first:.0f} to {hung:.0f} Hz, and"
         f" {texts['hung_up']} from there to {highest:.0f} Hz; taken over {whole:g} Hz, the ratios are"
         f" {value['erratic_over_low_coarse']:.2g} and {value['erratic_over_hung_up_coarse']:.2g}.",
+    )
+
+
+def erratic_pairs(
+    struck: BoolArray, flight_time: FloatArray, settings: Mapping[str, Any]
+) -> tuple[BoolArray, BoolArray]:
+    """Return between which neighbouring rates a late dot changes at once, and at which rates dots vary.
+
+    A dot changes if it is struck at one of the two rates only, or if its flight times, s, differ by more than
+    `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their flight
+    times differ by more than `flight_time_spread_s`. Both tables have a row for each rate; the shapes of what
+    is returned are (rates - 1,) and (rates,).
+    """
+    flights = np.where(struck, flight_time, np.nan)
+    change = np.abs(np.diff(flights, axis=0)) > settings["flight_time_change_s"]
+    late = (change | (struck[1:] != struck[:-1]))[:, settings["first_dot"] - 1 :]
+    spreads = np.fmax.reduce(flights, axis=1) - np.fmin.reduce(flights, axis=1)
+    return late.any(axis=1), ~struck.all(axis=1) | (spreads > settings["flight_time_spread_s"])
+
+
+def erratic_share(
+    rates: FloatArray, erratic: BoolArray, varies: BoolArray, hang_up: float | None
+) -> tuple[float | None, float | None]:
+    """Return the share of erratic pairs between the first rate at which dots vary and hang-up, and that rate.
+
+    Rates are in Hz, the pairs those of `erratic_pairs`. None where dots vary nowhere, or not before hang-up.
+    """
+    if not varies.any():
+        return None, None
+    first = float(rates[int(np.argmax(varies))])
+    inside = (rates[:-1] >= first) & (rates[1:] <= (math.inf if hang_up is None else hang_up))
+    return (float(erratic[inside].mean()) if inside.any() else None), first
+
+
+@measures("chaotic_region", *WHOLE)
+def chaotic_region(context: Context, claim: Claim) -> Measured:
+    """Share of neighbouring rates between which a late dot changes at once, where dots vary."""
+    rates = rates_of(claim.settings)
+    pulses = claim.settings["pulses"]
+    dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])
+    erratic, varies = erratic_pairs(dots.struck, dots.flight_time, claim.settings)
+    hung, _, _ = context.once("hang-up", lambda: hang_up_range(context))
+    share, first = erratic_share(np.array(rates), erratic, varies, hung)
+    value = {
+        "erratic_share": share,
+        "erratic_share_of_all": float(erratic.mean()),
+        "varies_from_Hz": first,
+        "hang_up_rate_Hz": hung,
+    }
+    if share is None:
+        return Measured(value, f"Up to {rates[-1]:.0f} Hz no dot varies before hang-up.")
+    return Measured(
+        value,
+        f"Dots vary from {first:.0f} Hz on; from there up to {min(rates[-1], hung or math.inf):.0f} Hz a late"
+        f" dot changes at once between {share:.0%} of neighbouring rates.",
     )
 
 

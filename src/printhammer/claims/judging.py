@@ -52,6 +52,20 @@ class JudgedClaim(Declared):
         """Names of the values that are not within their bands."""
         return self.claim.missed(self.value) if self.value is not None else []
 
+    @property
+    def statements(self) -> tuple[int, int]:
+        """How many of its statements hold, and how many it makes: one, or one for each text of a list."""
+        value = self.value or {}
+        lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
+        if not lists:
+            return int(self.verdict == "holds"), 1
+        pairs = [
+            (found, wanted)
+            for name, band in lists.items()
+            for found, wanted in itertools.zip_longest(value.get(name, ()), band)
+        ]
+        return sum(found == wanted for found, wanted in pairs), sum(map(len, lists.values()))
+
     def as_dict(self) -> dict[str, Any]:
         """Return what goes to `claims.json`."""
         claim = self.claim
@@ -67,6 +81,10 @@ class JudgedClaim(Declared):
             "says": claim.says,
             "note": claim.note,
         }
+
+
+def _is_texts(band: Any) -> bool:
+    return isinstance(band, list) and all(isinstance(entry, str) for entry in band)
 
 
 Judge = Callable[[Context, Claim], Measured]

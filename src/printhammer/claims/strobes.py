@@ -72,6 +72,17 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
     )
 
 
+@measures("behind_the_backstop", *WHOLE)
+def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
+    """How far behind the backstop the deepest strobe point lies."""
+    depths = {name: context.position - float(points[:, 0].min()) for name, points in panels(context).items()}
+    deepest = max(depths, key=lambda name: depths[name])
+    value = {"depth_m": depths[deepest], "depths_m": depths}
+    return Measured(
+        value, f"The deepest point lies {depths[deepest] * 1e6:.2f} um behind the backstop, at {deepest}."
+    )
+
+
 @measures("low_rate_fixed_point", *WHOLE)
 def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
     """How far the last points of slow trains are from each other."""

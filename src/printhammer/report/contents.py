@@ -53,6 +53,12 @@ class Report(Declared):
         return sum(result.verdict == verdict for result in self.results)
 
     @property
+    def statements(self) -> tuple[int, int]:
+        """How many statements of the paper hold, and how many there are: each panel of Fig. 11 is one."""
+        held, made = zip(*(result.statements for result in self.results), strict=True)
+        return sum(held), sum(made)
+
+    @property
     def reconstructed(self) -> bool:
         """Whether the hammer is the one that the reconstruction is about."""
         return self.search is not None

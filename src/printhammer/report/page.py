@@ -66,6 +66,7 @@ def view(report: Report) -> dict[str, Any]:
         "statuses": dict(Counter(constant.status for constant in constants)),
         "has_reconstructed": any(constant.status == "reconstructed" for constant in constants),
         "parts": _parts(report.hammer),
+        "statements": report.statements,
         "verdicts": {verdict: report.count(verdict) for verdict in VERDICTS},
         "kinds": KINDS,
         "by_kind": by_kind,

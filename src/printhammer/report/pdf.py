@@ -22,8 +22,18 @@ from printhammer.support.constants import Constant
 from printhammer.support.files import write_file
 
 _SHOWN = (
-    *("has_reconstructed", "statuses", "parts", "verdicts", "kinds", "by_kind", "claims", "failing", "rates"),
-    *("panels", "schemes", "search", "predictions", "family"),
+    *(
+        "has_reconstructed",
+        "statuses",
+        "parts",
+        "statements",
+        "verdicts",
+        "kinds",
+        "by_kind",
+        "claims",
+        "failing",
+    ),
+    *("rates", "panels", "schemes", "search", "predictions", "family"),
 )
 
 

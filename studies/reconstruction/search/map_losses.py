@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from printhammer.claims.bursts import erratic_pairs, erratic_share, rates_of
 from printhammer.claims.definition import claims
 from printhammer.claims.judging import spread
 from printhammer.drive.trains import PulseTrain
@@ -56,3 +57,21 @@ def sensitivity(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
             1.0 if ratio == 0.0 else hinge(math.log(wanted / ratio), math.log(wanted))
         )
         score.measured["sensitivity"] = None if math.isnan(ratio) else ratio
+
+
+def region(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
+    """Look at the share of neighbouring rates between which a late dot changes at once."""
+    claim = claims()["chaotic_region"]
+    wanted = claim.band["erratic_share"]["at_least"]
+    rates = rates_of(claim.settings)
+    for candidate, score in zip(chosen, scores, strict=True):
+        drives = [
+            PulseTrain(candidate.waveform, rate=rate, pulses=claim.settings["pulses"]) for rate in rates
+        ]
+        ends = [float(drive.times[-1]) + TAIL for drive in drives]
+        dots = run_all([candidate], drives, ends, len(drives), dots=True).dots
+        assert dots is not None
+        erratic, varies = erratic_pairs(dots.struck, dots.flight_time, claim.settings)
+        share, _ = erratic_share(np.array(rates), erratic, varies, score.measured["hang_up"])
+        score.losses["chaotic_region"] = hinge(wanted - (share or 0.0), wanted)
+        score.measured["erratic_share"] = share

@@ -106,6 +106,8 @@ def paper(
         report = write_report(hammer, out, progress=count, pdf=pdf)
     counts = ", ".join(_verdict(verdict, f"{report.count(verdict)} {verdict}") for verdict in _STYLES)
     job.show(table(_COLUMNS, report.results), "", marked(f"{len(report.results)} claims: {counts}"))
+    held, made = report.statements
+    job.show(f"{held} of {made} statements hold, each panel of Fig. 11 counted as one.")
     reports = [path for path in report.files if path.parent == out]
     for path in reports:
         job.wrote(path)

@@ -2,12 +2,13 @@
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from studies.reconstruction.search import losses, panel_losses
+from studies.reconstruction.search import evaluation, losses, panel_losses
 from studies.reconstruction.search.candidates import Candidate, candidates
 from studies.reconstruction.search.evaluation import AIMS, WEIGHTS, evaluate, rows
 from studies.reconstruction.search.losses import Score, hinge
@@ -18,6 +19,7 @@ from studies.reconstruction.tests.samples import near_points, random_points, som
 from printhammer.claims import Context, claims, judge
 from printhammer.claims.verdicts import printed_verdicts
 
+BEST = Path(evaluation.__file__).with_name("best.jsonl")
 QUICK = (
     "single_pulse_stroke",
     "return_from_everywhere",
@@ -68,7 +70,9 @@ def test_what_is_not_known_counts_in_full() -> None:
 
 
 def test_only_stated_claims_lead_one_search_and_typical_ones_neither() -> None:
-    kinds = {aim: {claims()[name].kind for name in weights} for aim, weights in WEIGHTS.items()}
+    known = claims()
+    # What clouds look like is no claim, and leads no search alone.
+    kinds = {aim: {known[name].kind for name in weights if name in known} for aim, weights in WEIGHTS.items()}
     led = {"stated", "shape"}
     assert kinds == {"stated": {"stated"}, "all": led, "panels": led, "buzz": led, "claims": led}
     # What leads the first search leads the second too, with the same weight.
@@ -265,3 +269,18 @@ def test_what_just_fails_counts_where_the_number_of_claims_leads() -> None:
     score = Score({"settle_out": 0.1, "low_restitution": 0.0})
     weights = {"settle_out": 2.0, "low_restitution": 1.0, "poincare": 4.0}
     assert score.total(weights, 0.4) == pytest.approx(2.0 * (0.4 + 0.6 * 0.1) + 4.0)
+
+
+def test_region_and_clouds_agree_with_the_claims() -> None:
+    """The shipped hammer has neither, the best that the search knows has both."""
+    best = json.loads(BEST.read_text("utf-8").splitlines()[0])
+    points = [best["point"], *near_points(1, 5, 0.0, "hendriks-1983")]
+    names = ("chaotic_region", "behind_the_backstop")
+    for (candidate, score), verdict in zip(evaluate(points, "claims"), ("holds", "fails"), strict=True):
+        assert candidate is not None
+        context = Context(candidate.hammer)
+        for name in names:
+            assert judge(context, claims()[name]).verdict == verdict
+            assert (score.losses[name] == 0.0) == (verdict == "holds")
+        assert 0.0 < score.measured["extent"] <= 1.0
+    assert score.losses["clouds"] > 0.0

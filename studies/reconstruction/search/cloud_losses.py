@@ -1,0 +1,90 @@
+"""How far the panels of Fig. 11 that should be strange are from clouds that fill the single-pulse orbit.
+
+Two numbers of the first strobe points: how deep behind the backstop the deepest lies, and over what share of
+the orbit of a single pulse, in the phase plane scaled to the window of Fig. 11, the points of a panel spread.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from printhammer.claims.definition import claims
+from printhammer.claims.strobes import window
+from printhammer.claims.verdicts import printed_verdicts
+from printhammer.drive.trains import PulseTrain
+from printhammer.run.simulate import simulate
+from studies.reconstruction.search.candidates import TOLERANCE
+from studies.reconstruction.search.losses import Score, hinge, run_all
+from studies.reconstruction.search.space import geometry
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from printhammer.support.arrays import FloatArray
+    from studies.reconstruction.search.candidates import Candidate
+
+_FIRST: Final = 100
+"""Points left out of the extent of a cloud, half of those that the paper plots: the transient from rest."""
+
+_ORBIT_TIME: Final = 3e-3
+_ORBIT_POINTS: Final = 1501
+_PIECES: Final = 36
+"""Into how many pieces of equal length the orbit is divided."""
+
+_SHARE: Final = 0.9
+"""Share of the length of the orbit that is looked at; the last tenth winds closely about the rest state."""
+
+_WANTED: Final = 0.6
+"""Share of the pieces that a cloud is to meet: arbitrary, about that of the widest clouds known."""
+
+
+def clouds(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
+    """Look at how far the strobe points of the strange panels spread, and how deep they lie."""
+    settings = claims()["poincare_window"].settings
+    low, high = claims()["behind_the_backstop"].band["depth_m"]
+    periods = [period for period, verdict in printed_verdicts().items() if verdict == "strange"]
+    for candidate, score in zip(chosen, scores, strict=True):
+        trains = [
+            PulseTrain(candidate.waveform, period=period, pulses=settings["points"] + 1) for period in periods
+        ]
+        ends = [period * settings["points"] for period in periods]
+        table = run_all([candidate], trains, ends, len(trains), strobes="firings").strobes
+        assert table is not None
+        x, v = table.x[:, : settings["points"]], table.v[:, : settings["points"]]
+        depth = geometry()["b"] - float(np.nanmin(x))
+        # The ends of the band are approached from outside over its own width.
+        score.losses["behind_the_backstop"] = hinge(max(low - depth, depth - high), high - low)
+        orbit = _orbit(candidate)
+        extents = [_extent(x[k, _FIRST:], v[k, _FIRST:], orbit) for k in range(len(periods))]
+        extent = float(np.median(extents))
+        score.losses["clouds"] = hinge(_WANTED - extent, _WANTED)
+        score.measured |= {"depth": depth, "extent": extent}
+
+
+def _orbit(candidate: Candidate) -> FloatArray:
+    """Return the orbit after the first touch of a single pulse in half-widths of the window, shape (n, 2)."""
+    motion = simulate(
+        candidate.hammer,
+        PulseTrain(candidate.waveform),
+        duration=_ORBIT_TIME,
+        points=_ORBIT_POINTS,
+        tolerance=TOLERANCE,
+    )
+    inside = np.flatnonzero((motion.x[1:] <= geometry()["b"]) & (motion.x[:-1] > geometry()["b"]))
+    start = int(inside[0]) if inside.size else 0
+    _, half = window()
+    return np.column_stack([motion.x[start:], motion.v[start:]]) / half
+
+
+def _extent(x: FloatArray, v: FloatArray, orbit: FloatArray) -> float:
+    """Return the share of the pieces of an orbit that points, m and m/s, are nearest to."""
+    from scipy.spatial import cKDTree
+
+    _, half = window()
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(orbit, axis=0).T))])
+    kept = length <= _SHARE * length[-1]
+    _, nearest = cKDTree(orbit[kept]).query(np.column_stack([x, v]) / half)
+    pieces = length[nearest] / (_SHARE * length[-1]) * _PIECES
+    return len(np.unique(np.minimum(pieces.astype(np.int64), _PIECES - 1))) / _PIECES
