@@ -55,8 +55,8 @@ class Report(Declared):
     @property
     def statements(self) -> tuple[int, int]:
         """How many statements of the paper hold, and how many there are: each panel of Fig. 11 is one."""
-        held, made = zip(*(result.statements for result in self.results), strict=True)
-        return sum(held), sum(made)
+        pairs = [result.statements for result in self.results]
+        return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 
     @property
     def reconstructed(self) -> bool:
