@@ -203,15 +203,15 @@ def test_a_measured_table_gives_the_equilibria_of_the_law_it_samples() -> None:
 @pytest.mark.parametrize(
     ("hammer", "key"),
     [
-        (replace(HAMMER, magnet=MAGNET.model_copy(update={"Am": 0.1})), "rest, value=state"),
-        (replace(HAMMER, backstop=None), "rest, value=state"),
-        (Bench(), "rest, value=state"),
-        (Bench(backstop=HERTZ), "rest, value=state"),
-        (Bench(spring=PreloadSpring(preload=1.0, stiffness=-1e3)), "rest, value=state"),
-        (Bench(spring=PreloadSpring(preload=1.0, stiffness=0.0), pack=PACK), "rest, value=state"),
+        (replace(HAMMER, magnet=MAGNET.model_copy(update={"Am": 0.1})), "rest"),
+        (replace(HAMMER, backstop=None), "rest"),
+        (Bench(), "rest"),
+        (Bench(backstop=HERTZ), "rest"),
+        (Bench(spring=PreloadSpring(preload=1.0, stiffness=-1e3)), "rest"),
+        (Bench(spring=PreloadSpring(preload=1.0, stiffness=0.0), pack=PACK), "rest"),
         (
             replace(HAMMER, backstop=HertzBackstop(position=51e-6, stiffness=1e3, damping=0.0)),
-            "rest, value=state",
+            "rest",
         ),
     ],
 )
@@ -226,11 +226,11 @@ def test_a_hammer_without_a_rest_state_says_so_in_one_sentence(hammer: Bench, ke
 
 
 def test_release_needs_a_magnet_that_can_let_go() -> None:
-    with refused("release, value=current"):
+    with refused("release"):
         release_current(replace(HAMMER, magnet=None))
-    with refused("release, value=current"):
+    with refused("release"):
         release_current(replace(HAMMER, backstop=None))
-    with refused("release, value=current"):
+    with refused("release"):
         release_current(replace(HAMMER, magnet=MAGNET.model_copy(update={"Bm": 0.0})))
     assert release_current(replace(HAMMER, magnet=MAGNET.model_copy(update={"Am": 0.1}))) == 0.0
 

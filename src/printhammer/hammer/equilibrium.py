@@ -80,7 +80,7 @@ def rest_state(hammer: HammerLike) -> float:
                 because = f"at zero current the backstop is crushed down to {force.low:.6g} m"
                 raise InputError(
                     f"{_named(hammer)} has no rest state: {because}",
-                    key="rest, value=state",
+                    key="rest",
                     expected="it to hold the armature",
                 )
             return rest
@@ -91,7 +91,7 @@ def rest_state(hammer: HammerLike) -> float:
             because = f"at the backstop the net force at zero current is {pressing:.6g} N"
             raise InputError(
                 f"{_named(hammer)} has no rest state: {because}",
-                key="rest, value=state",
+                key="rest",
                 expected="a negative force",
             )
     stable = [
@@ -102,7 +102,7 @@ def rest_state(hammer: HammerLike) -> float:
     if not stable:
         raise InputError(
             f"{_named(hammer)} has no rest state: it has no stable equilibrium at zero current",
-            key="rest, value=state",
+            key="rest",
         )
     return min(stable, key=lambda x: abs(x - hammer.origin))
 
@@ -160,9 +160,7 @@ def release_current(hammer: HammerLike) -> float:
     """
     if hammer.backstop is None or hammer.magnet is None:
         missing = "magnet" if hammer.magnet is None else "backstop"
-        raise InputError(
-            f"{_named(hammer)} has no release current: it has no {missing}", key="release, value=current"
-        )
+        raise InputError(f"{_named(hammer)} has no release current: it has no {missing}", key="release")
     force = StaticForce(hammer)
     position = hammer.backstop.position
 
@@ -180,7 +178,7 @@ def release_current(hammer: HammerLike) -> float:
             lifting += sorted(crossed, key=abs)[:1]
     if not lifting:
         because = f"none from {low:g} to {high:g} A lifts the armature"
-        raise InputError(f"{_named(hammer)} has no release current: {because}", key="release, value=current")
+        raise InputError(f"{_named(hammer)} has no release current: {because}", key="release")
     return min(lifting, key=abs)
 
 
