@@ -54,7 +54,7 @@ class JudgedClaim(Declared):
 
     @property
     def statements(self) -> tuple[int, int]:
-        """How many of its statements hold, and how many it makes: one, or one for each text of a list."""
+        """Numbers of statements that hold and that the claim makes; each text of a list is one statement."""
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:

@@ -74,7 +74,7 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
 
 @measures("behind_the_backstop", *WHOLE)
 def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
-    """How far behind the backstop the deepest strobe point lies."""
+    """Depth of the deepest strobe point behind the backstop, over the panels called strange."""
     depths = {name: context.position - float(points[:, 0].min()) for name, points in panels(context).items()}
     deepest = max(depths, key=lambda name: depths[name])
     value = {"depth_m": depths[deepest], "depths_m": depths}

@@ -31,7 +31,7 @@ _FIRST: Final = 100
 _ORBIT_TIME: Final = 3e-3
 _ORBIT_POINTS: Final = 1501
 _PIECES: Final = 36
-"""Into how many pieces of equal length the orbit is divided."""
+"""Number of pieces of equal length into which the orbit is divided; arbitrary."""
 
 _SHARE: Final = 0.9
 """Share of the length of the orbit that is looked at; the last tenth winds closely about the rest state."""
