@@ -54,7 +54,7 @@ def test_a_state_behind_a_rigid_backstop() -> None:
 
 def test_no_state_of_rest_to_start_from() -> None:
     hammer = hammers.made_of(spring=hammers.preload(1.0), backstop=hammers.hertz())
-    with refused("rest, value=state"):
+    with refused("rest"):
         ph.simulate(hammer, hammers.idle())
 
 
