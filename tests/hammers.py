@@ -270,6 +270,9 @@ def interpreted() -> Iterator[None]:
 
     The functions are the same, source for source; only the machine code is not.
     """
+    # A module that is first imported in here would keep the plain kernels for good.
+    for module in ("kernel.compile.lanes", "run.ahead"):
+        import_module(f"printhammer.{module}")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(specialise, "specialise", _plain)
         patch.setattr(flow, "variational", _plain_variational)
