@@ -21,7 +21,7 @@ def quality(hammer: Hammer) -> Result:
 def safe_rate(hammer: Hammer) -> Result:
     from printhammer.printing.rates.safe_rate import safe_rate
 
-    return safe_rate(hammer, first=600.0, last=700.0, step=100.0, cycle=False)
+    return safe_rate(hammer, first=600.0, last=700.0, step=100.0, long=False)
 
 
 def tolerance_yield(hammer: Hammer) -> Result:

@@ -138,7 +138,7 @@ def rate_from_rest(context: Context) -> float | None:
         first=first,
         last=last,
         step=step,
-        cycle=False,
+        long=False,
         tolerance=context.tolerance,
     ).rate
     return None if math.isnan(rate) else rate

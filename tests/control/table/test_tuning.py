@@ -8,7 +8,7 @@ from tests.hammers import crude
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import COLUMNS
-from printhammer.control.table.report import PERTURBATIONS, STRATEGIES, between, random_patterns
+from printhammer.control.table.report import PERTURBATIONS, SETS, STRATEGIES, between, random_patterns
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.strategy import slot_times
 from printhammer.printing.rates.variability import Perturbation
@@ -110,7 +110,7 @@ def test_bad_arguments(arguments: dict[str, object], key: str) -> None:
 def test_report(table: CompensationTable) -> None:
     cases = (Perturbation(), Perturbation(travel=5e-6))
     report = ph.judge_table(quick(), table, perturbations=cases)
-    assert report.good.shape == (len(STRATEGIES), 2, 1, 3)
+    assert report.good.shape == (len(STRATEGIES), 2, 1, len(SETS))
     assert (report.good[1] > report.good[0]).all()
     assert report.passed[1, 0].all()
     assert not report.passed[0, 0].any()

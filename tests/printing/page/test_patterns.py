@@ -12,7 +12,7 @@ from PIL import Image
 from tests.errors import refused
 
 import printhammer as ph
-from printhammer.printing.page.lettering import ADVANCE, broken, glyphs, lettered
+from printhammer.printing.dots.lettering import ADVANCE, broken, glyphs, lettered
 from printhammer.printing.page.pattern import Pattern, pattern_from_toml, pattern_toml
 
 FONTS = Path(mpl.get_data_path()) / "fonts" / "ttf"

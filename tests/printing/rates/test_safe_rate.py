@@ -46,7 +46,7 @@ def test_patterns_from_rest_against_one_motion_after_the_other(hammer: "ph.Hamme
     assert all(printed_well(hammer, rate, limits) for rate in found.rates[found.passed][-2:])
     bad = found.rates[~found.passed]
     assert bad.tolist() == [found.rate + 125.0]
-    if not found.failure.in_cycle:
+    if found.failure.kind == "from rest":
         assert not printed_well(hammer, float(bad[0]), limits)
 
 
@@ -54,7 +54,7 @@ def test_what_fails_first_fails_alone_as_well(hammer: "ph.Hammer") -> None:
     found = safe_rate(hammer, **COARSE)
     failure = found.failure
     assert failure is not None
-    assert not failure.in_cycle
+    assert failure.kind == "from rest"
     slots = [slot for slot, letter in enumerate(failure.pattern) if letter == "1"]
     assert slots[-1] == failure.slot == len(failure.pattern) - 1
     train = ph.PulseTrain(hammer.waveform, at=[slot / failure.rate for slot in slots])
@@ -73,10 +73,28 @@ def test_what_fails_first_fails_alone_as_well(hammer: "ph.Hammer") -> None:
     assert failure.text.endswith(".")
 
 
+def test_a_rate_that_eight_dots_bear_and_a_row_does_not_is_not_safe() -> None:
+    """At 840 Hz an error of a row changes its sign from dot to dot, and grows: seen in one long motion."""
+    hammer = ph.load("hendriks-1983")
+    grid = {"first": 835.0, "last": 840.0}
+    assert safe_rate(hammer, long=False, **grid).at_least
+    found = safe_rate(hammer, **grid)
+    assert found.rate == 835.0
+    failure = found.failure
+    assert failure is not None
+    assert (failure.kind, failure.rate) == ("row", 840.0)
+    assert 8 < failure.dot == failure.slot + 1
+    row = ph.PulseTrain(hammer.waveform, rate=840.0, pulses=failure.dot)
+    forces = [dot.peak_force or 0.0 for dot in ph.simulate(hammer, row, points=2).dots]
+    off = np.array(forces) / found.nominal.force - 1.0
+    assert off[-1] == pytest.approx(failure.deviation, abs=1e-6)
+    assert np.abs(off[:-1]).max() <= found.limits.force < abs(off[-1])
+
+
 def test_slow_enough_everything_passes(hammer: "ph.Hammer") -> None:
     found = safe_rate(hammer, first=40.0, last=60.0, step=10.0)
     assert found.passed.tolist() == [True] * 3
-    assert found.cycle_run.all()
+    assert found.long_run.all()
     assert found.at_least
     assert found.rate == 60.0
     assert max(np.abs(found.force_low).max(), np.abs(found.force_high).max()) < 1e-6
@@ -91,8 +109,8 @@ def test_limits_that_nothing_keeps_leave_no_rate(hammer: "ph.Hammer") -> None:
 
 
 def test_patterns_that_begin_later_are_printed_alike(hammer: "ph.Hammer") -> None:
-    found = safe_rate(hammer, first=600.0, last=1500.0, step=50.0, cycle=False)
-    assert not found.cycle_run.any()
+    found = safe_rate(hammer, first=600.0, last=1500.0, step=50.0, long=False)
+    assert not found.long_run.any()
     assert not found.at_least
     cases = [Case(hammer, found.nominal, rate) for rate in (found.rate, found.rate + 50.0)]
     for every, count in ((False, 128), (True, 255)):
@@ -219,7 +237,7 @@ def test_drives_may_fire_waveforms_of_their_own(hammer: "ph.Hammer") -> None:
 
     few = {"first": 800.0, "last": 800.0, "tolerance": 1e-8}
     ours, theirs = safe_rate(hammer, sequence, **few), safe_rate(hammer, **few)
-    assert ours.cycle_run.tolist() == theirs.cycle_run.tolist()
+    assert ours.long_run.tolist() == theirs.long_run.tolist()
     np.testing.assert_allclose(ours.force_high, theirs.force_high, atol=1e-4)
     np.testing.assert_allclose(ours.arrival_low, theirs.arrival_low, atol=1e-8)
     assert ours.failure == theirs.failure or (ours.failure.slot, ours.failure.fault) == (

@@ -305,7 +305,7 @@ def print_(
 def _pattern(
     text: str | None, path: Path | None, font: Path | None, wires: int | None, columns: int | None
 ) -> Pattern:
-    from printhammer.printing.page.lettering import COLUMNS, WIRES
+    from printhammer.printing.dots.lettering import COLUMNS, WIRES
     from printhammer.printing.page.pattern import Pattern
 
     if path is not None:

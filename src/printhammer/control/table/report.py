@@ -12,8 +12,9 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
+from printhammer.printing.dots.long_patterns import KINDS, long_patterns
 from printhammer.printing.dots.nominal import Nominal, nominal
-from printhammer.printing.dots.strategy import LEAD_IN, Strategy, cycle_with_lead_in, open_loop, slots_of
+from printhammer.printing.dots.strategy import Strategy, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
 from printhammer.printing.rates.variability import Perturbation, perturbed
@@ -39,8 +40,8 @@ PERTURBATIONS: Final = (
 
 STRATEGIES: Final = ("open loop", "table")
 
-# Patterns: all 255 of eight slots from rest; the de Bruijn cycle of order 8; long random ones
-SETS: Final = ("eight slots", "cycle", "random")
+# Patterns: all 255 of eight slots from rest; the cycle, rows and a line of text; long random ones
+SETS: Final = ("eight slots", *KINDS, "random")
 _LONG: Final = 12  # Number of rates of a table from which on it is judged between them
 
 RANDOM: Final = 8  # Number of random patterns
@@ -128,9 +129,9 @@ def judge_table(
 ) -> TableReport:
     """Judge a table beside open loop.
 
-    The patterns are those of the safe rate, and long random ones. The table is that of the hammer it is made
-    for; it drives others that differ from it, and their dots are judged by the single pulse of the hammer it
-    is made for.
+    The patterns are those of the safe rate, long ones among them, and random ones. The table is that of the
+    hammer it is made for; it drives others that differ from it, and their dots are judged by the single pulse
+    of the hammer it is made for.
 
     Parameters
     ----------
@@ -168,20 +169,20 @@ def judge_table(
     bounds = Limits() if limits is None else limits
     single: Nominal = nominal(hammer, tolerance=effort.tolerance)
     driven = [perturbed(hammer, by) for by in perturbations]
-    sets = [from_rest(every=True), [slots_of(cycle_with_lead_in())], random_patterns(seed)]
-    shape = len(strategies), len(driven), asked.size, len(sets)
+    sets = _sets(seed)
+    shape = len(strategies), len(driven), asked.size, len(SETS)
     good, force, arrival, lost, extra = (np.zeros(shape) for _ in range(5))
     deviations: list[tuple[FloatArray, FloatArray]] = []
     done = 0
     for s, strategy in enumerate(strategies):
-        for p, patterns in enumerate(sets):
+        for p, (name, (patterns, begin)) in enumerate(sets.items()):
             for r, rate in enumerate(asked.tolist()):
                 trial = attempt(
                     [Case(other, single, rate) for other in driven],
                     patterns,
                     strategy,
                     limits=bounds,
-                    judged_from=LEAD_IN if p == 1 else 0,
+                    judged_from=begin,
                     effort=effort.quiet,
                 )
                 judgement = trial.judgement
@@ -192,7 +193,7 @@ def judge_table(
                     arrival[place] = _largest(judgement.arrival_deviation[rows])
                     lost[place] = judgement.lost[rows].sum()
                     extra[place] = judgement.extra_contacts[rows].sum()
-                if p == 1 and r == 0:
+                if name == "cycle" and r == 0:
                     wanted = judgement.wanted[0]
                     deviations.append(
                         (judgement.force_deviation[0][wanted], judgement.arrival_deviation[0][wanted])
@@ -215,6 +216,17 @@ def judge_table(
         seed=seed,
         tolerance=effort.tolerance,
     )
+
+
+def _sets(seed: int) -> dict[str, tuple[Sequence[tuple[int, ...]], int | Sequence[int]]]:
+    """Return the patterns of each of `SETS`, and the first slot that is judged of them."""
+    long = {kind: [each for each in long_patterns() if each.kind == kind] for kind in KINDS}
+    judged = {
+        kind: ([each.slots for each in some], [each.judged_from for each in some])
+        for kind, some in long.items()
+    }
+    every = (from_rest(every=True), 0), *judged.values(), (random_patterns(seed), 0)
+    return dict(zip(SETS, every, strict=True))
 
 
 def _largest(values: FloatArray) -> float:

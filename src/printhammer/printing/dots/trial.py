@@ -60,15 +60,15 @@ def attempt(
     strategy: Strategy = open_loop,
     *,
     limits: Limits,
-    judged_from: int = 0,
+    judged_from: int | Sequence[int] = 0,
     extra: bool = False,
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> Trial:
     """Print all of some patterns in all of some cases, from rest.
 
-    Patterns are numbers of the slots at which dots are wanted, at least one each; slots before `judged_from`
-    are a lead-in. With `extra` every extra contact is kept too.
+    Patterns are numbers of the slots at which dots are wanted, at least one each; slots before `judged_from`,
+    one for all patterns or one for each, are a lead-in. With `extra` every extra contact is kept too.
 
     Each member has a status: a run that could not go on is no exception, and does not pass.
     """
@@ -88,7 +88,8 @@ def attempt(
     dots = result.dots
     assert dots is not None
     nominals = [case.nominal for case in cases for _ in patterns]
-    judgement = judge(dots, slots >= judged_from, due, nominals, limits, result.ok)
+    begin = np.tile(np.broadcast_to(judged_from, (len(patterns),)), len(cases))
+    judgement = judge(dots, slots >= begin[:, np.newaxis], due, nominals, limits, result.ok)
     return Trial(
         cases=tuple(cases),
         patterns=tuple(patterns),

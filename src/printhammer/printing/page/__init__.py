@@ -1,1 +1,1 @@
-"""Pages: patterns of wires and columns, lettering and fonts, and the page that a head prints of them."""
+"""Pages: patterns of wires and columns, and the page that a head prints of them."""

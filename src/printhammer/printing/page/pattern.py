@@ -31,8 +31,8 @@ from typing import Any, Final, Self
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.printing.page import lettering
-from printhammer.printing.page.lettering import COLUMNS, lettered
+from printhammer.printing.dots import lettering
+from printhammer.printing.dots.lettering import COLUMNS, lettered
 from printhammer.results import Declared, column, part
 from printhammer.support.arrays import BoolArray
 from printhammer.support.constants import shown
@@ -238,7 +238,7 @@ class Pattern(Declared):
             Number of wires.
         font : path, optional
             A TrueType font; by default the built-in font for 9 wires, of
-            `printhammer.printing.page.lettering`, and DejaVu Sans Mono for others.
+            `printhammer.printing.dots.lettering`, and DejaVu Sans Mono for others.
         columns : int, optional
             Most characters of a print line.
 

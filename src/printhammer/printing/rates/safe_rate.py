@@ -1,8 +1,9 @@
 """The safe rate: how fast a hammer prints any pattern of dots well.
 
 R(limits) is the largest rate of a grid such that at it and at every rate of the grid below it all dots are
-within limits: those of all 255 patterns of eight slots from rest, and those of the binary de Bruijn cycle of
-order 8, in which every word of eight slots occurs once, after 64 slots of it.
+within limits: those of all 255 patterns of eight slots from rest, and those of long patterns. These are the
+binary de Bruijn cycle of order 8, in which every word of eight slots occurs once, after 64 slots of it, rows
+of 200 slots, and a line of text.
 
 By default the grid begins at 100 Hz: ten milliseconds are several times the time in which such a
 hammer settles, so that below that every dot is a single pulse from rest.
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Unpack
+from typing import Any, Final, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -21,13 +22,12 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import FAULTS, Limits
+from printhammer.printing.dots.long_patterns import Kind, long_patterns
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.strategy import (
-    LEAD_IN,
     SLOTS,
     Strategy,
-    cycle_with_lead_in,
     eight_slot_patterns,
     name_of,
     open_loop,
@@ -60,25 +60,29 @@ class Failure(Declared):
 
     rate: float = scalar("Hz", "slots per second")
     pattern: str = part(
-        "the slots up to this dot, 1 where a dot is wanted; in the cycle the eight slots that end with it"
+        "the slots up to this dot, 1 where a dot is wanted; of a long pattern the last eight at most"
     )
-    in_cycle: bool = part("whether it is a dot of the cycle")
+    kind: Literal["from rest"] | Kind = part('"from rest", or the kind of the long pattern')
     slot: int = part("number of its slot; in the cycle counted from the end of the lead-in")
+    dot: int = part("number of the dot in its pattern, counted from 1")
     fault: str = part("one of `printhammer.printing.dots.judging.FAULTS`")
     deviation: float = part(
         "of the force, in parts of the single-pulse force, or of the arrival, s, or number of extra contacts",
         more="NaN where the fault is another one",
     )
     share: float = part(
-        "part of the patterns that do not pass at this rate; of a failure in the cycle, part of its dots"
+        "fraction of the patterns from rest that do not pass at this rate; in a long pattern, of its dots"
     )
 
     @property
     def text(self) -> str:
         """One sentence."""
-        where = (
-            f"in the cycle after {self.pattern[:-1]}" if self.in_cycle else f"of the pattern {self.pattern}"
-        )
+        where = {
+            "from rest": f"the last dot of the pattern {self.pattern}",
+            "cycle": f"the last dot in the cycle after {self.pattern[:-1]}",
+            "row": f"dot {self.dot} of a row",
+            "text": f"the last dot in a line of text after {self.pattern[:-1]}",
+        }[self.kind]
         what = {
             "force": f"has a force off by {100.0 * self.deviation:+.2f} %",
             "arrival": f"arrives {1e6 * self.deviation:+.1f} µs off",
@@ -86,7 +90,7 @@ class Failure(Declared):
             "lost": "is lost",
             "not run": "is not run: the run ended early",
         }[self.fault]
-        return f"At {self.rate:g} Hz the last dot {where} {what}."
+        return f"At {self.rate:g} Hz {where} {what}."
 
 
 class SafeRate(Result):
@@ -115,11 +119,11 @@ class SafeRate(Result):
     arrival_high: FloatArray = column("s", "latest arrival, less slot time and nominal flight time", "rate")
     lost: IntArray = column("1", "number of lost dots", "rate", dtype=np.int32)
     extra_contacts: IntArray = column("1", "number of extra contacts", "rate", dtype=np.int32)
-    cycle_run: BoolArray = column(
+    long_run: BoolArray = column(
         "1",
-        "whether the cycle was run after the patterns from rest",
+        "whether the long patterns were run after those from rest",
         "rate",
-        more="it is not where one of these does not pass",
+        more="they are not where one of these does not pass",
         dtype=np.int8,
     )
     peak_drive: float = scalar(
@@ -181,7 +185,7 @@ def safe_rate(
     last: float | str = LAST,
     step: float | str = STEP,
     stop: bool = True,
-    cycle: bool = True,
+    long: bool = True,
     progress: Callable[[float], None] | None = None,
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InThreads],
@@ -204,8 +208,9 @@ def safe_rate(
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise the rates up to the last one are run
         as well, for a chart.
-    cycle : bool, optional
-        Whether the dots of the cycle have to be within limits too, beside those of the patterns from rest.
+    long : bool, optional
+        Whether the dots of the cycle, of rows and of a line of text have to be within limits too, beside
+        those of the patterns from rest.
     progress : callable, optional
         Called with the rate, Hz, up to which all is run.
 
@@ -218,7 +223,6 @@ def safe_rate(
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=effort.tolerance) if nominal is None else nominal
     patterns = from_rest(every=strategy is not open_loop)
-    around_it = [slots_of(cycle_with_lead_in())]
     options: dict[str, Any] = {"limits": bounds, "effort": effort}
     rows: list[dict[str, Any]] = []
     failure: Failure | None = None
@@ -230,18 +234,18 @@ def safe_rate(
         good = np.flatnonzero(trial.passed)
         if stop and failure is None and not trial.passed.all():
             good = good[good < np.argmin(trial.passed)]
-        around = None
-        if cycle and good.size:
-            around = attempt([cases[k] for k in good], around_it, strategy, judged_from=LEAD_IN, **options)
+        lasting = None
+        if long and good.size:
+            lasting = attempt_long([cases[k] for k in good], strategy, **options)
         for k, case in enumerate(cases):
             runs = [(trial, k)]
-            if around is not None and k in good:
-                runs.append((around, int(np.searchsorted(good, k))))
+            if lasting is not None and k in good:
+                runs.append((lasting, int(np.searchsorted(good, k))))
             rows.append(_row(runs))
             if failure is None and rows[-1]["passed"]:
                 safe, best = case.rate, runs
             elif failure is None:
-                failure = _failure(*runs[-1], in_cycle=len(runs) > 1)
+                failure = _failure(*runs[-1], long=len(runs) > 1)
                 if stop:
                     break
         if progress is not None:
@@ -296,6 +300,13 @@ def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     return [slots for slots in patterns if every or slots[0] == 0]
 
 
+def attempt_long(cases: Sequence[Case], strategy: Strategy = open_loop, **options: Any) -> Trial:
+    """Print the long patterns in all cases, with options of `printhammer.printing.dots.trial.attempt`."""
+    patterns = long_patterns()
+    begin = [pattern.judged_from for pattern in patterns]
+    return attempt(cases, [pattern.slots for pattern in patterns], strategy, judged_from=begin, **options)
+
+
 def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
     """Return what a safe rate says of one rate, by the names of its fields, from the runs of some cases."""
 
@@ -308,7 +319,7 @@ def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
         "passed": bool(joined("passed").all()),
         "lost": int(joined("lost").sum()),
         "extra_contacts": int(joined("extra_contacts").sum()),
-        "cycle_run": len(runs) > 1,
+        "long_run": len(runs) > 1,
     }
     for name in ("force", "arrival"):
         values = joined(f"{name}_deviation")
@@ -319,11 +330,17 @@ def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
     return row
 
 
-def _failure(trial: Trial, case: int, *, in_cycle: bool) -> Failure:
-    """Return the failure that comes in the earliest slot, of several that of the first pattern."""
+def _failure(trial: Trial, case: int, *, long: bool) -> Failure:
+    """Return the failure that comes in the earliest slot, of several that of the first pattern.
+
+    Of long patterns that of the first one that does not pass.
+    """
     rows, judgement = trial.rows(case), trial.judgement
     faults, slots = judgement.faults[rows], trial.slots[rows]
     wrong = faults >= 0
+    first = int(np.argmax(wrong.any(axis=1)))
+    if long:
+        wrong[first + 1 :] = False
     row, dot = np.unravel_index(int(np.argmin(np.where(wrong, slots, np.iinfo(np.int64).max))), slots.shape)
     slot, fault, member = int(slots[row, dot]), FAULTS[faults[row, dot]], rows.start + int(row)
     deviation = {
@@ -331,16 +348,19 @@ def _failure(trial: Trial, case: int, *, in_cycle: bool) -> Failure:
         "arrival": judgement.arrival_deviation,
         "extra contacts": judgement.extra_contacts,
     }.get(fault)
-    since = slot - SLOTS + 1 if in_cycle else 0
+    since = max(slot - SLOTS + 1, 0) if long else 0
     wanted = set(trial.patterns[int(row)])
+    kind = long_patterns()[int(row)].kind if long else "from rest"
+    begin = long_patterns()[int(row)].judged_from if long else 0
     return Failure(
         rate=trial.cases[case].rate,
         pattern="".join("1" if number in wanted else "0" for number in range(since, slot + 1)),
-        in_cycle=in_cycle,
-        slot=slot - LEAD_IN if in_cycle else slot,
+        kind=kind,
+        slot=slot - begin,
+        dot=int(dot) + 1,
         fault=fault,
         deviation=math.nan if deviation is None else float(deviation[member, dot]),
-        share=float(wrong.sum() / judgement.wanted[rows].sum() if in_cycle else wrong.any(axis=1).mean()),
+        share=float(wrong.sum() / judgement.wanted[rows][first].sum() if long else wrong.any(axis=1).mean()),
     )
 
 
@@ -351,21 +371,20 @@ def all_pass(
     limits: Limits,
     effort: Effort,
 ) -> BoolArray:
-    """Return whether all patterns from rest, and the cycle, are within limits, for each hammer at a rate.
+    """Return whether all patterns, from rest and long ones, are within limits, for each hammer at a rate.
 
     Arguments as for `printhammer.printing.dots.trial.attempt`.
     """
     options: dict[str, Any] = {"limits": limits, "effort": effort}
     patterns = from_rest(every=strategy is not open_loop)
-    cycle = [slots_of(cycle_with_lead_in())]
     passed = np.zeros(len(cases), dtype=np.bool_)
     for begin in range(0, len(cases), _HAMMERS_AT_ONCE):
         some = cases[begin : begin + _HAMMERS_AT_ONCE]
         passed[begin : begin + len(some)] = attempt(some, patterns, strategy, **options).passed
     left = np.flatnonzero(passed)
-    if left.size:
-        some = [cases[k] for k in left.tolist()]
-        passed[left] = attempt(some, cycle, strategy, judged_from=LEAD_IN, **options).passed
+    for begin in range(0, left.size, _HAMMERS_AT_ONCE):
+        piece = left[begin : begin + _HAMMERS_AT_ONCE]
+        passed[piece] = attempt_long([cases[k] for k in piece.tolist()], strategy, **options).passed
     return passed
 
 

@@ -46,7 +46,7 @@ _DOT: Final = "#"
 @cache
 def glyphs() -> Mapping[str, BoolArray]:
     """Return the dots of every character of the font: arrays (9, 6), wires from the top by columns."""
-    text = (files("printhammer.printing.page") / "fonts" / "nine-wire.txt").read_text("utf-8")
+    text = (files("printhammer.printing.dots") / "fonts" / "nine-wire.txt").read_text("utf-8")
     drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
     # Blank lines part the groups; the first one says what the file is.
     for group in text.split("\n\n")[1:]:

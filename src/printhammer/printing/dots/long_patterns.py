@@ -1,0 +1,51 @@
+"""Long patterns by which drives are judged: the de Bruijn cycle, rows of dots, and a line of text.
+
+A cycle holds every word of eight slots, but at most eight dots in a row. An error may grow from dot to dot,
+and show only in a longer row: rows have 200 slots, with a dot in every one, or in every second or third. The
+text holds all letters and digits in the built-in font, as each wire of a head prints them.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Final, Literal, NamedTuple, get_args
+
+from printhammer.printing.dots.lettering import lettered
+from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slots_of
+
+ROW: Final = 200  # Number of slots of a row of dots
+
+STEPS: Final = (1, 2, 3)  # Slots from dot to dot of the rows
+
+TEXT: Final = "Pack my box with five dozen liquor jugs 0123456789"
+"""The line of text: every letter of the alphabet and every digit."""
+
+Kind = Literal["cycle", "row", "text"]
+KINDS: Final = get_args(Kind)
+
+
+class LongPattern(NamedTuple):
+    """A long pattern: its kind, the slots at which dots are wanted, and the first slot that is judged."""
+
+    kind: Kind
+    slots: tuple[int, ...]
+    judged_from: int = 0
+
+
+def row_of_dots(step: int = 1) -> tuple[int, ...]:
+    """Return the slots of a row of `ROW` slots with a dot in every `step`-th one."""
+    return tuple(range(0, ROW, step))
+
+
+@cache
+def long_patterns() -> tuple[LongPattern, ...]:
+    """Return the cycle after its lead-in, the rows, and a pattern for each wire of the line of text.
+
+    Patterns of a kind follow each other.
+    """
+    wires = [slots_of(wire) for wire in lettered(TEXT, columns=len(TEXT))[0]]
+    return (
+        LongPattern("cycle", slots_of(cycle_with_lead_in()), LEAD_IN),
+        *(LongPattern("row", row_of_dots(step)) for step in STEPS),
+        *(LongPattern("text", slots) for slots in wires if slots),
+    )
