@@ -221,7 +221,7 @@ def test_a_file_that_is_there_is_not_written_over(
 )
 def test_force_is_offered_where_new_files_are_written(cli: Callable[..., Any], verb: Verb) -> None:
     shown = cli(*verb.name.split(), "--help").out
-    assert ("Write over files" in shown) == (verb.name != "sweep")
+    assert ("Overwrite" in shown) == (verb.name != "sweep")
 
 
 def test_the_readings_of_a_figure_are_those_of_the_library() -> None:

@@ -1,7 +1,7 @@
-"""The program `printhammer`: its verbs, and how it ends.
+"""The program `printhammer`: its verbs and its exit status.
 
-Exit status: 0; 1 where a run did not reach its end, or with ``--strict`` a claim fails; 2 for bad input, told
-in one sentence on the standard error; 130 after Ctrl-C.
+Exit status: 0 for success; 1 if a run stopped early, or with ``--strict`` a claim fails; 2 for bad input,
+described in one sentence on the standard error; 130 after Ctrl-C.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from printhammer.errors import PrinthammerError
 
 BAD_INPUT: Final = 2
 _COLUMNS: Final = 76
-"""Where the lines of an example end at the latest."""
+"""Largest line length of an example."""
 
 HELP: Final = (
     "A laboratory for impact print hammers: motion, contacts, dots, and the claims of Hendriks (1983)."
 )
 
-# What typer raises for a command line that it cannot use; it has no public name in every version of typer.
+# Exception of typer for an invalid command line; not every version of typer gives it a public name.
 _REFUSED: Final[type[Exception]] = typer.BadParameter.__mro__[2]
 
 
@@ -42,11 +42,11 @@ def _program(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Hold the options of the program itself."""
+    """Declare the options of the program itself."""
 
 
 def _shown(example: str | None) -> str | None:
-    """Return an example as the help shows it, in lines that a shell takes as they stand."""
+    """Format an example for the help, in lines that can be pasted into a shell."""
     if example is None:
         return None
     lines = ["Example:"]
@@ -61,7 +61,7 @@ def _shown(example: str | None) -> str | None:
 def build_program(
     name: str, text: str, example: str, verbs: Iterable[Verb], groups: Mapping[str, tuple[str, str | None]]
 ) -> typer.Typer:
-    """Build a program of verbs; `groups` gives the help and the example of each group."""
+    """Build a program from verbs; `groups` holds the help and the example of each group."""
     program = typer.Typer(
         name=name,
         help=text,
@@ -103,7 +103,7 @@ def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None
         complain(str(error))
         sys.exit(BAD_INPUT)
     except _REFUSED as error:
-        # Without arguments the help has been shown, and nothing is left to say.
+        # Without arguments typer has shown the help, and the message is empty.
         if message := getattr(error, "format_message", str)().strip():
             complain(f"{message.rstrip('.')} (see --help)")
         sys.exit(BAD_INPUT)

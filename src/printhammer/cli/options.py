@@ -1,10 +1,8 @@
-"""The options of the verbs: how each is written, what it means, and how its text becomes a value.
+"""Declarations of command-line options: flag, help text, and parser of the value.
 
 A verb declares its options as defaults of its parameters, ``points: int = whole("Number of points.",
-default=200)``, and gets the value, not the text. Those that many verbs share are declared here, once, and
-mean the same everywhere.
-
-The two unit systems in which the command line shows quantities.
+default=200)``, and receives the parsed value. Options that several verbs share are declared once, below.
+`Units` names the two unit systems in which the command line shows quantities.
 """
 
 from __future__ import annotations
@@ -36,38 +34,38 @@ class Option:
     """An option or argument of a verb."""
 
     help: str
+    """Help text: begins with the field's noun or a verb; names unit and default."""
     metavar: str | None = None
-    """What it means, and what stands for its value in the help."""
+    """Placeholder of the value in the help."""
     default: Any = None
-    """Value where it is not given; an ellipsis if it must be."""
+    """Default value; an ellipsis marks a required option."""
     flag: str | None = None
-    """How it is written; by default as the parameter is called."""
+    """Flag; None derives it from the name of the parameter."""
     panel: str | None = None
-    """Heading in the help under which it stands."""
+    """Heading of the help panel that lists the option."""
     type: Any = str
-    """What typer makes of its text: str, Path, int, float, bool or an enumeration."""
+    """Type into which typer converts the text: str, Path, int, float, bool or an enumeration."""
     read: Callable[[str, str], Any] | None = None
-    """Makes the value of its text and its name instead; raises `InputError`."""
+    """Parser of (text, flag) that replaces the conversion by typer; raises `InputError`."""
     many: bool = False
-    """Whether it may be given repeatedly."""
+    """Whether the option is repeatable."""
     least: float | None = None
-    """Least number that is accepted."""
+    """Smallest number accepted."""
     argument: bool = False
-    """Whether it stands without a flag."""
+    """Whether the value is positional, without a flag."""
     is_input: bool = False
-    """Whether it names files that are read, which no output may be."""
+    """Whether the option names input files, which no output may overwrite."""
     writes: bool = False
-    """Whether it names a place to write new files to."""
+    """Whether the option names the place of new files."""
     hammer: Literal["named", "loaded", "fired"] | None = None
-    """Of the hammer that is worked on: "named", "loaded" with its warnings shown, or "fired", which has a
-    waveform too."""
+    """Role of a hammer: "named" (not loaded), "loaded" (warnings shown), "fired" (has a waveform)."""
 
     def flag_of(self, name: str) -> str:
-        """Return how the option of a parameter is written."""
+        """Return the flag of the option of a parameter."""
         return self.flag or f"--{name.replace('_', '-')}"
 
     def annotation(self, name: str) -> Any:
-        """Return the annotation from which typer makes the option of a parameter."""
+        """Return the annotation from which typer builds the option of a parameter."""
         read = self.read is not None or self.hammer is not None
         type_: Any = str if read else self.type
         type_ = list[type_] if self.many else type_
@@ -81,7 +79,7 @@ class Option:
         return Annotated[type_ | None if self.default is None else type_, entry]
 
     def typer_default(self) -> Any:
-        """Return the default as typer shows it: as text where the text is read."""
+        """Return the default for typer: as text if `read` parses the text."""
         if self.read is None or self.default in (None, ...):
             return self.default
         return format(self.default, "g") if isinstance(self.default, float) else str(self.default)
@@ -89,54 +87,54 @@ class Option:
 
 @dataclass(frozen=True)
 class Files(Option):
-    """An option that names files to write; the runner checks them before any work, and writes them."""
+    """An option that names output files; the runner checks them before the computation and writes them."""
 
     endings: tuple[str, ...] = ()
-    """How names may end beside those of pictures; empty if the end does not matter."""
+    """Accepted file endings besides those of pictures; empty if any ending is accepted."""
     pictures: bool = True
-    """Whether names may be those of pictures."""
+    """Whether pictures are accepted."""
     continued: bool = False
-    """Whether the work goes on with a file that is there, and writes nothing over."""
+    """Whether the computation resumes an existing file instead of overwriting it."""
 
 
 def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
-    """Return an option for pictures, and files with these endings."""
+    """Return an option for output files: pictures and files with the endings listed."""
     return Files(what, "FILE", type=Path, many=many, endings=endings, **more)
 
 
 def results(what: str, *more: str, **options: Any) -> Files:
-    """Return the option `--out` of a verb that has a result: data, a picture, or what else it can be."""
+    """Return the option `--out` of a verb with a result: data files, pictures, and `more` endings."""
     endings = (*DATA, *more)
     kinds = f"{what} ({', '.join(endings)}; SI)"
-    return files(f"{kinds} or picture (.svg, .png, .pdf); may be given repeatedly.", *endings, **options)
+    return files(f"{kinds} or picture (.svg, .png, .pdf); repeatable.", *endings, **options)
 
 
 def file(what: str, *endings: str, **more: Any) -> Files:
-    """Return an option for one file that is no picture, unless `many` are allowed."""
+    """Return an option for one output file that is not a picture; `many=True` makes it repeatable."""
     return files(what, *endings, **{"many": False, "pictures": False, **more})
 
 
-# What follows stands as a default of parameters of all types, and therefore returns none in particular. Every
-# further keyword is an attribute of the option.
+# The options below are defaults of parameters of any type; hence the return type Any. Further keywords are
+# attributes of `Option`.
 
 
 def text(metavar: str, what: str, **more: Any) -> Any:
-    """Return an option whose text is used as it is, or as typer reads it."""
+    """Return an option whose text is used verbatim, or as typer converts it."""
     return Option(what, metavar, **more)
 
 
 def argument(metavar: str, what: str, **more: Any) -> Any:
-    """Return what stands without a flag."""
+    """Return a positional argument."""
     return Option(what, metavar, argument=True, **more)
 
 
 def bounded(least: float, what: str, *, default: float, **more: Any) -> Any:
-    """Return an option that is a number of the type of its default, at least `least`."""
+    """Return a numeric option, of the type of its default and at least `least`."""
     return Option(what, more.pop("metavar", None), default, type=type(default), least=least, **more)
 
 
 def choice(choices: str, what: str, **more: Any) -> Any:
-    """Return an option for one of several words, such as "add|replace"."""
+    """Return an option with a fixed set of values, such as "add|replace"."""
     words = choices.split("|")
 
     def read(written: str, name: str) -> str:
@@ -148,22 +146,22 @@ def choice(choices: str, what: str, **more: Any) -> Any:
 
 
 def switch(what: str, *, default: bool = False, **more: Any) -> Any:
-    """Return an option that is given or not."""
+    """Return a Boolean flag."""
     return Option(what, default=default, type=bool, **more)
 
 
 def whole(what: str, **more: Any) -> Any:
-    """Return an option that is a whole number."""
+    """Return an integer option."""
     return Option(what, "N", read=read_whole, **more)
 
 
 def number(what: str, metavar: str = "X", **more: Any) -> Any:
-    """Return an option that is a number without unit."""
+    """Return an option for a number without a unit."""
     return Option(what, metavar, read=read_plain, **more)
 
 
 def quantity(si: str, metavar: str, what: str, *, positive: bool = False, **more: Any) -> Any:
-    """Return an option that is a number, or one above 0, with a unit of the dimension of an SI unit."""
+    """Return an option for a number with a unit of the dimension of `si`; above 0 if `positive`."""
 
     def read(written: str, name: str) -> float:
         from printhammer.drive.input import read_number, read_positive
@@ -174,12 +172,12 @@ def quantity(si: str, metavar: str, what: str, *, positive: bool = False, **more
 
 
 def span(what: str, **more: Any) -> Any:
-    """Return an option for two ends with their units and a number of values."""
+    """Return an option for a range: two ends with units, and a number of values."""
     return Option(what, "LOW, HIGH, N", read=read_span, **more)
 
 
 def rates_between(what: str, most: int) -> Any:
-    """Return an option for two rates and how many they and those between them are, at most `most`."""
+    """Return an option for evenly spaced rates: lowest, highest and their number, at most `most`."""
 
     def read(written: str, name: str) -> list[float]:
         import numpy as np
@@ -208,17 +206,17 @@ def rates_between(what: str, most: int) -> Any:
 
 
 def source(what: str, **more: Any) -> Any:
-    """Return an option that names a file that is read, or several."""
+    """Return an option for an input file, or several with `many=True`."""
     return Option(what, "FILE", type=Path, is_input=True, **more)
 
 
 def folder(what: str, **more: Any) -> Any:
-    """Return an option that names a folder to write to, or what else lies in one place."""
+    """Return an option for an output folder, or another single place to write to."""
     return Option(what, **{"metavar": "FOLDER", "type": Path, "writes": True, **more})
 
 
 def read_whole(written: str, name: str) -> int:
-    """Read a whole number; InputError if it is none."""
+    """Parse an integer."""
     try:
         return int(written)
     except ValueError:
@@ -226,7 +224,7 @@ def read_whole(written: str, name: str) -> int:
 
 
 def read_plain(written: str, name: str) -> float:
-    """Read a number; InputError if it is none."""
+    """Parse a number without a unit."""
     try:
         return float(written)
     except ValueError:
@@ -235,13 +233,13 @@ def read_plain(written: str, name: str) -> float:
 
 
 def read_share(written: str, name: str) -> float:
-    """Read a part such as 0.1 or 10%; InputError if it is none."""
+    """Parse a fraction written as 0.1 or 10%."""
     value = written.strip()
     return read_plain(value.removesuffix("%"), name) / (100.0 if value.endswith("%") else 1.0)
 
 
 def read_span(written: str, name: str) -> tuple[str, str, int]:
-    """Read two ends with their units and a number of values, such as '0 um, 100 um, 64'; else InputError."""
+    """Parse a range: two ends with units and a number of values, such as '0 um, 100 um, 64'."""
     parts = [part.strip() for part in written.split(",")]
     if len(parts) != 3:
         raise InputError(
@@ -253,7 +251,7 @@ def read_span(written: str, name: str) -> tuple[str, str, int]:
 
 
 def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float]:
-    """Return evenly spaced values of a `span` in an SI unit, none for None; else InputError."""
+    """Return the evenly spaced values of a `span` in an SI unit; an empty list for None."""
     import numpy as np
 
     from printhammer.drive.input import read_number
@@ -269,18 +267,18 @@ def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float
 
 
 def given(**options: Any) -> dict[str, Any]:
-    """Return the options that are not None; the others have the defaults of the library."""
+    """Return the options that are not None; the library supplies the other defaults."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def need_one(options: Mapping[str, object], example: str) -> None:
-    """Make sure that one of `period` and `rate` is given, and one only; else InputError."""
+    """Require exactly one of `period` and `rate`."""
     if (options.get("period") is None) == (options.get("rate") is None):
         raise InputError(f"--period and --rate: expected one of them, such as {example}", key="--period")
 
 
 def refuse(options: Mapping[str, object], expected: str) -> None:
-    """Make sure that none of some options is given; else InputError, which tells what is expected."""
+    """Raise InputError if any of the options is set; the error says what is `expected`."""
     for name, value in options.items():
         if value is not None:
             raise InputError(f"--{name} is given", key=f"--{name}", expected=expected)
@@ -290,29 +288,33 @@ _TRAIN: Final = "Train (one of --period and --rate)"
 
 
 def overlapping(panel: str = _TRAIN) -> Any:
-    """Return the option that says what overlapping pulses do."""
-    return choice("add|replace", "Overlapping pulses add up (default), or the latest replaces.", panel=panel)
+    """Return the option `--overlap`, the rule for overlapping pulses."""
+    return choice(
+        "add|replace",
+        "Rule for overlapping pulses: add their currents, or let the latest replace the others.",
+        panel=panel,
+    )
 
 
 def _hammer(use: str, *, flag: bool = False) -> Any:
-    what = "A hammer file, or the name of a shipped hammer."
+    what = "Hammer file, or the name of a shipped hammer."
     return text("HAMMER", what, default="hendriks-1983", argument=not flag, is_input=True, hammer=use)
 
 
-PART: Final = source("Python file that registers laws of parts; may be given repeatedly.", many=True)
+PART: Final = source("Python file that registers further laws of parts; repeatable.", many=True)
 NAMED, HAMMER, FIRED = _hammer("named"), _hammer("loaded"), _hammer("fired")
 HAMMER_OPTION: Final = _hammer("loaded", flag=True)
-PERIOD: Final = text("TIME", "Time between firings, such as '1.05 ms'.", panel=_TRAIN)
-RATE: Final = text("RATE", "Firings per second, such as '952 Hz'.", panel=_TRAIN)
+PERIOD: Final = text("TIME", "Time between firings, e.g. '1.05 ms'.", panel=_TRAIN)
+RATE: Final = text("RATE", "Firings per second, e.g. '952 Hz'.", panel=_TRAIN)
 OVERLAP: Final = overlapping()
 TRAIN: Final = {"period": PERIOD, "rate": RATE, "overlap": OVERLAP}
 DRIVE: Final = source(
-    "A drive file instead: a force without end, or pulses at a constant rate.", panel=_TRAIN
+    "Drive file, instead of --period or --rate: an endless force, or pulses at a constant rate.", panel=_TRAIN
 )
 FIRED_TRAIN: Final = {**TRAIN, "drive": DRIVE}
-LOWEST: Final = text("VALUE", "Least value, with its unit.", flag="--from")
-HIGHEST: Final = text("VALUE", "Largest value, with its unit.", flag="--to")
-TOLERANCE: Final = number("Error allowed in one step.")
-THREADS: Final = whole("Threads (as many as cores).")
-UNITS: Final = text("si|inch", "Unit system on the terminal.", default=Units.SI, type=Units)
-FORCE: Final = switch("Write over files that are there.", flag="--force")
+LOWEST: Final = text("VALUE", "Lowest parameter value, with its unit.", flag="--from")
+HIGHEST: Final = text("VALUE", "Highest parameter value, with its unit.", flag="--to")
+TOLERANCE: Final = number("Error tolerance of one integration step, relative to stroke and typical speed.")
+THREADS: Final = whole("Number of threads (default: number of cores).")
+UNITS: Final = text("si|inch", "Unit system of the numbers on the terminal.", default=Units.SI, type=Units)
+FORCE: Final = switch("Overwrite existing files.", flag="--force")

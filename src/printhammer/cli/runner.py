@@ -1,11 +1,10 @@
-"""The one way in which every verb runs.
+"""Runner of the verbs: options in, `Answer` out.
 
-A verb is a function of its options, and of a `Job` where it asks for one, declared with `verb`. The runner
-reads the options, checks before any work that every file can be written and writes over none, loads the
-hammer, and has compiling announced; the verb computes and returns an `Answer`; the runner shows it, writes
-the files, complains, and sets the exit status.
-
-How the verbs of chaos are told what is fired for ever: by period or rate, or by a drive file.
+A verb is a function of its options, and of a `Job` if it has a parameter `job`, declared with `verb`. The
+runner parses the options, checks before the computation that every output file is new and writable, loads
+the hammer, and announces compilation; the verb computes and returns an `Answer`; the runner shows the answer,
+writes the files, prints complaints, and sets the exit status. `firing_of` reads the endless drive of the
+verbs of chaos: period or rate, or a drive file.
 """
 
 from __future__ import annotations
@@ -38,34 +37,34 @@ Shown = TypeVar("Shown")
 INTERRUPTED: Final = 130
 _FORCE: Final = "write_over"
 _WITH_PARTS: Final = ("HAMMER", "SPEC")
-"""What stands for the files that may name a law from elsewhere."""
+"""Placeholders of the files that may use laws registered with --part."""
 PICTURES: Final = (".svg", ".png", ".pdf")
-"""Endings of the names of pictures."""
+"""File endings of pictures."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds: a picture where its name ends as one's does, else what `save` writes."""
+    """Content of an output file: a picture if its ending says so, else whatever `save` writes."""
 
     save: Callable[[Path], Any] | None = None
-    """Writes any file that is no picture; None where the work itself has written it."""
+    """Writer of any file that is not a picture; None if the computation has written the file."""
     plot: Callable[[], Any] | None = None
-    """Returns a matplotlib figure."""
+    """Function that returns a matplotlib figure."""
 
     @classmethod
     def text(cls, content: Callable[[], str]) -> Content:
-        """Return content that is a text, made when it is written."""
+        """Return text content, composed when the file is written."""
         from printhammer.support.files import write_file
 
         return cls(lambda path: write_file(path, content()))
 
     @classmethod
     def of(cls, result: Any, **options: Any) -> Content:
-        """Return a result as content; `options` go to its `plot`."""
+        """Return the content of a result; `options` are passed to its `plot`."""
         return cls(result.save, lambda: result.plot(**options))
 
     def write(self, path: Path) -> None:
-        """Write a file; InputError if it cannot be written."""
+        """Write the file; raise InputError if that is impossible."""
         from printhammer.support.files import write_file
 
         ending = path.suffix.lower()
@@ -79,20 +78,20 @@ class Content:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a verb has to say at its end."""
+    """Answer of a verb: text, files and exit status."""
 
     shown: Sequence[RenderableType] = ()
-    """What is still to be shown; text is markup."""
+    """Renderables to show; text is rich markup."""
     note: str = ""
     """Line below the name of the hammer."""
     files: Mapping[str, Content] = field(default_factory=dict)
-    """What the files of an option hold."""
+    """Content of the output files, by the name of their option."""
     complaints: Sequence[str] = ()
-    """Why the exit status is 1."""
+    """Reasons for exit status 1, printed on the standard error."""
     failed: bool = False
-    """Whether it is 1 without a complaint."""
+    """Whether the exit status is 1 without a complaint."""
     interrupted: bool = False
-    """Whether Ctrl-C ended the work, of which this much was done."""
+    """Whether Ctrl-C stopped the computation; the answer holds the finished part."""
 
 
 class Job:
@@ -102,26 +101,26 @@ class Job:
         self, declared: Mapping[str, Files], wanted: Mapping[str, list[Path]], *, force: bool = False
     ) -> None:
         self.hammer: Hammer | None = None
-        """The hammer that is worked on."""
+        """Loaded hammer, if any."""
         self.declared, self.wanted = declared, dict(wanted)
-        """Options that name files to write, and these files, by the name of the option."""
+        """Declarations of the output options, and the files requested, by the name of the option."""
         self.inputs: list[Path] = []
-        """Files that are read."""
+        """Input files."""
         self.force = force
-        """Whether files that are there may be written over."""
+        """Whether existing files may be overwritten."""
         self.screen = console()
-        """The standard output."""
+        """Console of the standard output."""
         self.seconds = 0.0
-        """How long the last work took whose progress was shown."""
+        """Duration, s, of the last computation with a progress display."""
         self._headed = False
 
     @property
     def outputs(self) -> list[Path]:
-        """All files to write."""
+        """All output files."""
         return [path for paths in self.wanted.values() for path in paths]
 
     def check(self, *inputs: Path) -> None:
-        """Make sure, before any work, that all files can be written, are new, and are none that is read.
+        """Check before the computation that all output files are writable, new, and not input files.
 
         Errors as for `check_endings`, `check_outputs` and `check_new`.
         """
@@ -147,7 +146,7 @@ class Job:
                 self.check_new(paths)
 
     def check_new(self, paths: Iterable[Path]) -> None:
-        """Make sure, before any work, that no file is there yet, unless with --force; else InputError."""
+        """Raise InputError if an output file exists, unless --force is set."""
         for path in paths:
             if not self.force and (path.exists() or path.is_symlink()):
                 raise InputError(
@@ -155,11 +154,11 @@ class Job:
                 )
 
     def counting(self, name: str, *, remaining: bool = True) -> AbstractContextManager[terminal.Counted]:
-        """Show a bar during work that is counted, and note its time; see `progress.counting`."""
+        """Show a progress bar and record the duration; see `terminal.counting`."""
         return self._timed(terminal.counting(name, remaining=remaining))
 
     def telling(self, first: str = "…") -> AbstractContextManager[Callable[[str], None]]:
-        """Show a line during work whose end is not known, and note its time; see `progress.telling`."""
+        """Show a status line and record the duration; see `terminal.telling`."""
         return self._timed(terminal.telling(first))
 
     @contextmanager
@@ -172,7 +171,7 @@ class Job:
             self.seconds = perf_counter() - begin
 
     def show(self, *parts: RenderableType, note: str = "") -> None:
-        """Print at once, below the name of the hammer; text is markup."""
+        """Print at once, below the name of the hammer; text is rich markup."""
         if not self._headed and self.hammer is not None:
             self.screen.print(heading(self.hammer))
             if note:
@@ -183,11 +182,11 @@ class Job:
             self.screen.print(part, soft_wrap=isinstance(part, str))
 
     def wrote(self, path: Path | str) -> None:
-        """Tell that a file was written."""
+        """Print the name of a file that was written."""
         self.screen.print(f"[dim]wrote[/dim] {escape(str(path))}", soft_wrap=True)
 
     def end(self, answer: Answer) -> int:
-        """Show, write and complain; return the exit status."""
+        """Show the answer, write its files, print its complaints; return the exit status."""
         if answer.shown or answer.note:
             self.show(*answer.shown, note=answer.note)
         for name, content in answer.files.items():
@@ -206,27 +205,27 @@ class Verb:
     """A verb of the command line."""
 
     name: str
-    """What it is called, such as "strobe" or "fit magnet"."""
+    """Name, such as "strobe" or "fit magnet"."""
     example: str
-    """A command line that runs; it stands in the help."""
+    """Runnable command line for the help."""
     call: Callable[..., int]
-    """What typer calls, with texts; returns the exit status."""
+    """Function that typer calls with texts; returns the exit status."""
     options: Mapping[str, Option]
-    """Options with their declarations, by the names of the parameters."""
+    """Declarations of the options, by parameter name."""
     files: Mapping[str, Files]
-    """Options that name files to write."""
+    """Declarations of the options that name output files."""
 
 
 def verb(
     name: str, example: str, passed: Mapping[str, Option] | None = None, **files: Files
 ) -> Callable[[Callable[..., Answer]], Verb]:
-    """Make a function the verb `name`, with an example of a command line that runs.
+    """Decorate a function as the verb `name`, with a runnable example.
 
-    The function has options as defaults of its parameters, and gets the `Job` too where it has a parameter
-    `job`. Options that are `passed` are those that the library takes under the same name: the function gets
-    those that are given as further keywords, to pass them on; the others have the defaults of the library.
-    `files` name files to write, in the order of writing; a verb that writes new ones has the option --force.
-    One that reads a hammer or a spec has the option --part, as has one that names it among those passed.
+    The function declares options as defaults of its parameters, and receives the `Job` in a parameter `job`
+    if it has one. `passed` are options of the library function under the same names: those that are set
+    arrive as further keywords, and the library supplies the other defaults. `files` declare output files, in
+    the order of writing. A verb that writes new files has the option --force; a verb that reads a hammer or a
+    spec, or names `part` among `passed`, has the option --part.
     """
 
     def made(function: Callable[..., Answer]) -> Verb:
@@ -253,7 +252,7 @@ def verb(
                 words["job"] = job
             return job.end(function(**words))
 
-        # What typer looks at.
+        # Typer reads docstring, signature and annotations.
         typed: Any = call
         typed.__doc__ = function.__doc__
         typed.__signature__ = inspect.Signature(
@@ -278,7 +277,7 @@ def _listed(paths: Path | list[Path] | None) -> list[Path]:
 
 
 def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> dict[str, Any]:
-    """Check the files, read the options, load the hammer; return the values of the options."""
+    """Check the files, parse the options, load the hammer; return the values by option."""
     job.check(
         *(
             Path(path)
@@ -304,9 +303,9 @@ def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> d
 
 
 def load_hammer(name: str, *, fired: bool) -> Hammer:
-    """Load a hammer that is to be run; print what is odd about it as warnings.
+    """Load a hammer for a simulation and print its warnings.
 
-    InputError if there is none, it does not rest at its backstop, or has no waveform to be fired with.
+    Raises InputError for an unknown hammer, one without a rest state, or, if `fired`, one without a waveform.
     """
     from printhammer.hammer.hammer import load
 
@@ -324,20 +323,20 @@ def load_hammer(name: str, *, fired: bool) -> Hammer:
 
 
 def tables_beside(path: Path, *parts: object) -> list[Path]:
-    """Return the tables that parts read from a file name, which lie beside that file."""
+    """Return the paths of tables to which parts refer by name, relative to the folder of `path`."""
     names = [getattr(part, "file", None) for part in parts]
     return [path.parent / name for name in names if name]
 
 
 def announce_compiling() -> None:
-    """Have the user told when machine code is made, which takes a while once."""
+    """Announce compilation on the standard error; it takes a while, once."""
     from printhammer.run.simulate import announce_compiling as announce
 
     announce(say)
 
 
 def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "--out") -> None:
-    """Make sure that names end as what can be written there, if any end is named; else InputError."""
+    """Raise InputError unless each name has one of the endings; an empty list accepts any."""
     for path in paths:
         if endings and path.suffix.lower() not in endings:
             raise InputError(
@@ -348,7 +347,7 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
-    """Return a complaint about the statuses that are not ok, of `total` runs or as many as there are."""
+    """Return a complaint that counts the runs with a status other than ok, of `total` runs."""
     every = [str(status) for status in statuses]
     failed = [status for status in every if status != "ok"]
     kinds = ", ".join(sorted(set(failed)))
@@ -358,11 +357,11 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 def firing_of(
     job: Job, hammer: Hammer, passed: dict[str, Any], example: str = "", *, timed: bool = True
 ) -> Firing:
-    """Take the options that say how a hammer is fired out of those that are passed, for `Regime.of`.
+    """Extract the firing options from `passed`, as keywords of `Regime.of`.
 
-    One of period and rate is asked for, with an example, where `timed`; a drive file stands instead: an
-    endless force, or pulses at a constant rate. InputError where the hammer has nothing to fire, the file
-    holds anything else, or more is given than is asked for.
+    If `timed`, exactly one of period and rate is required; a drive file may replace both: an endless force,
+    or pulses at a constant rate. Raises InputError for a hammer without a waveform, any other drive file, or
+    superfluous options.
     """
     file: Path | None = passed.pop("drive", None)
     train = {name: passed.pop(name, None) for name in ("period", "rate", "overlap")}

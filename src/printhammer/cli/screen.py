@@ -1,4 +1,4 @@
-"""How summaries look on the terminal: tables that are cut into parts, facts, and styles of words."""
+"""Summaries on the terminal: tables that wrap by columns, lists of facts, and text styles."""
 
 from __future__ import annotations
 
@@ -36,31 +36,31 @@ STYLES: Final = {
     "strong": "bold",
     "best": "bold green",
 }
-"""Styles of the terminal by those of summaries, where their names differ."""
+"""Terminal styles of the summary styles whose names differ."""
 
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """A column of a table of rows, as `printhammer.results.Cells` is one of an array."""
+    """Column of a table of row objects; `printhammer.results.Cells` is its counterpart for arrays."""
 
     heading: str
     value: Callable[[Row], Any]
-    """Returns of a row a number, None or NaN if there is none, or text with marks of style."""
+    """Function that returns the cell of a row: a number, None or NaN for an empty cell, or styled text."""
     unit: str = ""
     format: str = ""
     left: bool = False
-    """Whether the cells stand to the left."""
+    """Whether the cells are left-aligned."""
 
 
 class Sheet(Table):
-    """A table that a terminal too narrow for it shows in parts, so that no digit is cut off.
+    """Table that a narrow terminal shows in blocks of columns, so that no digit is cut off.
 
-    The parts stand one below the other, and each begins with the first column. Columns to the right are
-    numbers, which are never broken; texts to the left are, between words.
+    The blocks follow one below the other, each with the first column. Right-aligned columns hold numbers,
+    which never wrap; left-aligned texts wrap between words.
     """
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Render the parts, with an empty line between them."""
+        """Render the blocks of columns, separated by empty lines."""
         for number, columns in enumerate(self._parts(console, options.max_width)):
             part = copy(self)
             part.columns = [replace(column, _index=place) for place, column in enumerate(columns)]
@@ -83,7 +83,7 @@ class Sheet(Table):
         return parts
 
     def _least(self, console: Console, column: TableColumn) -> int:
-        """Return the least width of a column: of its longest number, or of its longest word."""
+        """Return the smallest width of a column: its longest number or word."""
         texts = [console.render_str(text) for text in (column.header, *column.cells) if isinstance(text, str)]
         lines = [line for text in texts for line in text.plain.split(None if not column.no_wrap else "\n")]
         return max(map(cell_len, lines), default=0)
@@ -96,7 +96,7 @@ def table(
     title: str = "",
     most: int | None = None,
 ) -> Table:
-    """Return a table of rows without frame; of more than `most` rows the first and the last."""
+    """Return a frameless table of rows; beyond `most` rows only the first and last ones."""
     from printhammer.results.summary import Cells, Grid
 
     every = list(rows)
@@ -125,7 +125,7 @@ def _grid(grid: Grid, units: Units) -> Table:
 
 
 def marked(text: str, units: Units = Units.SI) -> str:
-    """Return a text of a summary as rich markup."""
+    """Convert a text of a summary to rich markup."""
     from printhammer.results.summary import rendered
 
     def shown(style: str, said: str) -> str:
@@ -135,7 +135,7 @@ def marked(text: str, units: Units = Units.SI) -> str:
 
 
 def render(summary: Summary, units: Units = Units.SI) -> list[RenderableType]:
-    """Return the parts of a summary, in a unit system."""
+    """Render the blocks of a summary in a unit system."""
     from printhammer.results.summary import Facts
 
     parts: list[RenderableType] = []
@@ -150,7 +150,7 @@ def render(summary: Summary, units: Units = Units.SI) -> list[RenderableType]:
 
 
 def facts(rows: Iterable[tuple[str, str]], title: str = "") -> Table:
-    """Return names and what there is to say of them, a row each."""
+    """Return a two-column table of names and values."""
     made = Table(box=None, pad_edge=False, show_header=bool(title))
     made.add_column(title, style="dim", header_style="bold", overflow="fold")
     made.add_column(overflow="fold")
@@ -160,18 +160,18 @@ def facts(rows: Iterable[tuple[str, str]], title: str = "") -> Table:
 
 
 def train_line(shape: str, quantity: str, overlap: str, period: float | None = None) -> str:
-    """Say how a hammer is fired: the shape of its pulses, how often, and what overlapping ones do."""
+    """Return a line that describes a train: pulse shape, period and overlap rule."""
     every = "" if period is None else f" every {period:.9g} s"
     return escape(f"{shape} {quantity}{every}, overlap {overlap}")
 
 
 def heading(hammer: Hammer) -> str:
-    """Return the name of a hammer and how much of it is known, in one line; rich markup."""
+    """Return the headline of a hammer: its name and the status of its constants; rich markup."""
     return f"[bold]{escape(hammer.name)}[/bold]  {honesty(hammer)}"
 
 
 def honesty(hammer: Hammer) -> str:
-    """Say in one line how much of a hammer is known; rich markup."""
+    """Return the number of constants of each status, in one line; rich markup."""
     counts: dict[str, int] = {}
     for constant in hammer.constants.values():
         counts[constant.status] = counts.get(constant.status, 0) + 1

@@ -1,6 +1,6 @@
-"""What the command line prints, and where.
+"""Output of the command line: results on the standard output, messages on the standard error.
 
-How far a verb is: on the standard error, and only where somebody looks.
+Progress displays appear on the standard error, and only if it is a terminal.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from rich.progress import Progress, ProgressColumn, Task
 
 _WIDTH: Final = 120
 _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°": "deg", "→": "->"}
-"""How signs are written where the output has none of them."""
+"""Replacements of characters that the output encoding lacks."""
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
-    """Write the nearest plain text for what a stream cannot hold, or its number where there is none."""
+    """Replace characters that a stream cannot encode by plain text, or else by their code points."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     signs = error.object[error.start : error.end]
@@ -32,7 +32,7 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
 
 
 def allow_any_text() -> None:
-    """Have text that the standard streams cannot hold, such as "µ" in ASCII, replaced instead of refused."""
+    """Make the standard streams replace characters they cannot encode, such as "µ" in ASCII."""
     codecs.register_error(__name__, _plain)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -40,7 +40,7 @@ def allow_any_text() -> None:
 
 
 def console() -> Console:
-    """Return the console of the standard output; wide enough for tables where it is no terminal."""
+    """Return the console of the standard output, wide enough for tables if it is not a terminal."""
     return Console(highlight=False, emoji=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 
@@ -49,7 +49,7 @@ _bars: Final[list[Console]] = []
 
 @contextmanager
 def above(bar: Console) -> Iterator[None]:
-    """Print what is said meanwhile above a bar that a console shows on the standard error, not into it."""
+    """Print messages above the progress bar of a console while the context is open."""
     _bars.append(bar)
     try:
         yield
@@ -69,7 +69,7 @@ def complain(sentence: str) -> None:
 
 
 def say(sentence: str) -> None:
-    """Print a remark on the standard error, so that it does not get into what is piped on."""
+    """Print a remark on the standard error, which keeps piped output clean."""
     _print(f"[dim]{escape(sentence)}[/dim]")
 
 
@@ -79,18 +79,18 @@ def warn(sentence: str) -> None:
 
 
 class Counted(Protocol):
-    """Takes steps done and of all, and perhaps what is being done."""
+    """Callback of a progress bar: steps done, total steps, and the current step's name."""
 
     def __call__(self, done: int, total: int, what: str = "", /) -> None:
-        """Show them."""
+        """Update the progress bar."""
 
 
 @contextmanager
 def counting(name: str, *, remaining: bool = True) -> Iterator[Counted]:
-    """Show count, rate and time left while something, called `name`, is counted; yield what takes the count.
+    """Show a progress bar called `name` with count, rate and time left; yield its callback.
 
-    The time that went by is shown instead of that left unless `remaining`: the latter says nothing where most
-    steps may not be needed.
+    Without `remaining`, the elapsed time replaces the time left, which means nothing if most steps may turn
+    out to be unnecessary.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn, TimeElapsedColumn
     from rich.text import Text
@@ -112,9 +112,9 @@ def counting(name: str, *, remaining: bool = True) -> Iterator[Counted]:
 
 
 def pace_of(done: float, total: float | None, seconds: float | None) -> str:
-    """Return how fast steps were done, and how long the others take at that rate; empty before the first.
+    """Return rate and time left as text; empty before the first step.
 
-    The rate is that since the beginning: steps that are done in parallel come in bursts.
+    The rate is the average since the start, because parallel steps finish in bursts.
     """
     if not done or not seconds:
         return ""
@@ -128,7 +128,7 @@ def pace_of(done: float, total: float | None, seconds: float | None) -> str:
 
 @contextmanager
 def telling(first: str = "…") -> Iterator[Callable[[str], None]]:
-    """Show a line while something is done whose end is not known; yield a function of what it says next."""
+    """Show a status line for a computation of unknown length; yield a function that sets its text."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     with _shown(SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()) as line:
@@ -142,7 +142,7 @@ def _shown(*columns: ProgressColumn) -> Iterator[Progress]:
     from rich.progress import Progress
 
     console = Console(stderr=True, highlight=False, emoji=False)
-    # Where it is no terminal, the library would end with an empty line.
+    # Without a terminal, rich would print an empty line at the end.
     bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
     with above(console), bar:
         yield bar

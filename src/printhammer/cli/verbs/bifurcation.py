@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _RANGE: Final = ("0.8 ms", "1.35 ms")
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
 _JUDGED: Final = 200
-"""Firings that are judged, where there are enough."""
+"""Firings that are classified, if there are enough: as many as `printhammer.strobe` needs."""
 _of = partial(opt.text, panel=_PARAMETER)
 
 
@@ -29,37 +29,43 @@ _of = partial(opt.text, panel=_PARAMETER)
     "printhammer bifurcation hendriks-1983 --from '1.2 ms' --to '1.35 ms' --values 60"
     " --direction both --out bifurcation.png",
     {
-        "transient": opt.whole("Firings left out at the beginning (all but 200; a third, if that is more)."),
-        "refine": opt.whole("Halve the steps between neighbours that differ so often.", default=2),
+        "transient": opt.whole("Number of firings to discard (default: all but 200, at least a third)."),
+        "refine": opt.whole(
+            "Number of times to halve the step where neighbouring verdicts differ.", default=2
+        ),
         "overlap": opt.overlapping(_PARAMETER),
-        "drive": opt.source("A drive file: a force without end, or pulses.", panel=_PARAMETER),
+        "drive": opt.source("Drive file: an endless force, or pulses.", panel=_PARAMETER),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("States and verdicts"),
+    out=opt.results("States at the firings and verdicts"),
 )
 def bifurcation(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    parameter: str = _of("NAME", "period, rate, or any constant such as backstop.damping.", default="period"),
+    parameter: str = _of(
+        "NAME", "Name of the parameter: period, rate, or a constant, e.g. backstop.damping.", default="period"
+    ),
     lowest: str | None = opt.LOWEST,
     highest: str | None = opt.HIGHEST,
-    values: int = opt.whole("Number of values.", panel=_PARAMETER, default=500),
-    period: str | None = _of("TIME", "Time between firings, where another constant is changed."),
-    rate: str | None = _of("RATE", "Firings per second, likewise."),
+    values: int = opt.whole("Number of parameter values.", panel=_PARAMETER, default=500),
+    period: str | None = _of("TIME", "Time between firings, if the parameter is neither period nor rate."),
+    rate: str | None = _of("RATE", "Firings per second, if the parameter is neither period nor rate."),
     direction: str = opt.choice(
         "from-rest|up|down|both",
-        "Begin at rest (default), or where the train at the value before, or after, ended.",
+        "Initial state of each train: rest, or the final state at the value below (up) or above (down).",
         default="from-rest",
     ),
-    firings: int = opt.whole("Firings at each value.", default=1000),
-    exponents: bool = opt.switch("Tell strange trains from undecided ones by their exponents.", default=True),
-    show: str = opt.choice("x|v", "What a picture shows.", default="x"),
+    firings: int = opt.whole("Number of firings at each value.", default=1000),
+    exponents: bool = opt.switch(
+        "Compute Lyapunov exponents to separate strange motions from undecided ones.", default=True
+    ),
+    show: str = opt.choice("x|v", "Quantity on the vertical axis of the picture.", default="x"),
     **passed: Any,
 ) -> Answer:
-    """Fire trains at many values of a parameter and tell which are periodic, and what leads to chaos.
+    """Compute a bifurcation diagram: periods and strange motions against a parameter.
 
-    Ends with status 1 where a run stopped before its end. Ctrl-C writes what is done.
+    The exit status is 1 if a run stopped early. Ctrl-C writes the finished part.
     """
     from printhammer.chaos.bifurcation.bifurcation import InterruptedDiagram
     from printhammer.chaos.bifurcation.bifurcation import bifurcation as computed
@@ -141,30 +147,41 @@ _count = partial(opt.whole, panel=_BASINS)
     " --v '-1 m/s, 1 m/s, 20' --out basins.png",
     {
         **opt.FIRED_TRAIN,
-        "x": opt.span("Displacements, such as '30 um, 260 um, 128' (the strobe window).", panel=_BASINS),
-        "v": opt.span("Velocities, such as '-1 m/s, 1 m/s, 128' (the strobe window).", panel=_BASINS),
-        "firings": _count("Firings of a round (200)."),
-        "rounds": _count("Rounds that a cell gets at most (20)."),
-        "gaps": opt.span("Times between the two firings ('0.5 ms, 0.9 ms, 128').", panel=_QUENCH),
-        "widths": opt.span("Widths of the second pulse (half to 1.5 of the first, 128).", panel=_QUENCH),
-        "tail": opt.text("TIME", "Time within which a second dot is waited for (1 ms).", panel=_QUENCH),
+        "x": opt.span(
+            "Displacements of the grid, e.g. '30 um, 260 um, 128' (default: the strobe window).",
+            panel=_BASINS,
+        ),
+        "v": opt.span(
+            "Velocities of the grid, e.g. '-1 m/s, 1 m/s, 128' (default: the strobe window).", panel=_BASINS
+        ),
+        "firings": _count("Number of firings in a round (default: 200)."),
+        "rounds": _count("Maximum number of rounds for a cell (default: 20)."),
+        "gaps": opt.span("Times between the two firings (default: '0.5 ms, 0.9 ms, 128').", panel=_QUENCH),
+        "widths": opt.span(
+            "Widths of the second pulse (default: 128 from 0.5 to 1.5 times the first).", panel=_QUENCH
+        ),
+        "tail": opt.text(
+            "TIME",
+            "Time after the second firing within which its dot has to come (default: 1 ms).",
+            panel=_QUENCH,
+        ),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Cells"),
+    out=opt.results("Basins or quench map"),
 )
 def basins(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    box: int | None = _count("Cells along the side of a box, for the entropy (4)."),
-    saddles: int | None = _count("Draw the manifolds of saddles of up to so many firings."),
-    quench: bool = opt.switch("Map two pulses from rest instead.", panel=_QUENCH),
+    box: int | None = _count("Side of a box of the basin entropy, in cells (default: 4)."),
+    saddles: int | None = _count("Largest period, in firings, of the saddles whose manifolds are drawn."),
+    quench: bool = opt.switch("Map the dots of two pulses from rest, instead of basins.", panel=_QUENCH),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Tell which states lead to which attractor, or with --quench which second pulses lose their dot.
+    """Map the basins of attraction, or with --quench the second pulses that lose their dot.
 
-    Ends with status 1 where a run stopped before its end.
+    The exit status is 1 if a run stopped early.
     """
     from printhammer.chaos.basins.basins import NO_STATE_STATUS
     from printhammer.chaos.basins.basins import basins as computed

@@ -1,4 +1,4 @@
-"""The verbs `dead-time`, `impact-time` and `duty`: when a pulse strikes, and how hot its coil gets."""
+"""The verbs `dead-time`, `impact-time` and `duty`: timing of the impact, and heating of the coil."""
 
 from __future__ import annotations
 
@@ -20,20 +20,26 @@ if TYPE_CHECKING:
     "printhammer dead-time impact-wire --voltage '36 V, 40 V, 2' --temperature '20 degC, 100 degC, 2'"
     " --out dead.csv --out dead.h",
     {
-        "blow": opt.text("SPEED", "Speed of impact whose pulse is sought (that of the own rail)."),
+        "blow": opt.text(
+            "SPEED", "Impact speed for which the pulse width is solved (default: that at the nominal rail)."
+        ),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Table", ".h"),
+    out=opt.results("Dead-time table", ".h"),
 )
 def dead_time(
     job: Job,
     hammer: Hammer = opt.FIRED,
-    voltage: tuple[str, str, int] | None = opt.span("Rails (own rail, 10 % less, 10 % more)."),
-    temperature: tuple[str, str, int] | None = opt.span("Temperatures of the coil (20, 60, 100 degC)."),
+    voltage: tuple[str, str, int] | None = opt.span(
+        "Rail voltages of the table (default: nominal, 10 % below and above)."
+    ),
+    temperature: tuple[str, str, int] | None = opt.span(
+        "Coil temperatures of the table (default: 20, 60, 100 degC)."
+    ),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Find the time from switching on to impact against rail and temperature, and pulses of the same blow."""
+    """Tabulate the dead time, from switch-on to impact, and the pulse width of equal impact speed."""
     from printhammer.control.dead_time import dead_time as timed
 
     grid: dict[str, Any] = {
@@ -54,26 +60,32 @@ def dead_time(
     "printhammer impact-time impact-wire --noise '2 mA, 20 mA, 4' --sampling-rate '200 kHz, 1 MHz, 2'"
     " --bits 12 --out impact.svg",
     {
-        "signal": opt.choice("current|voltage", "What is sampled.", default="current"),
-        "full_scale": opt.text("VALUE", "Largest value that the converter shows."),
-        "dots": opt.whole("Dots in each way to sample.", default=50),
-        "seed": opt.whole("Of hammers and noise.", default=0),
+        "signal": opt.choice("current|voltage", "Quantity that is sampled.", default="current"),
+        "full_scale": opt.text(
+            "VALUE", "Full scale of the A/D converter (default: 1.5 times the largest nominal sample)."
+        ),
+        "dots": opt.whole("Number of dots for each sampling setup.", default=50),
+        "seed": opt.whole("Seed of the hammers and of the noise.", default=0),
     },
-    out=opt.results("Errors"),
+    out=opt.results("Errors of the impact time"),
 )
 def impact_time(
     job: Job,
     hammer: Hammer = opt.FIRED,
     noise: tuple[str, str, int] | None = opt.span(
-        "Of a sample (0.1, 0.3, 1 % of the largest current; of 10 V)."
+        "Standard deviations of a sample (default: 0.1, 0.3 and 1 % of the peak current, or of 10 V)."
     ),
-    sampling_rate: tuple[str, str, int] | None = opt.span("Samples per second (1 MHz)."),
-    bits: list[str] | None = opt.text("N", "Of the converter (12); may be given repeatedly.", many=True),
-    hammers: int = opt.whole("Hammers of a production that are drawn.", default=20),
+    sampling_rate: tuple[str, str, int] | None = opt.span(
+        "Sampling rates of the converter (default: 1 MHz)."
+    ),
+    bits: list[str] | None = opt.text(
+        "N", "Resolution of the A/D converter in bits (default: 12); repeatable.", many=True
+    ),
+    hammers: int = opt.whole("Number of hammers drawn from the production spread.", default=20),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Estimate times of impact from samples of current or voltage of the coil, and tell their error."""
+    """Estimate impact times from samples of the coil current or voltage, and report their error."""
     from printhammer.control.impact_estimator import UNITS
     from printhammer.control.impact_time import impact_time as studied
 
@@ -106,28 +118,41 @@ def _coil(si: str, metavar: str, what: str) -> Any:
     "printhammer duty --heat '4 mJ' --thermal-resistance '12 K/W' --limit '91 degC' --ambient '25 degC'"
     " --ambient '50 degC' --out duty.csv",
     {
-        "thermal_resistance": _coil("K/W", "K/W", "From the winding to the ambient air, or the body."),
-        "thermal_capacity": _coil("J/K", "J/K", "Heat capacity of the winding, for times."),
-        "body_resistance": _coil("K/W", "K/W", "From the body to the ambient air, of two masses."),
-        "body_capacity": _coil("J/K", "J/K", "Heat capacity of the body."),
-        "limit": opt.quantity("degC", "TEMPERATURE", "Largest temperature of the winding.", panel=_COIL),
-        "ambient": opt.text("TEMPERATURE", "Of the ambient air (25 degC); repeatedly.", many=True),
-        "burst": opt.text("RATE", "How long and how often this rate is allowed; repeatedly.", many=True),
-        "feed": opt.choice("voltage|current|energy", "What a driver keeps in a warm coil (voltage)."),
+        "thermal_resistance": _coil(
+            "K/W", "K/W", "Thermal resistance from the winding to the air, or to the body if there is one."
+        ),
+        "thermal_capacity": _coil("J/K", "J/K", "Heat capacity of the winding; needed for burst times."),
+        "body_resistance": _coil(
+            "K/W", "K/W", "Thermal resistance from the body to the air, for a two-mass model."
+        ),
+        "body_capacity": _coil("J/K", "J/K", "Heat capacity of the body, for a two-mass model."),
+        "limit": opt.quantity("degC", "TEMPERATURE", "Temperature limit of the winding.", panel=_COIL),
+        "ambient": opt.text(
+            "TEMPERATURE", "Temperature of the ambient air (default: 25 degC); repeatable.", many=True
+        ),
+        "burst": opt.text(
+            "RATE", "Rate whose allowed burst length and duty cycle are computed; repeatable.", many=True
+        ),
+        "feed": opt.choice(
+            "voltage|current|energy",
+            "Quantity that the driver holds constant as the coil warms (default: voltage).",
+        ),
     },
-    out=opt.results("Rates"),
+    out=opt.results("Allowed rates"),
 )
 def duty(
     hammer: str | None = opt.text(
-        "HAMMER", "A hammer whose coil has a resistance, instead of --heat.", argument=True, is_input=True
+        "HAMMER", "Hammer whose coil has a resistance, instead of --heat.", argument=True, is_input=True
     ),
     heat: float | None = opt.quantity(
-        "J", "ENERGY", "Heat of one dot with the winding at 20 degC.", positive=True
+        "J", "ENERGY", "Heat of one dot with the winding at 20 degC, e.g. '4 mJ'.", positive=True
     ),
-    rates: Path | None = opt.source("Rates that a maker allows (.csv): tell the limit behind them instead."),
+    rates: Path | None = opt.source(
+        "Table of rates that a maker allows (.csv); infers the thermal limit behind them."
+    ),
     **passed: Any,
 ) -> Answer:
-    """Find the largest rate that a coil stands at an ambient temperature, and what faster bursts may last."""
+    """Compute the highest continuous rate of a coil at an ambient temperature, and limits of bursts."""
     if rates is not None:
         from printhammer.control.thermal_limit import read_rates, thermal_limit
         from printhammer.errors import located
@@ -157,7 +182,7 @@ def duty(
 
 
 def _fired(name: str | None, passed: dict[str, Any]) -> Any:
-    """Return the heat of one dot of a hammer."""
+    """Return the heat of one dot of a hammer, as a function of the winding temperature."""
     from printhammer.control.duty import heat_of
 
     if "feed" in passed:

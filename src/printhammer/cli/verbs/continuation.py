@@ -1,4 +1,4 @@
-"""The verbs `continue` and `curve`: an orbit followed through a constant, a bifurcation through two."""
+"""The verbs `continue` and `curve`: orbits in one parameter, bifurcations in two."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _CHART: Final = "Chart of two constants"
 
 
 def read_state(written: str, name: str) -> tuple[float, float]:
-    """Read displacement, m, and velocity, m/s; InputError if they are none."""
+    """Parse a state, such as '46.2 um, 12 mm/s', as displacement, m, and velocity, m/s."""
     from printhammer.drive.input import read_number
 
     parts = [part.strip() for part in written.split(",")]
@@ -33,12 +33,15 @@ def read_state(written: str, name: str) -> tuple[float, float]:
     return read_number(parts[0], "m", name), read_number(parts[1], "m/s", name)
 
 
-_FIRINGS: Final = opt.whole("Firings after which the orbit repeats.", panel=_START)
+_FIRINGS: Final = opt.whole("Orbit period, in firings.", panel=_START)
 _STATE: Final = opt.text(
-    "X,V", "State near the orbit, such as '46.2 um, 12 mm/s'.", panel=_START, read=read_state
+    "X,V", "State (x, v) near the orbit, e.g. '46.2 um, 12 mm/s'.", panel=_START, read=read_state
 )
 _PHASE: Final = opt.number(
-    "Part of the period between firing and section, from 0 to 1.", panel=_START, metavar="P", default=0.0
+    "Phase of the section after the firing, as a fraction of the period.",
+    panel=_START,
+    metavar="P",
+    default=0.0,
 )
 
 
@@ -47,7 +50,7 @@ _PHASE: Final = opt.number(
     "printhammer continue hendriks-1983 --period '1.3 ms' --parameter period"
     " --from '1.27 ms' --to '1.34 ms' --out branch.png",
     {
-        "most": opt.whole("Steps in either direction.", default=1000),
+        "most": opt.whole("Maximum number of continuation steps in each direction.", default=1000),
         "overlap": opt.overlapping(),
         "drive": opt.DRIVE,
         "tolerance": opt.TOLERANCE,
@@ -58,7 +61,7 @@ def continue_(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     parameter: str = opt.text(
-        "NAME", "'rate', 'period' or a key such as 'backstop.damping'.", default="rate"
+        "NAME", "Continuation parameter: 'rate', 'period' or a key, e.g. 'backstop.damping'.", default="rate"
     ),
     lowest: str | None = opt.LOWEST,
     highest: str | None = opt.HIGHEST,
@@ -67,22 +70,32 @@ def continue_(
     firings: int | None = _FIRINGS,
     state: tuple[float, float] | None = _STATE,
     phase: float = _PHASE,
-    doublings: int = opt.whole("How often period doublings are followed as well.", default=0),
-    regimes: bool = opt.switch("Search for orbits and follow all.", panel=_ALL),
-    longest: int = opt.whole("Most firings after which a motion repeats.", panel=_ALL, default=3),
-    seeds: int = opt.whole("Rates at which orbits are searched for.", panel=_ALL, default=6),
-    second: str | None = opt.text("NAME", "Second constant, such as 'backstop.damping'.", panel=_CHART),
-    second_from: str | None = opt.text("VALUE", "Its least value.", panel=_CHART),
-    second_to: str | None = opt.text("VALUE", "Its largest value.", panel=_CHART),
-    grid: int = opt.whole(
-        "Values of either constant at which trains from rest are judged.", panel=_CHART, default=32
+    doublings: int = opt.whole("Number of successive period doublings to follow.", default=0),
+    regimes: bool = opt.switch("Search for orbits at several rates and continue them all.", panel=_ALL),
+    longest: int = opt.whole("Largest orbit period to search for, in firings.", panel=_ALL, default=3),
+    seeds: int = opt.whole("Number of rates at which orbits are searched for.", panel=_ALL, default=6),
+    second: str | None = opt.text(
+        "NAME", "Name of the second parameter, e.g. 'backstop.damping'.", panel=_CHART
     ),
-    show: str = opt.choice("v|x|flight_time|peak_force", "What pictures show.", default="v"),
+    second_from: str | None = opt.text(
+        "VALUE", "Lower bound of the second parameter, with its unit.", panel=_CHART
+    ),
+    second_to: str | None = opt.text(
+        "VALUE", "Upper bound of the second parameter, with its unit.", panel=_CHART
+    ),
+    grid: int = opt.whole(
+        "Number of grid values per parameter at which a train from rest is classified.",
+        panel=_CHART,
+        default=32,
+    ),
+    show: str = opt.choice(
+        "v|x|flight_time|peak_force", "Quantity on the vertical axis of pictures.", default="v"
+    ),
     **passed: Any,
 ) -> Answer:
-    """Follow a periodic motion, stable or not, through the values of a constant, to where it ends and why.
+    """Continue a periodic orbit, stable or unstable, in a parameter; report why the branch ends.
 
-    Ctrl-C keeps the branches that were followed by then. Ends with status 1 where there is none.
+    Ctrl-C keeps the branches found so far. The exit status is 1 if there is none.
     """
     from printhammer.chaos.continuation.regimes import InterruptedBranches
     from printhammer.chaos.continuation.regimes import regimes as all_regimes
@@ -136,7 +149,7 @@ def continue_(
 
 
 def both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
-    """Return both ends of a range; InputError where one is missing."""
+    """Return both ends of a range; raise InputError if one is missing."""
     if low is None or high is None:
         raise InputError(
             f"{first if low is None else last} is missing",
@@ -160,7 +173,7 @@ def _followed(
 
 
 def read_event(written: str, name: str) -> int | str:
-    """Read the number or the kind of an event; InputError where it is neither."""
+    """Parse the index or the kind of an event."""
     from printhammer.chaos.curves.starts import FIRST, LAST
     from printhammer.chaos.curves.systems import KINDS
 
@@ -181,22 +194,24 @@ def read_event(written: str, name: str) -> int | str:
     " --second backstop.damping --second-from '3.6e10 N*s/m^2.5' --second-to '3.7e10 N*s/m^2.5'"
     " --out curve.png",
     {
-        "most": opt.whole("Steps in either direction.", default=200),
+        "most": opt.whole("Maximum number of continuation steps in each direction.", default=200),
         "overlap": opt.overlapping(),
         "drive": opt.DRIVE,
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("BifurcationCurve"),
+    out=opt.results("Bifurcation curve"),
 )
 def curve(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    parameter: str = opt.text("NAME", "First constant, see 'continue'.", default="rate"),
+    parameter: str = opt.text(
+        "NAME", "Name of the first parameter: 'rate', 'period' or a key.", default="rate"
+    ),
     lowest: str | None = opt.LOWEST,
     highest: str | None = opt.HIGHEST,
-    second: str = opt.text("NAME", "Second constant, such as 'backstop.damping'.", default=...),
-    second_from: str | None = opt.text("VALUE", "Its least value."),
-    second_to: str | None = opt.text("VALUE", "Its largest value."),
+    second: str = opt.text("NAME", "Name of the second parameter, e.g. 'backstop.damping'.", default=...),
+    second_from: str | None = opt.text("VALUE", "Lower bound of the second parameter, with its unit."),
+    second_to: str | None = opt.text("VALUE", "Upper bound of the second parameter, with its unit."),
     period: str | None = opt.PERIOD,
     rate: str | None = opt.RATE,
     firings: int | None = _FIRINGS,
@@ -204,19 +219,22 @@ def curve(
     phase: float = _PHASE,
     event: int | str | None = opt.text(
         "EVENT",
-        "Number of an event of the branch from 0 on, its kind, or 'first' or 'last' for an end in a grazing.",
+        "Event of the branch at which the curve starts: index (from 0), kind, or 'first' or 'last' for a"
+        " grazing at an end of the branch.",
         panel=_START,
         read=read_event,
     ),
     start: Path | None = opt.source(
-        "A file with a branch or a curve instead, saved by 'continue' or 'curve'.", panel=_START
+        "File of a branch or curve to start from, saved by 'continue' or 'curve'.", panel=_START
     ),
-    grid: int = opt.whole("Values of either constant at which trains from rest are judged.", default=0),
+    grid: int = opt.whole(
+        "Number of grid values per parameter at which a train from rest is classified.", default=0
+    ),
     **passed: Any,
 ) -> Answer:
-    """Follow a fold, a period doubling or a grazing of a periodic motion through the plane of two constants.
+    """Continue a fold, period doubling or grazing of a periodic orbit in two parameters.
 
-    Tells where the curve ends, and at which points more happens.
+    Reports where the curve ends, and its points of codimension two.
     """
     from printhammer.chaos.continuation.continuation import continuation
     from printhammer.chaos.curves.bifurcation_curve import bifurcation_curve

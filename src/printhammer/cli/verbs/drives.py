@@ -1,4 +1,4 @@
-"""The verbs `energy` and `feedback`: a burst of least work, and a drive that sees the hammer."""
+"""The verbs `energy` and `feedback`: a burst of least work, and closed-loop drive."""
 
 from __future__ import annotations
 
@@ -23,31 +23,41 @@ _MOST_RATES: Final = 200
     "printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png",
     {
         "dots": opt.whole("Number of dots.", default=8),
-        "force": opt.number("Least force in parts of that of the single pulse (0.9).", flag="--least-force"),
-        "largest": opt.text("CURRENT", "Largest current of either sign, such as '2 A'.", default="2 A"),
-        "slew": opt.number("Largest slope of the current, A/s (the hammer's own waveform's).", metavar="A/S"),
-        "spacing": opt.text("TIME", "Time between nodes of the current, such as '50 us'."),
+        "force": opt.number(
+            "Lowest peak force of a dot, as a fraction of the single pulse's (default: 0.9).",
+            flag="--least-force",
+        ),
+        "largest": opt.text("CURRENT", "Limit on the magnitude of the current, e.g. '2 A'.", default="2 A"),
+        "slew": opt.number(
+            "Limit on the slope of the current, A/s (default: steepest rise of the hammer's waveform).",
+            metavar="A/S",
+        ),
+        "spacing": opt.text(
+            "TIME", "Time between nodes of the current, e.g. '50 us' (default: from the pack contact)."
+        ),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Burst, as .csv its current as a sampled waveform"),
+    out=opt.results("Burst (.csv: its current as a sampled waveform)"),
 )
 def energy(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    rate: str = opt.text("RATE", "Dots per second, such as '1.2 kHz'.", default="1 kHz"),
+    rate: str = opt.text("RATE", "Dots per second, e.g. '1.2 kHz'.", default="1 kHz"),
     rates: list[float] | None = opt.rates_between(
-        "Bursts at several rates instead, such as '600 Hz, 1.8 kHz, 7'.", _MOST_RATES
+        "Rates of several bursts, instead of --rate, e.g. '600 Hz, 1.8 kHz, 7'.", _MOST_RATES
     ),
-    heat: bool = opt.switch("Make the squared current least instead of the positive work."),
-    pulses: bool = opt.switch("Only pulses of the hammer, of times and widths that are sought."),
-    supply: bool = opt.switch("Show as well how the burst fares with other currents, up to 3 %."),
+    heat: bool = opt.switch("Minimise the coil heat instead of the positive work."),
+    pulses: bool = opt.switch(
+        "Restrict the current to pulses of the hammer; optimise their times and widths."
+    ),
+    supply: bool = opt.switch("Show the dots of the burst if the current is off by up to 3 %."),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Find the current that prints a burst with least work: the swing drive of the paper's discussion.
+    """Optimise the current of a burst for least work: the swing drive of the paper's discussion.
 
-    Every dot has the force asked for, the hammer starts from rest and comes to rest again. Ends with status 1
-    where a dot of the burst found is not adequate.
+    Each dot reaches the required force; the hammer starts and ends at rest. The exit status is 1 if a dot
+    is not adequate.
     """
     from printhammer.control.least_work.burst import least_work
 
@@ -88,14 +98,16 @@ def energy(
     "feedback",
     "printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png",
     {
-        "current": opt.text("CURRENT", "Largest current of either sign, such as '2 A'.", default="2 A"),
-        "edge": opt.text("TIME", "Time constant of the driver (the hammer's own decay)."),
+        "current": opt.text("CURRENT", "Limit on the magnitude of the current, e.g. '2 A'.", default="2 A"),
+        "edge": opt.text(
+            "TIME", "Time constant of the driver (default: decay time of the hammer's waveform)."
+        ),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Deviations"),
+    out=opt.results("Deviations of force and arrival"),
     run=opt.files(
-        "Picture of one run (.svg, .png, .pdf), or its drive (.toml); may be given repeatedly.",
+        "Picture of one run (.svg, .png, .pdf), or its drive (.toml); repeatable.",
         ".toml",
         panel="The run that is shown",
     ),
@@ -103,25 +115,31 @@ def energy(
 def feedback(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    rate: str = opt.text("RATE", "Slots per second.", default="1.6 kHz"),
-    noise: float | None = opt.number("Noise of a sample, in parts of the way to the pack (0.01)."),
-    delay: float | None = opt.quantity("s", "TIME", "Delay of the sensor ('20 us')."),
-    interval: float | None = opt.quantity("s", "TIME", "Between samples ('2 us').", positive=True),
-    step: float | None = opt.number("Quantisation, in parts of the way to the pack (1/1024)."),
-    seed: int | None = opt.whole("Of the noise (0)."),
-    supply: float = opt.number("Current of the hammer driven, in parts of the nominal one.", default=1.0),
+    rate: str = opt.text("RATE", "Dot slots per second.", default="1.6 kHz"),
+    noise: float | None = opt.number(
+        "Standard deviation of a sample, as a fraction of the travel to the pack (default: 0.01)."
+    ),
+    delay: float | None = opt.quantity("s", "TIME", "Delay of the sensor (default: 20 us)."),
+    interval: float | None = opt.quantity(
+        "s", "TIME", "Sampling interval of the sensor (default: 2 us).", positive=True
+    ),
+    step: float | None = opt.number(
+        "Quantisation step of the sensor, as a fraction of the travel to the pack (default: 1/1024)."
+    ),
+    seed: int | None = opt.whole("Seed of the sensor noise (default: 0)."),
+    supply: float = opt.number("Current of the driven hammer, as a fraction of nominal.", default=1.0),
     travel: float | None = opt.quantity(
-        "m", "LENGTH", "By how much its pack lies farther away, such as '10 um' (0)."
+        "m", "LENGTH", "Extra distance of the driven hammer's pack, e.g. '10 um' (default: 0)."
     ),
     beside: Path | None = opt.source(
-        "Compensation table to compare with, from `printhammer tune`.", flag="--table"
+        "Compensation table to compare with, made by `printhammer tune`.", flag="--table"
     ),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Drive a hammer with feedback: all patterns of eight slots, and two dots at all distances.
+    """Print all patterns of eight slots, and two dots at all distances, with position feedback.
 
-    Ends with status 1 where a pattern is not printed within limits with feedback.
+    The exit status is 1 if a pattern exceeds the limits with feedback.
     """
     from printhammer.control.feedback.comparison import feedback as compared
     from printhammer.control.feedback.estimator.sensor import PositionSensor

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.identify.result import Fit
 
-GROUP: Final = "Find constants from measurements: CSV tables whose heading gives every column its unit."
+GROUP: Final = "Fit constants to measurements: CSV tables whose header gives the unit of each column."
 _MEASURED: Final = "printhammer measure all hendriks-1983 --out lab &&"
 """Makes the tables that the examples read."""
 
@@ -28,24 +28,24 @@ _RESULTS: Final = "Results"
 # In the order of writing.
 _FILES: Final = {
     "out": opt.files(
-        "The constants as a fragment of a hammer file (.toml), or picture of data and residuals (.svg, .png,"
-        " .pdf); may be given repeatedly.",
+        "Fitted constants as a fragment of a hammer file (.toml), or picture of data and residuals (.svg,"
+        " .png, .pdf); repeatable.",
         ".toml",
         panel=_RESULTS,
     ),
-    "covariance": opt.file("Covariance of the constants, CSV.", panel=_RESULTS),
-    "into": opt.file("The hammer of --hammer with the constants replaced.", panel=_RESULTS),
+    "covariance": opt.file("Covariance matrix of the constants (CSV).", panel=_RESULTS),
+    "into": opt.file("Hammer file to write: that of --hammer with the fitted constants.", panel=_RESULTS),
 }
 _measured = partial(opt.source, argument=True)
 _earlier = partial(opt.source, panel="Tables of the parts, fitted first")
 
 _HAMMER: Final = opt.text(
-    "HAMMER", "Hammer with what is known already; --into starts from it.", is_input=True
+    "HAMMER", "Hammer with the constants already known; the start of --into.", is_input=True
 )
-_STRICT: Final = opt.switch("End with status 1 where the data reject the law.")
-_PASSED: Final = {"robust": opt.switch("Leave out rows that lie too far off, and name them.", default=True)}
+_STRICT: Final = opt.switch("Exit with status 1 if the data reject the law.")
+_PASSED: Final = {"robust": opt.switch("Reject outliers, and list them.", default=True)}
 _BACKSTOP: Final = opt.quantity(
-    "m", "LENGTH", "Position of the backstop, such as '0.002 in'.", flag="--backstop"
+    "m", "LENGTH", "Position of the backstop, e.g. '0.002 in'.", flag="--backstop"
 )
 
 
@@ -54,7 +54,7 @@ _BACKSTOP: Final = opt.quantity(
     EXAMPLE,
     {
         **_PASSED,
-        "spring": opt.source("Columns displacement, force: the spring alone, without magnet."),
+        "spring": opt.source("Table of the spring alone: columns displacement, force."),
         "position": _BACKSTOP,
     },
     **_FILES,
@@ -62,20 +62,20 @@ _BACKSTOP: Final = opt.quantity(
 def magnet(
     job: Job,
     files: list[Path] = _measured(
-        "Columns displacement, current, force: magnet and spring together; a second: as --spring.",
+        "Table of magnet and spring: columns displacement, current, force; a second file: the spring alone.",
         many=True,
         default=...,
     ),
     zero: str = opt.text(
-        "LENGTH|fit", "Reading of the displacement sensor at x = 0; or fit it.", default="0 m"
+        "LENGTH|fit", "Reading of the displacement sensor at x = 0; 'fit' estimates it.", default="0 m"
     ),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Find F0, Am and Bm of the magnet, and Bs and As of the spring.
+    """Fit F0, Am and Bm of the magnet, and Bs and As of the spring.
 
-    Forces of magnet and spring together do not tell F0 from Bs: give the spring alone with --spring.
+    The sum of magnet and spring forces does not separate F0 from Bs: add the spring alone with --spring.
     """
     from printhammer.drive.input import read_number
     from printhammer.identify.fitting import fit
@@ -95,19 +95,21 @@ def magnet(
 def solenoid(
     job: Job,
     file: Path = _measured(
-        "Columns gap, force, inductance or linkage, and perhaps current: a coil at a held armature.",
+        "Table of a coil with held armature: columns gap, force, inductance or linkage, optionally current.",
         default=...,
     ),
-    turns: float = opt.number("Turns of the coil.", metavar="N", default=...),
-    current: float | None = opt.quantity("A", "CURRENT", "Of all rows, where the table has no column of it."),
+    turns: float = opt.number("Number of turns of the coil.", metavar="N", default=...),
+    current: float | None = opt.quantity(
+        "A", "CURRENT", "Current of all rows, if the table has no such column."
+    ),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Find the magnetic circuit of a solenoid or pot magnet: gap, fringe, core, leakage.
+    """Fit the magnetic circuit of a solenoid or pot magnet: gap, fringe, core, leakage.
 
-    Force and inductance at one current tell how far the core saturates. The constants are those of the magnet
-    law reluctance; where its gap closes is not among them.
+    Force and inductance at one current reveal the saturation of the core. The constants are those of the
+    magnet law `reluctance`, except the displacement at which its gap closes.
     """
     from printhammer.identify.fitting import fit
 
@@ -124,12 +126,12 @@ def solenoid(
 )
 def spring(
     job: Job,
-    file: Path = _measured("Columns displacement, force: the spring alone.", default=...),
+    file: Path = _measured("Table of the spring alone: columns displacement, force.", default=...),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Find Bs and As of the spring."""
+    """Fit Bs and As of the spring."""
     from printhammer.identify.fitting import fit
 
     return _fitted(job, hammer, strict, lambda known: fit("spring", file, hammer=known, **passed))
@@ -140,21 +142,22 @@ def spring(
     f"{_MEASURED} printhammer fit pack lab/pack.csv --thickness '0.007 in' --out pack.png",
     {
         **_PASSED,
-        "thickness": opt.quantity("m", "LENGTH", "Thickness of the pack, such as '0.007 in'."),
-        "exponents": opt.switch("Fit the exponents too, instead of 2.7 and 11."),
+        "thickness": opt.quantity("m", "LENGTH", "Thickness of the pack, e.g. '0.007 in'."),
+        "exponents": opt.switch("Fit the exponents, instead of 2.7 and 11."),
     },
     **_FILES,
 )
 def pack(
     job: Job,
     file: Path = _measured(
-        "Columns indentation, force and perhaps branch (loading, unloading).", default=...
+        "Table of load cycles: columns indentation, force, optionally branch (loading, unloading).",
+        default=...,
     ),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Find the stiffness of the ribbon and paper pack, and the exponents if asked."""
+    """Fit the stiffness of the pack, and with --exponents its exponents."""
     from printhammer.identify.fitting import fit
 
     return _fitted(job, hammer, strict, lambda known: fit("pack", file, hammer=known, **passed))
@@ -169,20 +172,24 @@ def pack(
 )
 def backstop(
     job: Job,
-    file: Path | None = _measured("Columns impact speed, rebound speed."),
+    file: Path | None = _measured("Table of rebounds: columns impact speed, rebound speed."),
     radius: list[str] | None = opt.text(
-        "LENGTH", "Radius of the armature; again for a backstop that is round.", many=True
+        "LENGTH", "Radius of the armature; a second one for a round backstop.", many=True
     ),
-    modulus: list[str] | None = opt.text("PRESSURE", "Young's modulus, for each of both bodies.", many=True),
-    poisson: list[str] | None = opt.text("X", "Poisson ratio, for each of both bodies.", many=True),
+    modulus: list[str] | None = opt.text(
+        "PRESSURE", "Young's modulus of armature and backstop, one option each.", many=True
+    ),
+    poisson: list[str] | None = opt.text(
+        "X", "Poisson ratio of armature and backstop, one option each.", many=True
+    ),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Find the stiffness k of the backstop from its geometry, and its damping l from rebounds.
+    """Compute the stiffness k of the backstop from its geometry, and fit its damping l to rebounds.
 
-    A value may carry its standard error: '3 GPa +- 0.2 GPa'. Without geometry the stiffness is taken from
-    --hammer.
+    A value may carry its standard error: '3 GPa +- 0.2 GPa'. Without geometry, --hammer supplies the
+    stiffness.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -207,29 +214,31 @@ def backstop(
     f"{_MEASURED} printhammer fit motion lab/motion.csv --hammer hendriks-1983 --out motion.toml",
     {
         **_PASSED,
-        "bandwidth": opt.quantity("Hz", "FREQUENCY", "Of the displacement sensor, such as '200 kHz'."),
+        "bandwidth": opt.quantity("Hz", "FREQUENCY", "Bandwidth of the displacement sensor, e.g. '200 kHz'."),
     },
     **_FILES,
 )
 def motion(
     job: Job,
     files: list[Path] = _measured(
-        "Columns time, displacement and perhaps current; one single shot each.", many=True, default=...
+        "Records of single shots: columns time, displacement, optionally current; one file each.",
+        many=True,
+        default=...,
     ),
     hammer: str | None = _HAMMER,
-    free: str | None = opt.text("KEYS", "Constants to find, such as 'mass, backstop.damping'."),
-    magnet: Path | None = _earlier("Table of magnet and spring."),
-    spring: Path | None = _earlier("Table of the spring alone."),
-    pack: Path | None = _earlier("Table of the pack."),
-    backstop: Path | None = _earlier("Table of rebounds from the backstop."),
+    free: str | None = opt.text("KEYS", "Constants to fit, e.g. 'mass, backstop.damping'."),
+    magnet: Path | None = _earlier("Table of magnet and spring together, fitted first."),
+    spring: Path | None = _earlier("Table of the spring alone, fitted first."),
+    pack: Path | None = _earlier("Table of the pack, fitted first."),
+    backstop: Path | None = _earlier("Table of rebounds from the backstop, fitted first."),
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Find the mass, the damping of the backstop and what else single shots tell.
+    """Fit the mass, the damping of the backstop and other constants to records of single shots.
 
-    Constants of the hammer that have standard errors in its file, as --into of other fits writes them, count
-    as known with these errors, and the shots improve them; the others count as exact. Tables given with
-    --magnet, --spring, --pack and --backstop are fitted first.
+    Constants with standard errors in the hammer file, as written by --into of other fits, enter as priors
+    and are refined; the others are exact. The tables of --magnet, --spring, --pack and --backstop are fitted
+    first.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -253,26 +262,26 @@ def motion(
     "printhammer fit coil current.csv --hammer driven.toml --locked '100 um' --out coil.toml",
     {
         **_PASSED,
-        "bandwidth": opt.quantity("Hz", "FREQUENCY", "Of the current probe, such as '200 kHz'."),
-        "locked": opt.quantity("m", "LENGTH", "Where the armature was locked; without it, it is free."),
+        "bandwidth": opt.quantity("Hz", "FREQUENCY", "Bandwidth of the current probe, e.g. '200 kHz'."),
+        "locked": opt.quantity("m", "LENGTH", "Displacement of a locked armature (default: free armature)."),
     },
     **_FILES,
 )
 def coil(
     job: Job,
     files: list[Path] = _measured(
-        "Columns time, current and perhaps voltage; one shot each.", many=True, default=...
+        "Records of shots: columns time, current, optionally voltage; one file each.", many=True, default=...
     ),
     hammer: str | None = _HAMMER,
-    free: str | None = opt.text("KEYS", "Constants to find, instead of coil.resistance, coil.inductance."),
-    also: str | None = opt.text("KEYS", "Further ones, such as 'magnet.saturation_flux'."),
+    free: str | None = opt.text("KEYS", "Constants to fit (default: coil.resistance, coil.inductance)."),
+    also: str | None = opt.text("KEYS", "Additional constants to fit, e.g. 'magnet.saturation_flux'."),
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Find resistance and inductance of the coil, a shorted turn or the saturation, from its current.
+    """Fit resistance and inductance of the coil, a shorted turn or the saturation, to its current.
 
-    The hammer's own driver switches the coil, or the voltage of the table. Constants to find begin with the
-    values of --hammer.
+    The hammer's driver, or the voltage column of the table, drives the coil. The initial guess is the values
+    of --hammer.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -293,7 +302,7 @@ def _keys(text: str) -> list[str]:
 
 
 def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[Fit]:
-    """Fit tables of the parts of a hammer, whose other constants are known."""
+    """Fit the tables of single parts; the hammer supplies the other constants."""
     from printhammer.identify.fitting import fit
 
     rest = dict(tables)
@@ -309,7 +318,7 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
 
 
 def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit]) -> Answer:
-    """Fit, and return what is shown and written."""
+    """Run a fit and return its summary and files."""
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file
 
@@ -331,7 +340,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
 
 
 def _with_error(text: str, flag: str, si: str) -> tuple[float, float]:
-    """Read a value and its standard error, such as "3 GPa +- 0.2 GPa"; without one it is 0."""
+    """Parse a value and its standard error (default: 0), such as "3 GPa +- 0.2 GPa"."""
     from printhammer.drive.input import read_number
 
     value, mark, error = text.replace("±", "+-").partition("+-")

@@ -33,9 +33,9 @@ GROUP: Final = "Show and check hammer files."
 def show(
     hammer: str = opt.NAMED,
     units: Units = opt.UNITS,
-    toml: bool = opt.switch("Print the hammer file instead, to start one of your own from."),
+    toml: bool = opt.switch("Print the hammer file, as a start for your own."),
 ) -> Answer:
-    """Show every constant with its status and source, and where the armature can rest."""
+    """Show each constant with its status and source, and the equilibria of the armature."""
     from printhammer.hammer.equilibrium import equilibrium_picture
     from printhammer.hammer.hammer import load
 
@@ -68,7 +68,7 @@ def show(
 
 @verb("hammer check", "printhammer hammer check hendriks-1983")
 def check(hammer: str = opt.NAMED) -> Answer:
-    """Check a hammer file: an error ends with status 2, a warning does not."""
+    """Check a hammer file; the exit status is 2 for an error, 0 for warnings."""
     from printhammer.hammer.hammer import load
 
     loaded = load(hammer)
@@ -83,10 +83,10 @@ def check(hammer: str = opt.NAMED) -> Answer:
     "hammer schema",
     "printhammer hammer schema --out hammer.schema.json",
     {"part": opt.PART},
-    out=opt.file("Write it here instead."),
+    out=opt.file("File of the schema, instead of the terminal."),
 )
 def schema(job: Job) -> Answer:
-    """Print the JSON schema of hammer files, with the laws of --part among those that a file may name."""
+    """Print the JSON schema of hammer files, including the laws registered with --part."""
     import json
 
     from printhammer.hammer.hammer import Hammer
@@ -110,13 +110,13 @@ def list_shipped() -> Answer:
 
 
 def numbered(sources: list[str]) -> list[str]:
-    """Return the sources that the table of constants numbers."""
+    """Return the numbered list of sources to which the table of constants refers."""
     lines = (f"[dim]{number}  {escape(source)}[/dim]" for number, source in enumerate(sources, 1))
     return ["\n[bold]sources[/bold]", *lines]
 
 
 def constants_table(hammer: Hammer, sources: list[str]) -> Table:
-    """Return the constants, with the law of each part before its own."""
+    """Return the table of constants, grouped by part and headed by its law."""
     laws = {role: f"law {part.law}" for role, part in hammer.parts.items()}
     if hammer.waveform is not None:
         laws["waveform"] = f"shape {hammer.waveform.shape}"
@@ -188,13 +188,13 @@ POOR = 0.15
     "hammer from-datasheet",
     "printhammer hammer from-datasheet --example impact-wire > sheet.toml"
     " && printhammer hammer from-datasheet sheet.toml --out wire.toml",
-    out=opt.file("Write the hammer file here.", ".toml"),
+    out=opt.file("Hammer file to write (.toml).", ".toml"),
 )
 def from_datasheet(
-    sheet: Path | None = opt.argument("SHEET", "A data sheet, TOML.", type=Path, is_input=True),
-    example: str | None = opt.text("NAME", "Print the data sheet of a shipped hammer, to begin with."),
+    sheet: Path | None = opt.argument("SHEET", "Data sheet of a solenoid (TOML).", type=Path, is_input=True),
+    example: str | None = opt.text("NAME", "Print the data sheet of a shipped hammer, as an example."),
 ) -> Answer:
-    """Make a hammer of what a maker prints; every constant says whether it is printed, derived or assumed."""
+    """Build a hammer from a maker's data sheet; each constant is marked printed, derived or assumed."""
     if example is not None:
         typer.echo(_example(example), nl=False)
         return Answer()

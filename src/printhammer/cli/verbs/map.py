@@ -1,4 +1,4 @@
-"""The verb `map`: displacement against time and firing rate, computed, or beside a measured one."""
+"""The verb `map`: displacement against time and firing rate, alone or beside a measured map."""
 
 from __future__ import annotations
 
@@ -27,33 +27,35 @@ _count = partial(opt.whole, panel=_BURST)
     "map",
     "printhammer map hendriks-1983 --from '500 Hz' --to '2 kHz' --rates 64 --times 256",
     {
-        "pulses": _count("Firings at each rate.", default=9),
+        "pulses": _count("Number of firings at each rate.", default=9),
         "overlap": opt.overlapping(_BURST),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Data"),
+    out=opt.results("Displacement map"),
 )
 def map_(
     job: Job,
     hammer: Hammer = opt.FIRED,
     lowest: float | None = opt.quantity(
-        "Hz", "RATE", "Lowest rate (500 Hz).", flag="--from", panel=_BURST, positive=True
+        "Hz", "RATE", "Lowest rate (default: 500 Hz).", flag="--from", panel=_BURST, positive=True
     ),
     highest: float | None = opt.quantity(
-        "Hz", "RATE", "Highest rate (2 kHz).", flag="--to", panel=_BURST, positive=True
+        "Hz", "RATE", "Highest rate (default: 2 kHz).", flag="--to", panel=_BURST, positive=True
     ),
-    rates: int | None = _count("Number of rates (512)."),
-    times: int | None = _count("Number of times (512)."),
+    rates: int | None = _count("Number of rates (default: 512)."),
+    times: int | None = _count("Number of sampling times (default: 512)."),
     measured: Path | None = opt.source(
-        "Displacement records to compare with, CSV or NetCDF; rates and times are then theirs unless given."
+        "Measured map to compare with (CSV or NetCDF); it sets rates and times that are not set otherwise."
     ),
-    figure: str | None = opt.choice("8|9", "Which figure of the paper a picture is like (9)."),
+    figure: str | None = opt.choice(
+        "8|9", "Figure of the paper whose style the picture follows (default: 9)."
+    ),
     **passed: Any,
 ) -> Answer:
-    """Fire bursts at many rates and map the displacement against time and rate, as Figs. 8 and 9.
+    """Map the displacement against time and firing rate, as in Figs. 8 and 9 of the paper.
 
-    Ends with status 1 where a run stopped before its end; its rate is named.
+    The exit status is 1 if a run stopped early; the message names its rate.
     """
     from printhammer.maps.frequency import frequency_map, summary_of
     from printhammer.maps.measured import load_measured_map
@@ -73,7 +75,7 @@ def map_(
 
 
 def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -> int:
-    """Return the number of the figure that is drawn."""
+    """Return the number of the paper's figure whose style the picture follows."""
     if figure is None:
         return 9
     if not any(path.suffix.lower() in PICTURES for path in outputs):
@@ -90,7 +92,7 @@ def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -
 def _axes(
     beside: xr.Dataset | None, low: float | None, high: float | None, rates: int | None, times: int | None
 ) -> tuple[FloatArray, FloatArray | int]:
-    """Return the rates, Hz, and the times, s, or their number; those of a measured map unless given."""
+    """Return the rates, Hz, and the times, s, or their number; a measured map supplies the defaults."""
     import numpy as np
 
     from printhammer.maps.frequency import HIGHEST, LOWEST, MOST_CELLS, RATES, TIMES
@@ -120,7 +122,7 @@ def _axes(
 
 
 def _complaints(chart: xr.Dataset) -> list[str]:
-    """Name the runs that did not reach their end."""
+    """Return a complaint for each status of runs that stopped early, with their rates."""
     from printhammer.maps.layout import failed_rates
 
     complaints = []

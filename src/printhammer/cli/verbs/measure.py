@@ -1,4 +1,4 @@
-"""The verb `measure`: synthetic measurements of a hammer, as a laboratory would hand them in."""
+"""The verb `measure`: synthetic measurements of a hammer, in the format of a laboratory."""
 
 from __future__ import annotations
 
@@ -30,36 +30,42 @@ _bench = partial(opt.text, panel="Bench")
     {
         "noise": _sensor(
             "AMOUNT",
-            "Standard deviation, such as 'force=0.1 N', 'force=0.5 %' of full scale, or '0.2 um' for all"
-            " lengths; may be given repeatedly.",
+            "Standard deviation of readings: 'force=0.1 N', 'force=0.5 %' of full scale, or '0.2 um' for all"
+            " lengths; repeatable.",
             many=True,
         ),
-        "resolution": _sensor("AMOUNT", "Step of the readings, in the same form.", many=True),
-        "offset": _sensor("AMOUNT", "Reading at zero, in the same form.", many=True),
-        "sampling_rate": _sensor("RATE", "Of a record of motion or current (1 MHz)."),
-        "bandwidth": _sensor("RATE", "Of its sensors, first-order low-pass (200 kHz), or none."),
-        "outliers": _sensor("SHARE", "Of readings that are wrong, such as '2 %' (0)."),
-        "displacements": _bench("LIST", "Where the armature is held, '60 um, 100 um'."),
-        "currents": _bench("LIST", "Currents in the coil, '0 A, 1 A'."),
-        "peaks": _bench("LIST", "Largest indentations of the load cycles."),
-        "speeds": _bench("LIST", "Impact speeds on the backstop, '0.2 m/s, 1 m/s'."),
-        "duration": _bench("TIME", "Of the record after the firing (4 ms)."),
-        "before": _bench("TIME", "Of the record before the firing (100 us)."),
-        "locked": _bench("LENGTH", "Where the armature is locked in a record of the current."),
+        "resolution": _sensor("AMOUNT", "Quantisation step of readings, in the form of --noise.", many=True),
+        "offset": _sensor("AMOUNT", "Zero offset of readings, in the form of --noise.", many=True),
+        "sampling_rate": _sensor("RATE", "Sampling rate of records of motion or current (default: 1 MHz)."),
+        "bandwidth": _sensor(
+            "RATE", "Bandwidth of their sensors, a first-order low-pass (default: 200 kHz), or none."
+        ),
+        "outliers": _sensor("SHARE", "Fraction of readings that are outliers, e.g. '2 %' (default: 0)."),
+        "displacements": _bench("LIST", "Displacements at which the armature is held, e.g. '60 um, 100 um'."),
+        "currents": _bench("LIST", "Currents in the coil, e.g. '0 A, 1 A'."),
+        "peaks": _bench("LIST", "Peak indentations of the load cycles, e.g. '20 um, 60 um'."),
+        "speeds": _bench("LIST", "Impact speeds on the backstop, e.g. '0.2 m/s, 1 m/s'."),
+        "duration": _bench("TIME", "Duration of a record after the firing (default: 4 ms)."),
+        "before": _bench("TIME", "Duration of a record before the firing (default: 100 us)."),
+        "locked": _bench(
+            "LENGTH", "Displacement at which the armature is locked in a record of the current."
+        ),
     },
 )
 def measure(
     job: Job,
-    kind: str = opt.argument("KIND", "magnet, spring, pack, backstop, motion, current, or all.", default=...),
+    kind: str = opt.argument(
+        "KIND", "Kind of measurement: magnet, spring, pack, backstop, motion, current, or all.", default=...
+    ),
     hammer: Hammer = opt.HAMMER,
-    out: Path | None = opt.folder("Table to write, CSV; a folder for all.", metavar="FILE"),
-    exact: bool = opt.switch("Begin with sensors without any error.", panel=_SENSORS),
-    seed: int = opt.whole("Of the random numbers.", default=0),
+    out: Path | None = opt.folder("Table to write (CSV), or a folder if KIND is all.", metavar="FILE"),
+    exact: bool = opt.switch("Start from error-free sensors instead of an ordinary bench.", panel=_SENSORS),
+    seed: int = opt.whole("Seed of the random number generator.", default=0),
     **passed: Any,
 ) -> Answer:
-    """Measure a hammer in a synthetic laboratory, with the errors of real sensors.
+    """Generate synthetic measurements of a hammer, with the errors of real sensors.
 
-    The tables are those that `printhammer fit` reads; what was done stands in their comments.
+    `printhammer fit` reads the tables; their comments record the bench and the sensors.
     """
     from printhammer.identify.bench.laboratory import measure as measured
 
@@ -87,7 +93,7 @@ def measure(
 
 
 def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str, Path]]:
-    """Return what is to be measured, and the files to write."""
+    """Return the kinds of measurement and the file of each."""
     from printhammer.identify.bench.laboratory import KINDS
     from printhammer.support.files import check_outputs
 
@@ -112,7 +118,7 @@ def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str,
 
 
 def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the settings of the sensors of each kind; a setting must belong to one of them."""
+    """Return the sensor settings of each kind; each setting must apply to at least one kind."""
     from printhammer.identify.bench.laboratory import SENSORS, SI
     from printhammer.identify.bench.sensor import PARTS, applicable, by_quantity
 
@@ -133,7 +139,7 @@ def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str,
 
 
 def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any]]:
-    """Return what is measured where, for each kind; an option must belong to one of them."""
+    """Return the bench options of each kind; each option must apply to at least one kind."""
     from inspect import signature
 
     from printhammer.drive.input import read_number
@@ -159,7 +165,7 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
 
 
 def _possible(kinds: list[str], hammer: Hammer) -> list[str]:
-    """Return what the hammer has; say what it lacks. Only a hammer on a voltage has a current to show."""
+    """Return the kinds that the hammer allows, and announce the others; "current" needs a voltage drive."""
     waveform = hammer.waveform
     if waveform is None or waveform.unit != "V":
         kinds = [kind for kind in kinds if kind != "current"]

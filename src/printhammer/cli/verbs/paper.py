@@ -22,15 +22,15 @@ def figure(
     job: Job,
     number: str = opt.argument("N", "Number of the figure in the paper.", default=...),
     hammer: Hammer = opt.HAMMER,
-    out: Path = opt.folder("Where to write it.", default=Path("build/figures")),
+    out: Path = opt.folder("Folder of the figure files.", default=Path("build/figures")),
     scheme: str = opt.choice(
         "exact|runge-kutta-4|trapezoid",
-        "Of Fig. 11: its points exactly, or as an integrator of 1983 computes them.",
+        "Integrator of Fig. 11: exact, or a scheme of 1983.",
         default="exact",
     ),
     reading: str = opt.choice(
         "firings|look-ahead|inside|grid|no-late-step",
-        "With that: when its short step is taken, into and out of the backstop.",
+        "Rule for the short step of a scheme of 1983 at the backstop (only with --scheme).",
         default="firings",
     ),
 ) -> Answer:
@@ -91,12 +91,12 @@ def paper(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     out: Path = opt.folder(
-        "Where to write the report, in place of an earlier one.", default=Path("build/paper")
+        "Folder of the report; an earlier report is replaced.", default=Path("build/paper")
     ),
-    pdf: bool = opt.switch("Write the report as report.pdf too."),
-    strict: bool = opt.switch("End with status 1 if a claim fails."),
+    pdf: bool = opt.switch("Write the report as report.pdf, too."),
+    strict: bool = opt.switch("Exit with status 1 if a claim fails."),
 ) -> Answer:
-    """Draw the figures, judge the claims, and write one HTML report, the figures and claims.json."""
+    """Reproduce all figures and claims of the paper: HTML report, figures and claims.json."""
     from printhammer.report import write_report
     from printhammer.report.build import check_place
 

@@ -1,4 +1,4 @@
-"""The verbs `quality` and `print`: what a hammer prints at a rate, by its figures and on paper."""
+"""The verbs `quality` and `print`: print quality at a rate, and the printed page."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.printing.page.pattern import Pattern
 
-TABLE: Final = opt.source("Compensation table to drive by (.csv, .json), from `printhammer tune`.")
+TABLE: Final = opt.source("Compensation table of the drive (.csv, .json), made by `printhammer tune`.")
 SERIAL: Final = opt.text(
-    "TEXT", "Serial number of the unit, for a table that was learned on one; 'any' to drive another."
+    "TEXT", "Serial number of the driven unit, for a learned table; 'any' skips the check."
 )
-FEEDBACK: Final = opt.switch("Drive with feedback, see `printhammer feedback`; takes a while.")
+FEEDBACK: Final = opt.switch("Drive with position feedback, as `printhammer feedback` (slow).")
 
 
 def chosen_strategy(
     job: Job, hammer: Hammer, table: Path | None, feedback: bool, serial: str | None = None
 ) -> tuple[dict[str, Any], CompensationTable | None]:
-    """Return the argument `strategy` of what prints, empty for an open loop, and the table if there is one.
+    """Return the keyword `strategy` of the printing functions (empty: open loop), and the table or None.
 
     Raises
     ------
     InputError
-        Table and feedback are asked for at once, a serial without a table, or the table cannot be used for
-        this hammer.
+        Both a table and feedback are requested, a serial without a table, or the table belongs to another
+        hammer.
     """
     if serial is not None and table is None:
         raise InputError(
@@ -67,47 +67,64 @@ _instead = partial(opt.switch, panel=_MORE)
 
 
 @verb(
-    "quality", "printhammer quality hendriks-1983 --rate 900Hz --out quality.png", out=opt.results("Numbers")
+    "quality", "printhammer quality hendriks-1983 --rate 900Hz --out quality.png", out=opt.results("Result")
 )
 def quality(
     job: Job,
     hammer: Hammer = opt.FIRED,
-    rate: str | None = _report("RATE", "Slots per second, such as 900Hz."),
-    pattern: str | None = _report("SLOTS", "Slots such as 10110111 (the de Bruijn cycle of order 8)."),
-    pulses: int | None = opt.whole("Dots without a gap, instead of a pattern.", panel="Report"),
-    pitch: str | None = _report("LENGTH", "Distance of neighbouring slots (1/60 in)."),
-    paper: Path | None = opt.source("How the paper varies along the line (.toml).", panel="Report"),
+    rate: str | None = _report("RATE", "Dot slots per second, e.g. 900Hz."),
+    pattern: str | None = _report(
+        "SLOTS", "Pattern of slots, e.g. 10110111 (default: de Bruijn cycle of order 8)."
+    ),
+    pulses: int | None = opt.whole(
+        "Number of dots in successive slots, instead of --pattern.", panel="Report"
+    ),
+    pitch: str | None = _report("LENGTH", "Distance between neighbouring slots (default: 1/60 in)."),
+    paper: Path | None = opt.source("Variation of the paper along the line (.toml).", panel="Report"),
     table: Path | None = TABLE,
     serial: str | None = SERIAL,
     feedback: bool = FEEDBACK,
-    safe_rate: bool = _instead("Find the rate up to which all patterns of eight slots print well."),
+    safe_rate: bool = _instead(
+        "Find the highest rate up to which all patterns of eight slots stay within limits."
+    ),
     yield_: int | None = opt.whole(
-        "Draw hammers: how many pass at --rate; without it, their safe rates.", flag="--yield", panel=_MORE
+        "Number of hammers to draw; reports the yield at --rate, else their safe rates.",
+        flag="--yield",
+        panel=_MORE,
     ),
-    damping: bool = _instead("Exchange the materials of backstop and pack at the same print force."),
+    damping: bool = _instead("Compare materials of backstop and pack at equal print force."),
     spread: list[str] | None = _more(
-        "X|KEY=X", "With --yield: 1%, of all constants, or magnet.Am=2%; repeatedly.", many=True
+        "X|KEY=X",
+        "Relative spread of all constants (1%) or of one (magnet.Am=2%), with --yield; repeatable.",
+        many=True,
     ),
-    judged_by: str | None = _more("own|design", "With --yield: by which single pulse dots are judged."),
-    seed: int | None = opt.whole("With --yield: seed of the draw (0).", panel=_MORE),
-    current: str | None = _more("CURRENT", "With --damping: largest current allowed (2 A)."),
+    judged_by: str | None = _more(
+        "own|design",
+        "Reference dot, with --yield: single pulse of the drawn hammer (own) or of the nominal one (design).",
+    ),
+    seed: int | None = opt.whole("Seed of the draw, with --yield (default: 0).", panel=_MORE),
+    current: str | None = _more("CURRENT", "Limit on the current, with --damping (default: 2 A)."),
     limits: str = _grid(
-        "NAME", "slots (10 %, 50 µs), dot-matrix (10 %, 100 µs) or engraved (10 %, 15 µs).", default="slots"
+        "NAME",
+        "Limits on force, arrival: slots (10 %, 50 µs), dot-matrix (10 %, 100 µs), engraved (10 %, 15 µs).",
+        default="slots",
     ),
-    force_limit: str | None = _grid("X", "Other limit on the force, such as 10%."),
+    force_limit: str | None = _grid(
+        "X", "Limit on the force deviation, e.g. 10%, instead of that of --limits."
+    ),
     arrival_limit: float | None = opt.quantity(
-        "s", "TIME", "Other limit on the arrival, such as 50us.", panel=_GRID
+        "s", "TIME", "Limit on the arrival deviation, e.g. 50us, instead of that of --limits.", panel=_GRID
     ),
-    first: str | None = _grid("RATE", "First rate of the grid (100 Hz)."),
-    last: str | None = _grid("RATE", "Last rate of the grid (4 kHz)."),
-    step: str | None = _grid("RATE", "Step of the grid (5 Hz; 25 Hz for many hammers)."),
+    first: str | None = _grid("RATE", "Lowest rate of the grid (default: 100 Hz)."),
+    last: str | None = _grid("RATE", "Highest rate of the grid (default: 4 kHz)."),
+    step: str | None = _grid("RATE", "Spacing of the grid (default: 5 Hz; 25 Hz for several hammers)."),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
 ) -> Answer:
-    """Report what a hammer prints at a rate; or find its safe rate, its yield, or better materials.
+    """Report the print quality at a rate; or find the safe rate, the yield, or better materials.
 
-    Ends with status 1 where a run stopped before its end.
+    The exit status is 1 if a run stopped early.
     """
     from printhammer.printing.dots.judging import limits_named
 
@@ -133,7 +150,7 @@ def quality(
     common: dict[str, Any] = {"limits": bounds, **opt.given(tolerance=tolerance), **strategy}
     many: dict[str, Any] = {**common, **of_grid, "threads": threads}
     if loaded_table is not None:
-        # It says nothing of other rates.
+        # The table covers no other rates.
         many = {"first": float(loaded_table.rates[0]), "last": float(loaded_table.rates[-1]), **many}
     result: Any
     bad: list[str] = []
@@ -182,7 +199,7 @@ _TAKES: Final = {
 
 
 def _only(task: str, options: set[str]) -> None:
-    """Refuse options of another task."""
+    """Raise InputError if an option belongs to another task."""
 
     def named(name: str) -> str:
         return "the report" if name == "report" else f"--{name}"
@@ -197,7 +214,7 @@ def _only(task: str, options: set[str]) -> None:
 
 
 def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
-    """Read spreads: one number for all constants, and others by key."""
+    """Parse the spreads: one number for all constants, and others by key."""
     from printhammer.printing.rates.tolerance import spreads_of
 
     if not texts:
@@ -228,45 +245,54 @@ _length = partial(opt.quantity, "m", "LENGTH", panel=_HEAD, positive=True)
     "printhammer print 'Bounce and chaotic motion' --rate 1.4kHz --out page.png",
     {"tolerance": opt.TOLERANCE, "threads": opt.THREADS},
     out=opt.files(
-        "Page (.png, .pdf, .svg) or its dots (.nc, .csv); may be given repeatedly. Without --out, --zoom,"
-        f" --sheet and --save: {', '.join(_USUAL)}.",
+        "Page (.png, .pdf, .svg) or its dots (.nc, .csv); repeatable. Default without any output option:"
+        f" {', '.join(_USUAL)}.",
         ".nc",
         ".csv",
         panel=_FILES,
     ),
-    zoom=opt.files("Picture of the worst place (.png, .pdf, .svg).", many=False, panel=_FILES),
-    sheet=opt.files("The paper alone, at its true size (.png, .pdf, .svg).", many=False, panel=_FILES),
+    zoom=opt.files("Enlarged picture of the worst place (.png, .pdf, .svg).", many=False, panel=_FILES),
+    sheet=opt.files("Sheet of paper alone, at true size (.png, .pdf, .svg).", many=False, panel=_FILES),
     save=opt.file(
-        "The pattern itself (.toml, .png, .pbm, .bmp).", ".toml", ".png", ".pbm", ".bmp", panel=_FILES
+        "Dot pattern requested (.toml, .png, .pbm, .bmp).", ".toml", ".png", ".pbm", ".bmp", panel=_FILES
     ),
 )
 def print_(
     job: Job,
-    text: str | None = opt.argument("[TEXT]", "Text to print; \\n begins a new line."),
-    rate: str | None = opt.text("RATE", "Slots per second on each wire, such as '1.2 kHz'."),
+    text: str | None = opt.argument("[TEXT]", "Text to print; \\n starts a new line."),
+    rate: str | None = opt.text("RATE", "Dot slots per second on each wire, e.g. '1.2 kHz'."),
     hammer: Hammer = opt.HAMMER_OPTION,
     pattern: Path | None = opt.source("Pattern file (.toml) or bitmap (.png, .pbm, .bmp).", panel=_PATTERN),
-    wires: int | None = opt.whole("Wires: 9 (the built-in font), 18, 24 or another number.", panel=_PATTERN),
+    wires: int | None = opt.whole("Number of wires: 9 (built-in font), 18, 24 or any other.", panel=_PATTERN),
     font: Path | None = opt.source(
-        "TrueType font (built-in for 9 wires, DejaVu Sans Mono for others).", panel=_PATTERN
+        "TrueType font (default: built-in for 9 wires, else DejaVu Sans Mono).", panel=_PATTERN
     ),
-    columns: int | None = opt.whole("Most characters of a print line (40).", panel=_PATTERN),
-    pitch: float | None = _length("From slot to slot (1/60 in for 9 wires)."),
-    wire_diameter: float | None = _length("Thickness of the wires (0.35 mm for 9 wires).", flag="--wire"),
-    density: float | None = opt.number("Optical density of the dot of a single pulse (1).", panel=_HEAD),
+    columns: int | None = opt.whole(
+        "Maximum number of characters in a print line (default: 40).", panel=_PATTERN
+    ),
+    pitch: float | None = _length("Distance between slots (default: 1/60 in for 9 wires)."),
+    wire_diameter: float | None = _length(
+        "Diameter of a wire (default: 0.35 mm for 9 wires).", flag="--wire"
+    ),
+    density: float | None = opt.number(
+        "Optical density of the dot of a single pulse (default: 1).", panel=_HEAD
+    ),
     line_gap: float | None = opt.number(
-        "Between print lines, in parts of the height of the wires (1/3; 0 for a bitmap).", panel=_HEAD
+        "Gap between print lines, as a fraction of the print height (default: 1/3; 0 for a bitmap).",
+        panel=_HEAD,
     ),
-    limits: str | None = opt.text("NAME", "Limits: slots (default), dot-matrix or engraved."),
+    limits: str | None = opt.text(
+        "NAME", "Limits on force, arrival: slots (default), dot-matrix or engraved."
+    ),
     table: Path | None = TABLE,
     serial: str | None = SERIAL,
     feedback: bool = FEEDBACK,
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Print a text or a pattern of dots at a rate, and see the page.
+    """Print a text or a dot pattern at a rate, and draw the page.
 
-    A hammer on every wire, each print line from rest. Ends with status 1 where a run stopped before its end.
+    Each wire has a hammer; each print line starts from rest. The exit status is 1 if a run stopped early.
     """
     from printhammer.drive.input import read_positive
     from printhammer.printing.dots.judging import limits_named
@@ -282,7 +308,7 @@ def print_(
         job.check()
     asked = _pattern(text, pattern, font, wires, columns)
     if line_gap is None and pattern is not None and pattern.suffix.lower() in BITMAPS:
-        # A drawing goes on from print line to print line.
+        # A bitmap continues across print lines.
         line_gap = 0.0
     head = head_of(
         asked.wires, **opt.given(pitch=pitch, wire_diameter=wire_diameter, density=density, line_gap=line_gap)

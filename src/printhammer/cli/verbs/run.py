@@ -28,32 +28,34 @@ _record = partial(opt.file, panel=_FILES)
     "run",
     "printhammer run hendriks-1983 --at '0 us, 700 us' --units inch",
     {
-        "duration": opt.quantity("s", "TIME", "End of the run (4 ms after the last firing)."),
+        "duration": opt.quantity("s", "TIME", "End time of the run (default: 4 ms after the last firing)."),
         "tolerance": opt.TOLERANCE,
         "scheme": opt.choice(
-            "default|trapezoid|runge-kutta-4", "Integrator: default, or those of 1983.", default="default"
+            "default|trapezoid|runge-kutta-4",
+            "Integrator: the default, or one of the two schemes of 1983.",
+            default="default",
         ),
-        "points": opt.whole("Points in the record of the motion."),
+        "points": opt.whole("Number of points of the saved motion."),
     },
-    out=opt.results("Motion, as .json its dots, contacts and energies", panel=_FILES),
-    dots=_record("Dots, .csv or .parquet.", ".csv", ".parquet"),
-    contacts=_record("Contacts, .csv or .parquet.", ".csv", ".parquet"),
+    out=opt.results("Motion (.json: its dots, contacts and energies)", panel=_FILES),
+    dots=_record("Table of dots (.csv or .parquet).", ".csv", ".parquet"),
+    contacts=_record("Table of contacts (.csv or .parquet).", ".csv", ".parquet"),
 )
 def run(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    rate: str | None = _drive("RATE", "Firings per second, such as '1.2 kHz'."),
-    period: str | None = _drive("TIME", "Time between firings, such as '1.05 ms'."),
-    at: str | None = _drive("TIMES", "Firing times, such as '0 us, 700 us'."),
-    pulses: int | None = opt.whole("Number of firings with --rate or --period (9).", panel=_DRIVE),
+    rate: str | None = _drive("RATE", "Firings per second, e.g. '1.2 kHz'."),
+    period: str | None = _drive("TIME", "Time between firings, e.g. '1.05 ms'."),
+    at: str | None = _drive("TIMES", "Firing times, e.g. '0 us, 700 us'."),
+    pulses: int | None = opt.whole("Number of firings for --rate or --period (default: 9).", panel=_DRIVE),
     overlap: str | None = opt.overlapping(_DRIVE),
-    drive: Path | None = opt.source("A drive file instead.", panel=_DRIVE),
+    drive: Path | None = opt.source("Drive file, instead of the options of a train.", panel=_DRIVE),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Fire a hammer and tell what each pulse prints.
+    """Simulate a hammer under a drive and report the dot that each pulse prints.
 
-    Ends with status 1 where the run stopped before its end, which the status line names.
+    The exit status is 1 if the run stopped early; the status line gives the reason.
     """
     from printhammer.run.simulate import simulate
 
@@ -75,7 +77,7 @@ def run(
 
 
 def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
-    """Make the drive that the options describe."""
+    """Build the drive from the options of the command line."""
     from printhammer.drive.file import load_drive
     from printhammer.drive.trains import PulseTrain
 

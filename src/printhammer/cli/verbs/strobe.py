@@ -21,18 +21,20 @@ if TYPE_CHECKING:
     "printhammer strobe hendriks-1983 --period '1.10 ms' --points 200 --out points.csv",
     {
         **opt.FIRED_TRAIN,
-        "points": opt.whole("Number of points.", default=200),
-        "transient": opt.whole("Firings left out before the first.", default=0),
-        "phase": opt.number("Part of the period between a firing and its point, from 0 to 1.", metavar="P"),
+        "points": opt.whole("Number of points (firings recorded).", default=200),
+        "transient": opt.whole("Number of firings to discard before the first point.", default=0),
+        "phase": opt.number(
+            "Phase of the section after the firing, as a fraction of the period.", metavar="P"
+        ),
         "tolerance": opt.TOLERANCE,
-        "verdict": opt.switch("Judge firings 1001 to 2000.", default=True),
+        "verdict": opt.switch("Classify the motion from firings 1001 to 2000.", default=True),
     },
     out=opt.results("Points"),
 )
 def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
-    """Fire a hammer without end and tell what its state is at each firing: periodic, or strange.
+    """Sample the state at each firing of an endless train, and classify it: periodic or strange.
 
-    Ends with status 1 where the run stopped before its end.
+    The exit status is 1 if the run stopped early.
     """
     from printhammer.chaos import strobe as points_of
 
@@ -55,18 +57,20 @@ _search = partial(opt.whole, panel="Search")
     "printhammer orbits hendriks-1983 --period '1.05 ms' --longest 4 --out orbits.csv",
     {
         **opt.FIRED_TRAIN,
-        "longest": _search("Most firings after which a motion repeats.", default=8),
-        "starts": _search("States from which motions are followed.", default=1024),
-        "guesses": _search("Guesses that are tried for each number of firings.", default=48),
-        "follow": _search("Most firings of orbits through which branches are followed.", default=2),
+        "longest": _search("Largest orbit period to search for, in firings.", default=8),
+        "starts": _search("Number of initial states from which trajectories are followed.", default=1024),
+        "guesses": _search("Number of initial guesses for Newton's method at each orbit period.", default=48),
+        "follow": _search(
+            "Largest period, in firings, of orbits that are continued 5 % in the drive period.", default=2
+        ),
         "tolerance": opt.TOLERANCE,
     },
     out=opt.results("Orbits"),
 )
 def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
-    """Search for the motions that repeat after some firings, stable or not, and tell what they do.
+    """Search for periodic orbits, stable and unstable, and report their multipliers and dots.
 
-    Ends with status 1 where none was found.
+    The exit status is 1 if no orbit is found.
     """
     from printhammer.chaos.orbits.search import orbits as search
 
@@ -93,9 +97,11 @@ _trains = partial(opt.text, panel=_TRAINS)
     "printhammer lyapunov hendriks-1983 --period '1.10 ms, 1.30 ms' --firings 300",
     {
         "overlap": opt.overlapping(_TRAINS),
-        "drive": opt.source("A drive file instead: a force without end, or pulses.", panel=_TRAINS),
-        "firings": opt.whole("Firings over which growth is averaged.", default=1000),
-        "transient": opt.whole("Firings left out before.", default=1000),
+        "drive": opt.source(
+            "Drive file, instead of --period or --rate: an endless force, or pulses.", panel=_TRAINS
+        ),
+        "firings": opt.whole("Number of firings over which the exponents are averaged.", default=1000),
+        "transient": opt.whole("Number of firings to discard before the average.", default=1000),
         "tolerance": opt.TOLERANCE,
     },
     out=opt.results("Exponents"),
@@ -103,19 +109,21 @@ _trains = partial(opt.text, panel=_TRAINS)
 def lyapunov(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    period: str | None = _trains("TIMES", "Times between firings, such as '1.10 ms, 1.30 ms'."),
-    rate: str | None = _trains("RATES", "Firings per second, such as '952 Hz'."),
+    period: str | None = _trains("TIMES", "Times between firings, e.g. '1.10 ms, 1.30 ms'."),
+    rate: str | None = _trains("RATES", "Firings per second, e.g. '952 Hz'."),
     lowest: str | None = _trains(
-        "TIME", "Shortest of many times between firings, such as '0.8 ms'.", flag="--from"
+        "TIME", "Shortest time between firings of a range, e.g. '0.8 ms'.", flag="--from"
     ),
-    highest: str | None = _trains("TIME", "Longest of them.", flag="--to"),
-    steps: int | None = opt.whole(f"Number of them ({_STEPS}).", panel=_TRAINS),
+    highest: str | None = _trains("TIME", "Longest time between firings of the range.", flag="--to"),
+    steps: int | None = opt.whole(
+        f"Number of times between firings in the range (default: {_STEPS}).", panel=_TRAINS
+    ),
     threads: int | None = opt.THREADS,
     **passed: Any,
 ) -> Answer:
-    """Tell how fast neighbouring motions part: Lyapunov exponents with errors, dimension, and the 0-1 test.
+    """Compute Lyapunov exponents with standard errors, the Lyapunov dimension, and the 0-1 test for chaos.
 
-    Ends with status 1 where a run stopped before its end.
+    The exit status is 1 if a run stopped early.
     """
     from printhammer.chaos import LyapunovChart, lyapunovs
     from printhammer.chaos import lyapunov as exponents_of

@@ -24,14 +24,14 @@ def studio(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     port: int | None = opt.whole(
-        "Port on 127.0.0.1 (19830, or a free one where that is taken; 0: a free one)."
+        "Port on 127.0.0.1 (default: 19830, or a free port if that is taken; 0: a free port)."
     ),
-    state: Path | None = opt.source("State to open with, as the studio's export saves it."),
+    state: Path | None = opt.source("State to open, as saved by the studio's export."),
     browser: bool = opt.switch(
-        "Open the page in the browser of the desktop.", flag="--open/--no-open", default=True
+        "Open the page in the default browser.", flag="--open/--no-open", default=True
     ),
 ) -> Answer:
-    """Open the studio: a page on this machine, for its user alone; Ctrl-C ends it."""
+    """Start the studio, a page on this machine for its user alone; Ctrl-C stops it."""
     from printhammer.studio import serve
 
     def ready(address: str) -> None:
@@ -74,13 +74,13 @@ _KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
     "runs, their dots and peaks": _runs,
     "maps and sweeps": _lanes,
     "exponents, orbits, sensitivities": _exponents,
-    # Last, since it takes most of what maps take, which else would be made twice at once.
+    # Last: it shares most code with maps, which two processes would otherwise compile at once.
     "strobe points": _strobes,
 }
 
 
 def _made(name: str, hammer: Hammer) -> tuple[str, float]:
-    """Make or load the machine code of one kind, in a process of its own; return its name and the time, s."""
+    """Compile or load one kind of machine code in a separate process; return its name and the time, s."""
     start = time.perf_counter()
     _KERNELS[name](hammer)
     return name, time.perf_counter() - start
@@ -94,7 +94,7 @@ def _announce(sentences: SimpleQueue[str | None]) -> None:
 
 @contextmanager
 def _saying(sentences: SimpleQueue[str | None]) -> Iterator[None]:
-    """Say what other processes put into a queue."""
+    """Print the sentences that other processes put into a queue."""
 
     def work() -> None:
         while (sentence := sentences.get()) is not None:
@@ -111,11 +111,11 @@ def _saying(sentences: SimpleQueue[str | None]) -> Iterator[None]:
 
 @verb("warm", "printhammer warm hendriks-1983")
 def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
-    """Compile what a hammer needs ahead of time, on two cores; another hammer with these laws needs nothing.
+    """Compile the machine code of a hammer ahead of time, on two cores.
 
-    The machine code stays beside the program, or in NUMBA_CACHE_DIR, which may be copied to another machine
-    with the same processor and the same versions, baked into a container, and be read-only there. Where it
-    does not fit, the program says why and makes it again.
+    Hammers with the same laws share the code. It is stored beside the program, or in NUMBA_CACHE_DIR, which
+    may be copied to a machine with the same processor and versions, and may be read-only there. If the code
+    does not fit, the program says why and compiles again.
     """
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
@@ -128,7 +128,7 @@ def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
         _saying(sentences),
         ProcessPoolExecutor(2, spawn, _announce, (sentences,)) as pool,
     ):
-        # What takes longest begins first, beside what is wanted first.
+        # In the order of `_KERNELS`: the longest compilation and the one needed first start first.
         tasks = [pool.submit(_made, name, hammer) for name in _KERNELS]
         tell(0, len(tasks))
         for done, task in enumerate(as_completed(tasks), 1):

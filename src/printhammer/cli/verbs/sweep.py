@@ -26,19 +26,17 @@ if TYPE_CHECKING:
 @verb("sweep", "printhammer sweep --example > sweep.toml && printhammer sweep sweep.toml --out results.zarr")
 def sweep(
     job: Job,
-    spec: Path | None = opt.argument("SPEC", "A spec file, TOML.", type=Path),
-    out: Path | None = opt.folder(
-        "Store of the results (Zarr): a new one, or one to be continued.", writes=False
-    ),
+    spec: Path | None = opt.argument("SPEC", "Spec file of the sweep (TOML).", type=Path),
+    out: Path | None = opt.folder("Result store (Zarr): a new store, or one to resume.", writes=False),
     threads: int | None = opt.THREADS,
-    dask: str | None = opt.text("ADDRESS", "Work on a dask cluster: address of its scheduler."),
-    check: bool = opt.switch("Say what would be done and how much room it takes; do nothing."),
-    example: bool = opt.switch("Print a spec to begin with."),
-    schema: bool = opt.switch("Print the JSON schema of specs."),
+    dask: str | None = opt.text("ADDRESS", "Address of the scheduler of a dask cluster that does the work."),
+    check: bool = opt.switch("Show the plan and the disk space it needs, without running it."),
+    example: bool = opt.switch("Print an example spec."),
+    schema: bool = opt.switch("Print the JSON schema of spec files."),
 ) -> Answer:
     """Run a sweep over any constants, drives and initial states.
 
-    Whatever ends it, the same command goes on where it ended. A member that fails is a row with a status.
+    The same command resumes an interrupted sweep. A run that fails is a row with a status.
     """
     if schema:
         from printhammer.sweep import tables
@@ -72,7 +70,7 @@ def sweep(
 
 
 def ended(result: xr.Dataset, new: float, seconds: float) -> str:
-    """Say how the members of a sweep ended."""
+    """Return a line with the number of sweep members for each status."""
     from collections import Counter
 
     from printhammer.sweep.outputs import STATUSES
@@ -90,12 +88,12 @@ _LINE_EVERY: Final = 10.0
 
 
 class Telling:
-    """Tells how far a sweep is: a bar on a terminal, else a line now and then, on the standard error.
+    """Progress of a sweep on the standard error: a bar on a terminal, else a line every ten seconds.
 
     Attributes
     ----------
     new : float
-        Members done by this process.
+        Number of members computed by this process.
     """
 
     def __init__(self) -> None:
@@ -123,10 +121,10 @@ class Telling:
             self._bar.stop()
 
     def tell(self, done: float, before: int, members: int) -> None:
-        """Take how many members are done, were done before, and there are."""
+        """Update the progress: members done, done before this run, and in total."""
         now = time.monotonic()
         if self.new <= 0.0 and done <= before:
-            # Compiling and reaching a cluster are not part of the rate.
+            # Exclude compiling and the connection to a cluster from the rate.
             self._began = now
         self.new = done - before
         text = progress_text(done, before, members, now - self._began)
@@ -139,7 +137,7 @@ class Telling:
 
 
 def progress_text(done: float, before: int, members: int, seconds: float) -> str:
-    """Say how many members are done, at which rate, and how long the others will take."""
+    """Return the progress text: members done, rate, and time left."""
     text = f"{int(done)} of {members} members"
     new = done - before
     if new <= 0.0 or seconds <= 0.0:

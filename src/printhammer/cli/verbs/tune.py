@@ -1,4 +1,4 @@
-"""The verbs `tune` and `learn`: compensation tables from the model, and from the dots of one unit."""
+"""The verbs `tune` and `learn`: compensation tables from the model, or from the dots of a unit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def tuned_along(
     options: dict[str, Any],
     units: Units,
 ) -> Answer:
-    """Tune tables along an axis, such as 'rail 90 V, 110 V, 3'; `header` holds the tick, if any."""
+    """Tune one table per value of an axis, such as 'rail 90 V, 110 V, 3'; `header` holds the tick, if any."""
     from printhammer.control.axes import tune_along
 
     axis, values = _read(along)
@@ -42,7 +42,7 @@ def tuned_along(
 
 
 def _told(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
-    """Show a table, rounded to the tick if there is one, and return it; check that it keeps to the budget."""
+    """Show the table, rounded to the tick if any, check its size against the budget, and return it."""
     made = made.quantised(header["tick"]) if header else made
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
@@ -51,7 +51,7 @@ def _told(job: Job, made: Any, header: dict[str, Any], budget: int | None, units
 
 
 def _read(written: str) -> tuple[str, list[float]]:
-    """Read an axis and its values; InputError if it is none."""
+    """Parse an axis and its values."""
     from printhammer.control.axes import AXES
 
     axis, _, rest = written.strip().partition(" ")
@@ -67,43 +67,52 @@ _MOST_RATES: Final = 2000
     "tune",
     "printhammer tune hendriks-1983 --rate 1.3kHz --history 2 --out table.csv --out table.h",
     {
-        "rate": opt.text("RATE", "Slots per second, such as 1.3kHz (all rates)."),
-        "rates": opt.rates_between("Several rates, such as '1.2 kHz, 1.4 kHz, 41'.", _MOST_RATES),
-        "history": opt.whole("Gaps that a history holds, 1 to 4.", default=2),
-        "reach": opt.whole("Longest gap that counts, slots.", default=2),
-        "brake": opt.switch("Allow brake pulses.", default=True),
-        "robust": opt.switch("Tune on hammers that differ a little as well."),
-        "driver": opt.choice(
-            "own|switch", "The hammer's own pulse, or that of a fast switch.", default="own"
+        "rate": opt.text("RATE", "Dot slots per second, e.g. 1.3kHz (default: all rates)."),
+        "rates": opt.rates_between(
+            "Rates of the table, instead of --rate, e.g. '1.2 kHz, 1.4 kHz, 41'.", _MOST_RATES
         ),
-        "largest_current": opt.text("CURRENT", "Bound on the current.", default="2 A"),
+        "history": opt.whole("Number of preceding gaps that index an entry, 1 to 4.", default=2),
+        "reach": opt.whole(
+            "Longest gap that is distinguished, in slots; longer gaps count as rest.", default=2
+        ),
+        "brake": opt.switch("Allow brake pulses.", default=True),
+        "robust": opt.switch("Minimise the mean square deviation over perturbed hammers, too."),
+        "driver": opt.choice(
+            "own|switch",
+            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar switch.",
+            default="own",
+        ),
+        "largest_current": opt.text("CURRENT", "Limit on the current.", default="2 A"),
     },
-    out=opt.results("Table", ".h"),
+    out=opt.results("Compensation table", ".h"),
     report=opt.files(
-        "Picture of gain and loss (.svg, .png, .pdf) or numbers (.nc, .csv, ...).", *opt.DATA, many=False
+        "Report on gain and loss: picture (.svg, .png, .pdf) or data (.nc, .csv, ...).", *opt.DATA, many=False
     ),
 )
 def tune(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    judge: bool = opt.switch("Judge the table beside open loop on what it was not tuned on.", default=True),
-    tick: float | None = opt.quantity(
-        "s", "TIME", "Tick of the timer, such as '1 us' (1 ns).", positive=True
+    judge: bool = opt.switch(
+        "Validate the table against open loop on patterns that the tuning did not use.", default=True
     ),
-    budget: int | None = opt.whole("Most bytes that the arrays of the C header may take."),
+    tick: float | None = opt.quantity(
+        "s", "TIME", "Tick of the firmware timer, e.g. '1 us' (default: 1 ns).", positive=True
+    ),
+    budget: int | None = opt.whole("Maximum size of the arrays in the C header, bytes."),
     along: str | None = opt.text(
         "AXIS LOW, HIGH, N",
-        "Tables along rail, temperature (of the coil), gap or forms, such as 'rail 90 V, 110 V, 3'.",
+        "Axis along which several tables are tuned: rail, temperature (of the coil), gap or forms, with its"
+        " values, e.g. 'rail 90 V, 110 V, 3'.",
     ),
-    variability: bool = opt.switch("Choose for the spread of a production."),
+    variability: bool = opt.switch("Select the entries that are best over the production spread."),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Tune pulse width and advance as a function of the last gaps, so that every dot is like one from rest.
+    """Tune pulse width and advance for each history of gaps, so that every dot equals one from rest.
 
-    Ends with status 1 where the table does not keep to the limits on the hammer it is made for.
+    The exit status is 1 if the table exceeds the limits on the hammer for which it was tuned.
     """
     from printhammer.control.table.report import judge_table
     from printhammer.control.table.tuning import tune as tuned
@@ -144,7 +153,7 @@ def tune(
 
 
 def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> None:
-    """Write a table, a C header in ticks of the timer."""
+    """Write the table; a C header holds ticks of the timer."""
     from printhammer.support.files import write_file
 
     if path.suffix.lower() == ".h":
@@ -160,45 +169,66 @@ _PANEL: Final = "The sensor"
     "learn",
     "printhammer learn hendriks-1983 --rate 1.275kHz --force-noise 0.03 --serial A17 --table learned.json",
     {
-        "rate": opt.text("RATE", "Slots per second, such as 1.275kHz.", default="1.275 kHz"),
+        "rate": opt.text("RATE", "Dot slots per second, e.g. 1.275kHz.", default="1.275 kHz"),
         "driver": opt.choice(
-            "own|switch", "The hammer's own pulse, or that of a fast switch.", default="switch"
+            "own|switch",
+            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar switch.",
+            default="switch",
         ),
-        "history": opt.whole("Gaps that a history holds, 1 to 4.", default=2),
-        "reach": opt.whole("Longest gap that counts, slots.", default=2),
-        "members": opt.whole("Simulated hammers on which the ladder is chosen.", default=400),
-        "forgetting": opt.number("Part of the corrections that each stage takes back.", default=0.02),
-        "doubt": opt.number("Share of hammers like the unit to which the table may do harm.", default=0.0),
-        "serial": opt.text("TEXT", "Serial number of the unit.", default="unit"),
-        "seed": opt.whole("Of the simulated hammers, and of the unit where none is given.", default=1983),
-        "largest_current": opt.text("CURRENT", "Bound on the current.", default="2 A"),
+        "history": opt.whole("Number of preceding gaps that index an entry, 1 to 4.", default=2),
+        "reach": opt.whole(
+            "Longest gap that is distinguished, in slots; longer gaps count as rest.", default=2
+        ),
+        "members": opt.whole(
+            "Number of simulated hammers that select the sequence of test lines.", default=400
+        ),
+        "forgetting": opt.number("Fraction of the earlier corrections that each stage undoes.", default=0.02),
+        "doubt": opt.number(
+            "Largest accepted fraction of likely units that print worse with the table than in open loop.",
+            default=0.0,
+        ),
+        "serial": opt.text("TEXT", "Serial number of the unit that learns.", default="unit"),
+        "seed": opt.whole(
+            "Seed for the simulated hammers, and for the test unit if --unit is not given.", default=1983
+        ),
+        "largest_current": opt.text("CURRENT", "Limit on the current.", default="2 A"),
         "threads": opt.THREADS,
     },
-    out=opt.results("What is printed at each stage"),
-    table=opt.files("The table that is learned (.csv, .json, .h, ...).", *opt.DATA, ".h", pictures=False),
+    out=opt.results("Dots printed at each stage"),
+    table=opt.files("Learned compensation table (.csv, .json, .h, ...).", *opt.DATA, ".h", pictures=False),
 )
 def learn(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    unit: Path | None = opt.source("Hammer file of the unit that is driven (a random one)."),
-    noise: float | None = opt.quantity("s", "TIME", "Of a time of impact ('5 us').", panel=_PANEL),
+    unit: Path | None = opt.source("Hammer file of the driven unit (default: drawn at random)."),
+    noise: float | None = opt.quantity(
+        "s", "TIME", "Standard deviation of the impact-time sensor (default: 5 us).", panel=_PANEL
+    ),
     signal: str | None = opt.choice(
-        "current|voltage", "Take the time of impact from samples of the coil instead.", panel=_PANEL
+        "current|voltage",
+        "Estimate the impact time from samples of coil current or voltage, instead of a sensor.",
+        panel=_PANEL,
     ),
-    signal_noise: str | None = opt.text("VALUE", "Noise of such a sample ('5 mA', '50 mV').", panel=_PANEL),
+    signal_noise: str | None = opt.text(
+        "VALUE", "Standard deviation of a coil sample, e.g. '5 mA' or '50 mV'.", panel=_PANEL
+    ),
     force_noise: float | None = opt.number(
-        "Noise of a force, relative (forces are not measured).", panel=_PANEL
+        "Relative standard deviation of measured forces (default: no forces).", panel=_PANEL
     ),
-    colour: float | None = opt.number("Correlation of the noise from dot to dot (0).", panel=_PANEL),
-    gain: float | None = opt.number("Error of the scale (0).", panel=_PANEL),
-    missed: float | None = opt.number("Share of the impacts that are missed (0).", panel=_PANEL),
-    false: float | None = opt.number("Share of false impacts (0).", panel=_PANEL),
+    colour: float | None = opt.number(
+        "Correlation of the noise of successive dots (default: 0).", panel=_PANEL
+    ),
+    gain: float | None = opt.number("Scale error of the sensor (default: 0).", panel=_PANEL),
+    missed: float | None = opt.number(
+        "Fraction of impacts that the sensor misses (default: 0).", panel=_PANEL
+    ),
+    false: float | None = opt.number("Fraction of false impacts (default: 0).", panel=_PANEL),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Let a hammer that nobody has measured calibrate its compensation table while it prints test lines.
+    """Learn the compensation table of a unit from the impact times of its test lines.
 
-    Ends with status 1 where not all dots are within limits in the end.
+    The exit status is 1 if dots of the last line exceed the limits.
     """
     from printhammer.control.learning.learn import learn as learned
     from printhammer.control.learning.sensor import ImpactSensor
@@ -223,7 +253,7 @@ def learn(
 
 
 def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict[str, float]:
-    """Return what the time of impact from samples of the coil is like: noise, offset and share missed."""
+    """Return the error model of impact times from coil samples: noise, offset and fraction missed."""
     from dataclasses import asdict
 
     from printhammer.control.impact_time import impact_time
