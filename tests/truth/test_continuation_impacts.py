@@ -237,6 +237,46 @@ def test_a_branch_goes_on_where_its_impact_meets_the_section() -> None:
             assert min(math.dist((x[0], v[0]), state) for state in exact) < 1e-7
 
 
+HOPPER = BouncingBall(1.5, 0.4, 3.0)
+AT_IMPACT = math.acos(HOPPER.fold * 3.0 / 5.3)
+
+
+@pytest.mark.parametrize(
+    ("force_phase", "section"),
+    # The impact at the fold lies on the section; that at the start does; neither does.
+    [(0.0, 0.0), (AT_IMPACT, 0.0), (0.0, AT_IMPACT / (2.0 * math.pi)), (0.5, 0.4)],
+)
+def test_no_section_hides_a_fold(force_phase: float, section: float) -> None:
+    weight, amplitude, omega, start = 3.0, 5.3, 6.0 * math.pi, AT_IMPACT
+    hammer = ph.Hammer.build(
+        2.0,
+        spring={"law": "preload", "preload": -weight, "stiffness": 0.0},
+        backstop={"law": "rigid", "position": 0.0, "restitution": 0.4},
+    )
+    # Flight from the impact at the angle `start` of the force to the section.
+    late = ((2.0 * math.pi * section + force_phase - start) % (2.0 * math.pi)) / omega
+    push, up, now = amplitude / 2.0, 0.5 * 0.4 / 1.4, start + omega * late
+    v = up - 1.5 * late - push / omega * (math.cos(now) - math.cos(start))
+    x = (up + push / omega * math.cos(start)) * late - 0.75 * late**2
+    x -= push / omega**2 * (math.sin(now) - math.sin(start))
+    branch = continuation(
+        hammer,
+        "drive.amplitude",
+        (3.9, 6.0),
+        drive=ph.SineForce(amplitude, 3.0, phase=force_phase),
+        state=(x, v),
+        phase=section,
+    )
+    assert [(stop.reason, stop.parameter) for stop in branch.stops] == [("bound", 6.0), ("bound", 6.0)]
+    # W pi (1-e)/(1+e), and W sqrt((pi (1-e)/(1+e))^2 + (2 (1+e^2)/(1+e)^2)^2).
+    assert values(branch, "fold") == [pytest.approx(4.0391905546, rel=1e-10)]
+    assert values(branch, "period doubling") == [pytest.approx(5.3781787136, rel=1e-10)]
+    (limits,) = branch.stable_ranges
+    assert limits == pytest.approx((4.0391905546, 5.3781787136), rel=1e-10)
+    (fold,) = [event for event in branch.events if event.kind == "fold"]
+    np.testing.assert_allclose(fold.multipliers.real, [1.0, 0.16], atol=1e-6)
+
+
 def test_an_oscillation_goes_on_where_it_grazes_a_pack() -> None:
     # x'' + x = F cos(w t) is F / (1 - w^2) cos(w t), and meets the pack where that gets to its front.
     omega, front = 1.7, 0.1

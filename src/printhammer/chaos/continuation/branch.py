@@ -292,7 +292,8 @@ class Branch(Result):
     @property
     def message(self) -> str:
         """What the branch is, and why it ends at either end, in one line."""
-        low, high = float(self.values.min()), float(self.values.max())
+        reached = [*self.values.tolist(), *(event.value for event in self.events if event.kind == "fold")]
+        low, high = min(reached), max(reached)
         span = f"{self.parameter} from {low:{_DIGITS}} to {high:{_DIGITS}} {self.unit}"
         what = f"period-{self.firings} branch of {len(self)} orbits, {span}"
         if self.closed:

@@ -18,7 +18,7 @@ from printhammer.chaos.continuation.branch import MOST, Branch
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbits
-from printhammer.chaos.strobe.map import MAP_EFFORT
+from printhammer.chaos.strobe.map import MAP_EFFORT, is_on_impact, quiet_section, state_later, usable
 from printhammer.chaos.strobe.points import strobes
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -51,8 +51,8 @@ def continuation(
     start : Hammer, Regime or Orbit
         A periodic orbit from `printhammer.orbits`; or a regime, or a hammer with all that `firing` says of
         it, whose orbit is that near `state`, or else that to which a train from rest settles, or else the
-        first that a search finds. The armature must not be on its way out of the pack at the phase of the
-        section.
+        first that a search finds. Where an impact lies on the section, the branch is followed at another
+        phase; no result depends on the phase.
     parameter : str
         "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
         waveform or of an endless force, such as "waveform.amplitude" or "drive.amplitude".
@@ -103,27 +103,34 @@ def continuation(
             )
         wanted = None if firings is None else read_count(firings, "firings")
         if state is None:
-            fixed = isinstance(start, Regime) or firing.get("phase") is not None
-            regime, point, count = _orbit_to_start_from(regime, wanted, fixed, effort)
+            regime, point, count = _orbit_to_start_from(regime, wanted, effort)
         else:
             point, count = np.array(state, dtype=np.float64), wanted or 1
+    if is_on_impact(regime, point, count, effort.tolerance):
+        quiet = quiet_section(regime, point, count, effort.tolerance)
+        regime, point = (regime, point) if quiet is None else quiet
     tracer = Tracer(regime, parameter, read_bounds(regime, parameter, bounds), effort.quiet)
     chosen = steps or Steps(most=read_count(most, "most"), precision=PRECISION)
     return tracer.branch(point, count, chosen, effort.progress)
 
 
 def _orbit_to_start_from(
-    regime: Regime, firings: int | None, phase_given: bool, effort: Effort
+    regime: Regime, firings: int | None, effort: Effort
 ) -> tuple[Regime, FloatArray, int]:
-    """Return the regime at the phase of an orbit of it, a state of the orbit and its number of firings."""
+    """Return a regime at the phase of a section, the state of an orbit there and its number of firings."""
     judged = (_SETTLE // 2, _SETTLE)
     (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=effort.threads)
     period = None if settled.verdict is None or not settled.ok else settled.verdict.period
-    if period is not None and firings in (None, period):
-        return regime, np.array([settled.x[0], settled.v[0]]), period
+    state = np.array([settled.x[0], settled.v[0]])
+    if period is not None and firings in (None, period) and usable(regime.hammer, *state.tolist()):
+        return regime, state, period
     many = firings or 1
     for orbit in orbits(regime, longest=many, threads=effort.threads):
-        if orbit.firings == many and (orbit.phase == regime.phase or not phase_given):
+        if orbit.firings == many:
+            state = state_later(orbit.regime, orbit.section, regime.phase, effort.tolerance)
+            # On its way out of the pack the armature has a memory.
+            if np.isfinite(state).all() and usable(regime.hammer, *state.tolist()):
+                return regime, state, many
             return orbit.regime, np.array(orbit.section), many
     raise InputError(
         (

@@ -22,7 +22,7 @@ from printhammer.chaos.continuation.branch_points import (
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.chaos.continuation.flights import grazing_of, near_touches
-from printhammer.chaos.strobe.map import quiet_section
+from printhammer.chaos.strobe.map import quiet_section, state_later
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.run.effort import Effort
@@ -45,6 +45,10 @@ _DIGITS: Final = ".9g"
 _MOST_SECTIONS: Final = 8
 _SAME_PHASE: Final = 1e-3
 """Sections that a branch is followed at beyond an end; parts of the period within which they are the same."""
+_CLEAR: Final = 1e-3
+"""Scaled distance from a lost end from which on an impact at the section disturbs no derivative."""
+_LEAST_CHORD: Final = 1e-5
+"""Least scaled distance of two orbits whose chord is the direction of a branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 
 
@@ -106,18 +110,22 @@ class Tracer:
         """Return how a branch goes on from an end at other sections, piece by piece, and its new stop.
 
         A branch is lost where an impact meets its section. Each piece begins or ends with the last orbit of
-        that before it, looked at where it is farthest from its contacts.
+        that before it, looked at where it is farthest from its contacts. Orbits too close to the end are
+        removed from `nodes`.
         """
         pieces: list[tuple[RegimeFamily, list[Node]]] = []
         while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
-            node = nodes[0] if backward else nodes[-1]
+            kept = self.before_end(nodes if backward else nodes[::-1])
+            node = kept[0]
             regime = family.regime.with_(self.parameter, node.parameter)
             quiet = quiet_section(regime, node.state, family.firings, self.effort.tolerance)
             if quiet is None or abs(quiet[0].phase - regime.phase) < _SAME_PHASE:
                 break
             tracer = self.at_phase(quiet[0].phase)
+            way = self.way_at(family, kept, quiet)
+            if way is None:
+                break
             family = tracer.family(family.firings)
-            up = (node.tangent[-1] > 0.0) != backward
             try:
                 curve = follow(
                     family,
@@ -127,13 +135,14 @@ class Tracer:
                     bounds=self.bounds,
                     steps=steps,
                     directions="up",
-                    row=np.array([0.0, 0.0, 1.0 if up else -1.0]),
+                    row=way,
                     watch=tracer.watch(family.firings, steps, self.effort),
                 )
             except InputError:
                 break
             if len(curve.nodes) < 2:
                 break
+            nodes[:] = kept if backward else kept[::-1]
             curve = tracer.grazed(family, curve)
             stop, nodes = curve.stops[1], curve.nodes
             if backward:
@@ -141,6 +150,34 @@ class Tracer:
             nodes = [replace(each, arc=each.arc + node.arc) for each in nodes]
             pieces.append((family, nodes))
         return pieces, stop
+
+    def before_end(self, nodes: list[Node]) -> list[Node]:
+        """Return the orbits of a piece from its end on without those so close to it that it disturbs them."""
+        places = np.array([np.append(node.state, node.parameter) for node in nodes]) / self.scales
+        away = np.linalg.norm(places - places[0], axis=1) > _CLEAR
+        return nodes[min(int(np.argmax(away)) if away.any() else 0, len(nodes) - 2) :]
+
+    def way_at(
+        self, family: RegimeFamily, nodes: list[Node], quiet: tuple[Regime, FloatArray]
+    ) -> FloatArray | None:
+        """Return the direction, in scaled variables, in which a branch goes on at another section.
+
+        `nodes` begin with the last orbit, which is at the state `quiet` there. It is that of the chord from
+        an orbit before it: a contact on the section leaves no derivative there, and at a fold the constant
+        alone is no direction. None where no orbit is far enough away, or one does not come through.
+        """
+        last = nodes[0]
+        end = np.append(quiet[1], last.parameter) / self.scales
+        for node in nodes[1:]:
+            own = family.regime.with_(self.parameter, node.parameter)
+            there = state_later(own, node.state, quiet[0].phase, self.effort.tolerance)
+            way = end - np.append(there, node.parameter) / self.scales
+            length = float(np.linalg.norm(way))
+            if not math.isfinite(length):
+                return None
+            if length > _LEAST_CHORD:
+                return np.asarray(way / length)
+        return None
 
     def at_phase(self, phase: float) -> Tracer:
         """Return the same at another section."""

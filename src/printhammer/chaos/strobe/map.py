@@ -226,6 +226,7 @@ def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, Flo
 
 
 _BEYOND: Final = 0.01
+_ON_IMPACT: Final = 1e-3
 
 
 def quiet_section(
@@ -249,24 +250,59 @@ def quiet_section(
     tuple or None
         None where a run does not come through.
     """
-    train, _ = regime.train(firings + 1)
-    begin, *_, end = (float(time) for time in regime.moments(train, firings))
-    problem = Problem(regime.hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
-    # An orbit that begins at a contact ends at one, or just before it.
-    record = problem.run(end + _BEYOND * regime.period)
-    if record.status_name != "ok":
+    flight = _around(regime, state, firings, tolerance)
+    if flight is None:
         return None
-    busy = _busy(record.contacts, begin, end) % regime.period
-    if not busy.size:
+    problem, record, times = flight
+    begin = problem.start
+    if not times.size:
         return regime, state
     # Of all firings at once: the section is at the same phase after each.
-    times = np.unique(busy)
     gaps = np.diff(np.append(times, times[0] + regime.period))
     widest = int(np.argmax(gaps))
     late = (times[widest] + 0.5 * gaps[widest]) % regime.period
     (row,) = problem.resample(record, np.array([begin + late]))
     phase = (regime.phase + late / regime.period) % 1.0
     return replace(regime, phase=float(phase)), row[:2].copy()
+
+
+def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> bool:
+    """Whether an orbit meets a rigid backstop within a thousandth of a period of its section."""
+    backstop = regime.hammer.backstop
+    if backstop is None or backstop.law != "rigid":
+        return False
+    flight = _around(regime, state, firings, tolerance)
+    if flight is None:
+        return False
+    times = flight[2] / regime.period
+    return bool((np.minimum(times, 1.0 - times) < _ON_IMPACT).any())
+
+
+def _around(
+    regime: Regime, state: FloatArray, firings: int, tolerance: float
+) -> tuple[Problem, Record, FloatArray] | None:
+    """Return an orbit from a section on, and times since a section at which it has a contact, ascending."""
+    train, _ = regime.train(firings + 1)
+    begin, *_, end = (float(time) for time in regime.moments(train, firings))
+    try:
+        problem = Problem(regime.hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
+    except InputError:
+        return None
+    # An orbit that begins at a contact ends at one, or just before it.
+    record = problem.run(end + _BEYOND * regime.period)
+    if record.status_name != "ok":
+        return None
+    return problem, record, np.unique(_busy(record.contacts, begin, end) % regime.period)
+
+
+def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: float) -> FloatArray:
+    """Return the state, (m, m/s), at the next section of another phase; NaN where a run ends before."""
+    train, _ = regime.train(2)
+    begin = float(regime.moments(train, 1)[0])
+    problem = Problem(regime.hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
+    end = begin + (phase - regime.phase) % 1.0 * regime.period
+    record = problem.run(end)
+    return record.nodes[-1, 1:3].copy() if record.status_name == "ok" else np.full(2, np.nan)
 
 
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
