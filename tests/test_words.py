@@ -14,7 +14,7 @@ from printhammer.cli.registry import GROUPS, VERBS
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/printhammer"
 
-ROOMS = ("cli",)
+ROOMS = ("cli", "derivatives", "drive", "hammer", "maps", "support")
 PAGES: tuple[str, ...] = ()
 PHRASES = (
     r"Returns? what\b",

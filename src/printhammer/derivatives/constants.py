@@ -1,6 +1,6 @@
-"""The tangent flow of constants: how a motion changes with the constants of hammer and drive.
+"""Tangent flow of the constants: derivatives of a motion with respect to constants of hammer and drive.
 
-The columns of `printhammer.kernel.variational` carried along a recorded run, in a second pass as for the
+A second pass along a recorded run integrates the columns of `printhammer.kernel.variational`, as for the
 tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md has the derivation.
 """
 
@@ -41,19 +41,19 @@ def flow(
     initial: FloatArray,
     nodes: Sequence[int] = (),
 ) -> Flow:
-    """Carry the columns of constants along a recorded run; arguments as for `carry_columns`.
+    """Integrate the columns of constants along a recorded run; arguments as for `carry_columns`.
 
-    The changes are those with ``value / scale`` of each constant.
+    Derivatives are with respect to ``value / scale`` of each constant.
     """
     forcing = forcing_of(problem, as_arrays(wanted))
     return carry_columns(problem, [record], marks, initial, forcing, nodes=nodes)
 
 
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the changes of a start from rest at time 0 with constants, shape (3, n): m, m/s, m.
+    """Return the derivatives of a start from rest at time 0, shape (3, n): m, m/s, m.
 
-    A pulse fired at that time with a sharp edge begins to act later if its firing does. With a circuit shape
-    (6, n), of a start without current.
+    A pulse with a sharp edge fired at that time acts later if its firing does. With a circuit, the shape is
+    (6, n), for a start without current.
     """
     columns = np.zeros((3, len(wanted)))
     columns[0] = rest_changes(problem.hammer, wanted)
@@ -72,9 +72,10 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 
 
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
-    """Return the changes of a start without current at time 0, shape (6, n): those of `columns`, Wb, Wb, V.
+    """Return the derivatives of a start without current at time 0, shape (6, n), from `columns`: Wb, Wb, V.
 
-    The linkage is that of the place; a voltage switched on at that time acts later if its firing does.
+    The flux linkage is the one at the displacement of the start; a voltage switched on at that time acts
+    later if its firing does.
     """
     magnet: Any = import_module(problem.laws.magnet or problem.laws.absent)
     linkage = getattr(magnet, "magnet_linkage", None) if problem.constants[COUPLED] else None
@@ -108,7 +109,7 @@ def without_current(problem: Problem, wanted: Sequence[Parameter], columns: Floa
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
-    """Return the changes [m] of the front of the pack and of the position of the backstop, by surface."""
+    """Return the derivatives [m] of the positions of pack front and backstop, by surface."""
     moves = as_arrays(wanted)["hammer"]
     return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
 
@@ -116,10 +117,10 @@ def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
 def pack_push_changes(
     problem: Problem, wanted: Sequence[Parameter], state: FloatArray, changes: FloatArray
 ) -> FloatArray:
-    """Return the changes [N] of the push of the pack on the armature, shape (n,).
+    """Return the derivatives [N] of the pack force on the armature, shape (n,).
 
-    At a state inside the pack, a row of `Flow.states`, from the changes there of displacement, velocity and
-    latest local maximum, shape (3 or more, n).
+    The state is inside the pack, a row of `Flow.states`; `changes`, shape (3 or more, n), are the derivatives
+    of displacement, velocity and latest local maximum there.
     """
     moves = as_arrays(wanted)["hammer"]
     return np.array(
@@ -128,24 +129,24 @@ def pack_push_changes(
 
 
 def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
-    """Return the rate [N/s] of the push of the pack at a time of a run, s; NaN but on the loading branch."""
+    """Return the rate [N/s] of the pack force at a time of a run, s; NaN except on the loading branch."""
     row = problem.resample(record, np.array([t]))[0]
     if int(row[9]) != M.LOADING:
         return math.nan
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     a = (float(row[3:9].sum()) + drive) / problem.hammer.mass
     still = np.zeros_like(problem.constants)
-    # In the time of the motion, so that the changes are of the size of the state.
+    # Scale by the time of the motion, which makes the changes as large as the state.
     time = problem.scales[0] / problem.scales[1]
     direction = np.array([float(row[1]), a, 0.0]) * time
     return _push_change(problem, still, np.array([row[0], row[1], row[9], 0.0]), direction) / time
 
 
 def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
-    """Return the change [N] of the push of the pack with constants, displacement, velocity and memory."""
+    """Return the derivative [N] of the pack force along a change of constants, state and memory."""
     x, v, mode, peak = (float(number) for number in state[:4])
     dx, dv, dp = (float(number) for number in change)
-    # No point may leave the pack, and no depth may change much.
+    # A step must neither leave the pack nor change the indentation by much.
     sink = max(abs(dx - moves[FRONT]), abs(dp - moves[FRONT]))
     depth = x - problem.constants[FRONT]
     share = SPACING * min(1.0, depth / sink if sink > 0.0 and depth > 0.0 else 1.0)

@@ -1,8 +1,8 @@
-"""How what each firing did changes with the constants: from the columns of constants at contacts and peaks.
+"""Derivatives of each dot with respect to the constants, from the columns at contacts and peaks.
 
-A touch is earlier or later by dt = -(dx - dg) / v, dx the change of the displacement at a fixed time and dg
-that of the surface; its speed changes by dv + a dt. Losses are integrals of power, whose changes the columns
-hold.
+A touch shifts in time by dt = -(dx - dg) / v, with dx the change of the displacement at a fixed time and dg
+that of the surface; the touch speed changes by dv + a dt. Losses are integrals of power, whose derivatives
+are in the columns.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DOT_QUANTITIES: Final = {
     "return_time": ("s", "from firing to the first touch of the backstop after the dot"),
     "return_speed": ("m/s", "speed at that touch"),
 }
-"""Unit and meaning of what is told of each dot."""
+"""Unit and meaning of the quantities of a dot."""
 
 RUN_QUANTITIES: Final = {
     "coil_work": ("J", "work of the coil"),
@@ -44,7 +44,7 @@ RUN_QUANTITIES: Final = {
     "backstop_loss": ("J", "energy that the backstop took"),
     "damping_loss": ("J", "energy that the damping of the armature took"),
 }
-"""Unit and meaning of what is told of the whole run; the last of a hammer with damping only."""
+"""Unit and meaning of the quantities of a whole run; the last one exists only for a hammer with damping."""
 
 _ENERGY: Final = 3
 _PACK_LOSS: Final = 5
@@ -53,7 +53,7 @@ _NEAR: Final = 1e-6
 
 
 class Struck(Declared):
-    """One dot that was struck: its contacts, by their rows, and the instants at which to look."""
+    """Dot that was printed: the rows of its contacts, and its instants of largest indentation and force."""
 
     index: int = part("number of the firing")
     touch: int = part("row of the contact with the pack")
@@ -63,7 +63,7 @@ class Struck(Declared):
 
 
 def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck]:
-    """Find contacts and instants of all dots that were struck."""
+    """Locate the contacts and instants of all printed dots."""
     struck: list[Struck] = []
     contacts = motion.contacts
     for row in _touches(contacts):
@@ -75,7 +75,7 @@ def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck
 
 
 def dot_values(motion: Motion) -> FloatArray:
-    """Return the values of `DOT_QUANTITIES` for each firing, SI, shape (dots, q); NaN where not known."""
+    """Return the values of `DOT_QUANTITIES` for each firing, SI, shape (dots, q); NaN for a missing value."""
     values = np.full((len(motion.dots), len(DOT_QUANTITIES)), np.nan)
     names = list(DOT_QUANTITIES)
     for dot in motion.dots:
@@ -92,12 +92,12 @@ def dot_values(motion: Motion) -> FloatArray:
 
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
-    """Return the rows of the contacts that make a dot."""
+    """Return the row of the contact that makes the dot, for each firing."""
     return [row for row, number in enumerate(contact_numbers(contacts)) if number == DOT]
 
 
 def _back(contacts: Sequence[Contact], row: int) -> int | None:
-    """Return the row of the backstop contact that follows a dot and its extra contacts, if one does."""
+    """Return the row of the first backstop contact after a dot and its extra contacts, or None."""
     following = next((k for k in range(row + 1, len(contacts)) if not contacts[k].extra), None)
     return following if following is not None and contacts[following].surface == "backstop" else None
 
@@ -107,7 +107,7 @@ def _end(record: Record, contact: Contact) -> float:
 
 
 def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
-    """Return the time of the largest indentation, s, where the velocity is zero to the last digits."""
+    """Return the time of largest indentation, s: the zero of the velocity, to full precision."""
     t = contact.t_peak
     for _ in range(3):
         row = problem.resample(record, np.array([t]))[0]
@@ -119,7 +119,7 @@ def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
 
 
 def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: float) -> float:
-    """Return the time of the largest force of the pack, s; one that jumps at touch may be largest there."""
+    """Return the time of the largest pack force, s; the touch itself if the force jumps to its maximum."""
     from scipy.optimize import minimize_scalar
 
     t_in, t_out = contact.t_in, _end(record, contact)
@@ -140,14 +140,14 @@ def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: floa
         options={"xatol": 1e-10},
     )
     t = t_in + float(best_force.x) * scale
-    # Without damping the force is largest where the indentation is, which is known better.
+    # Without damping the force peaks at the largest indentation, whose time is known more precisely.
     return t_peak if abs(t - t_peak) < _NEAR * scale else _settled(problem, record, t, 1e-3 * (high - low))
 
 
 def _settled(problem: Problem, record: Record, t: float, step: float) -> float:
-    """Return the time near `t`, s, at which the force of the pack is stationary, by the secant method.
+    """Return the time near `t`, s, at which the pack force is stationary, by the secant method.
 
-    A comparison of forces finds it to half of the digits only.
+    Comparing forces would locate the time to half of the digits only.
     """
     before, rate_before = t - step, pack_push_rate(problem, record, t - step)
     for _ in range(6):
@@ -160,14 +160,14 @@ def _settled(problem: Problem, record: Record, t: float, step: float) -> float:
 
 
 def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
-    """Return the acceleration, m/s^2, of a row of `Problem.resample`, without some of its forces."""
+    """Return the acceleration, m/s^2, of a row of `Problem.resample`, excluding the forces in `without`."""
     forces = {k: float(row[k]) for k in range(3, 9) if k not in without}
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     return (math.fsum(forces.values()) + drive) / problem.hammer.mass
 
 
 class Changes(Declared):
-    """Changes with ``value / scale`` of each constant."""
+    """Derivatives of the quantities of a run with respect to ``value / scale`` of each constant."""
 
     dots: FloatArray = part(
         "of `DOT_QUANTITIES`, shape (dots, quantities, n)", more="NaN where a dot is lost or one is not known"
@@ -179,7 +179,7 @@ class Changes(Declared):
 def changes_of(
     motion: Motion, problem: Problem, record: Record, wanted: Sequence[Parameter], initial: FloatArray
 ) -> Changes:
-    """Return the changes of all quantities of a run from those of its state at time 0, shape (3 or 6, n)."""
+    """Return the derivatives of all quantities of a run from those of its initial state (`initial`)."""
     struck = struck_dots(motion, problem, record)
     times = record.nodes[:, 0]
     end = float(times[-1])
@@ -206,7 +206,7 @@ def changes_of(
 
 @dataclass(frozen=True)
 class _Look:
-    """What is needed to turn columns into changes of quantities."""
+    """Run, flow and constants, from which the derivatives of quantities follow."""
 
     problem: Problem
     record: Record
@@ -216,16 +216,16 @@ class _Look:
     rows: dict[int, int]
 
     def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Return state and columns at a mark."""
+        """Return the state and the columns at a mark."""
         row = int(np.searchsorted(self.marks, t))
         return self.flow.states[row], self.flow.changes[row]
 
     def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
-        """Return by how much later a surface is passed, s."""
+        """Return the derivative of the time at which a surface is passed, s."""
         return np.asarray(-(columns[0] - surface_moves(self.wanted)[surface]) / v)
 
     def dot(self, dot: Struck, contacts: Sequence[Contact]) -> dict[str, FloatArray]:
-        """Return the changes of what is known of a dot, by name."""
+        """Return the derivatives of the quantities of a dot, by name."""
         contact = contacts[dot.touch]
         fired = np.array([parameter.firings[dot.index] for parameter in self.wanted])
         touch = self.flow.passed[self.rows[int(self.record.contacts[dot.touch, 5])], 0]
@@ -241,7 +241,7 @@ class _Look:
         state, at_force = self.columns(dot.t_force)
         total = at_force[:3].copy()
         if dot.t_force == contact.t_in:
-            # The largest force is that at touch, whenever that is.
+            # The largest force occurs at the touch.
             total[0] = surface_moves(self.wanted)["pack"]
             total[1] = changes["impact_speed"]
         changes["peak_force"] = pack_push_changes(self.problem, self.wanted, state, total)

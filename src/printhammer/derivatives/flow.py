@@ -1,6 +1,6 @@
-"""Columns of variational equations carried along a run: the one way from a problem to their kernel.
+"""Columns of variational equations integrated along a run; the only interface to their kernel.
 
-In a second pass over the record of a run, so that runs which do not ask for derivatives pay nothing.
+The integration is a second pass over the record of a run, so that other runs do not pay for it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from printhammer.run.problem import Problem, Record, Stretch
 from printhammer.support.arrays import FloatArray
 
 _VALUE_SPACING: Final = 1e-3
-"""Share of the largest pulse by which a drive is moved to see what it does to the force."""
+"""Step, as a fraction of the largest pulse, of the difference quotient of force with respect to the drive."""
 
 
 class Flow(Declared):
-    """Columns along a run, at times that are called marks."""
+    """Columns of the variational equations along a run, at given times (the marks)."""
 
     states: FloatArray = part(
         "displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks, shape (m, 4); with a"
@@ -47,7 +47,7 @@ class Flow(Declared):
 
     @property
     def status_name(self) -> str:
-        """Name of the status."""
+        """Name of the status of the run."""
         return STATUS_NAMES[self.status]
 
 
@@ -61,7 +61,7 @@ def carry_columns(
     nodes: Sequence[int] = (),
     renormalise: bool = False,
 ) -> Flow:
-    """Carry columns along a run, from the first mark to the last; NaN where the run ended before.
+    """Integrate columns along a run, from the first mark to the last; NaN after an early end of the run.
 
     Parameters
     ----------
@@ -74,11 +74,12 @@ def carry_columns(
         linkage of the coil and of its shorted turn, Wb, and voltage of the reservoir, V, by default none.
         Where no current flows, the linkage goes with the displacement, and its change is not looked at.
     forcing : tuple, optional
-        Of constants, see `forcing_of`; without it what changes is the state at the first mark alone.
+        Derivatives of the equations with respect to constants, see `forcing_of`; by default none, and only
+        the initial state changes.
     nodes : sequence of int, optional
-        Ascending numbers of nodes at which to look as well, of a record in one piece.
+        Ascending indices of nodes at which the columns are returned, too, for a record in one piece.
     renormalise : bool, optional
-        Whether to keep the columns orthonormal and to note their growth.
+        Whether to orthonormalise the columns at each step and record their growth.
     """
     forced, circuit, count = forcing is not None, problem.laws.circuit, initial.shape[1]
     rows = V.row_count(forced, circuit)
@@ -119,7 +120,7 @@ def carry_columns(
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
-    """Return what the kernel needs of the changes of "hammer", "firings" and "pieces" with n constants."""
+    """Pack the derivatives of "hammer", "firings" and "pieces" for n constants into kernel arguments."""
     moves = changes["hammer"]
     count = len(moves)
     away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)

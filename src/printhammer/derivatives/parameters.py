@@ -1,12 +1,12 @@
-"""Constants by which a motion can be differentiated, and what each changes in what the kernel works with.
+"""Constants with respect to which a motion can be differentiated, and their effect on the kernel's arrays.
 
-A constant is named as in a hammer file, "pack.stiffness"; those of the pulse are the drive's own,
-"waveform.width". Beside them there are "period" and "rate" of an even train or of a sinusoidal force, and
-"firing.3", the time of a single firing, counted from 0. A sampled waveform has the one constant
-"waveform.amplitude", its largest value.
+A constant is named as in a hammer file, such as "pack.stiffness"; constants of the pulse, such as
+"waveform.width", are those of the drive. In addition there are "period" and "rate" of an even train or a
+sinusoidal force, and "firing.3", the time of a single firing, counted from 0. A sampled waveform has one
+constant, "waveform.amplitude", its largest value.
 
-Changes are taken by differences of fourth order of the packed arrays, one-sided where a constant is at an end
-of its range. A part need not know of them.
+Derivatives of the packed arrays are finite differences of fourth order, one-sided if a constant is at an end
+of its range, so that parts need no derivatives of their own.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantities
 
 _SPACING: Final = 2e-4
-"""Share of a constant, or of its scale, by which it is moved in what is packed."""
+"""Step of the finite differences, as a fraction of the constant or its scale."""
 _STENCILS: Final = (
     ((-2, -1, 1, 2), (1.0, -8.0, 8.0, -1.0)),
     ((0, 1, 2, 3, 4), (-25.0, 48.0, -36.0, 16.0, -3.0)),
@@ -39,11 +39,11 @@ _STENCILS: Final = (
 )
 """Offsets and weights, times 12: central, forward, backward; Abramowitz and Stegun (1964), table 25.2."""
 _MOST_SINGLE: Final = 20
-"""Largest number of uneven firings whose times are listed one by one."""
+"""Largest number of uneven firings whose times are listed individually; arbitrary."""
 
 
 class Parameter(Declared):
-    """A constant of a hammer under a drive, and the changes that it makes."""
+    """Constant of a hammer under a drive, with the derivatives of the kernel's arrays."""
 
     name: str = part('such as "pack.stiffness", "waveform.width", "period", "firing.1"')
     value: float = part("in SI")
@@ -61,10 +61,10 @@ class Parameter(Declared):
 
 
 def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
-    """List the constants of a hammer and a drive: those of the hammer, of the pulse, of the firing times.
+    """List the differentiable constants: those of the hammer, of the pulse, and of the firing times.
 
-    A train of even spacing has its period, others up to 20 firings the time of each but the first. A drive
-    whose firings have waveforms of their own has no constants of the pulse.
+    An even train has its period; any other train of up to 20 firings has the time of each firing but the
+    first. A drive with a waveform per firing has no constants of the pulse.
     """
     names = [key for key in hammer.constants if not key.startswith("waveform.")]
     if drive.uniform:
@@ -78,24 +78,24 @@ def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
 
 
 def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Parameter]:
-    """Return constants by name, with the changes that they make.
+    """Return the constants named, with the derivatives of the kernel's arrays.
 
     Names are such as `parameter_names` lists, or "rate".
 
     Raises
     ------
     InputError
-        There is no such constant, or nothing is differentiable with it at its value, such as a rise time of
+        The constant is unknown, or the motion is not differentiable at its value, such as a rise time of
         zero.
     """
     return [_parameter(hammer, drive, name) for name in names]
 
 
 def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the changes [m] of the rest state with ``value / scale`` of constants, shape (n,)."""
+    """Return the derivatives [m] of the rest state with respect to ``value / scale``, shape (n,)."""
     changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
-        # A supply does not move what is at rest.
+        # The supply does not affect the state of rest.
         if parameter.hammer.any() and not parameter.name.startswith("waveform."):
             changes[k] = _rest_change(hammer, parameter)
     return changes
@@ -148,7 +148,7 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
 
 
 def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
-    """Return the period or rate of an even train, its first firing staying where it is, or of a sine."""
+    """Return the period or rate of an even train, with its first firing fixed, or of a sine."""
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError.of("constant", name, "a drive with a single period and several firings")
@@ -187,7 +187,7 @@ def _changed(waveform: Waveform, name: str, value: float) -> Waveform:
 
 
 def _table_change(made: Callable[[float], Waveform], value: float, scale: float, name: str) -> FloatArray:
-    """Return the change of a segment table whose segments stay of one kind."""
+    """Return the derivative of a segment table whose segments keep their kinds."""
     kinds = made(value).segments()[:, 1]
 
     def table(moved: float) -> FloatArray:
@@ -204,14 +204,14 @@ def _table_change(made: Callable[[float], Waveform], value: float, scale: float,
 
 
 def _difference(function: Callable[[float], FloatArray], value: float, scale: float, name: str) -> FloatArray:
-    """Return the change of an array with ``value / scale``; zero where it is infinite."""
+    """Return the derivative of an array with respect to ``value / scale``; zero if the array is infinite."""
     for offsets, weights in _STENCILS:
         try:
             middle = function(value)
             samples = [function(value + offset * _SPACING * scale) for offset in offsets]
         except InputError:
             continue
-        # From the middle, so that what does not depend on the constant is exactly zero.
+        # Relative to the middle, so that entries independent of the constant are exactly zero.
         with np.errstate(invalid="ignore"):
             change = sum(weight * (array - middle) for weight, array in zip(weights, samples, strict=True))
         change = np.asarray(change) / (12.0 * _SPACING)
@@ -224,7 +224,7 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
 
 
 def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
-    """Return what is typical for the motion in an SI unit such as "N s/m^2.5"."""
+    """Return the typical magnitude of the motion in an SI unit such as "N s/m^2.5"."""
     way, speed = scales_of(hammer, drive, (hammer.origin, 0.0))
     time, force = way / speed, hammer.mass * speed * speed / way
     known = {
@@ -253,7 +253,7 @@ def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
 
 
 def as_arrays(wanted: Sequence[Parameter]) -> dict[str, Any]:
-    """Return the changes of several constants side by side: `hammer`, `firings`, `pieces`."""
+    """Stack the derivatives of several constants: `hammer`, `firings`, `pieces`."""
     return {
         name: np.ascontiguousarray([getattr(parameter, name) for parameter in wanted], dtype=np.float64)
         for name in ("hammer", "firings", "pieces")

@@ -1,8 +1,8 @@
-"""Sensitivities: how flight time, force and energy change with every constant of the hammer and the pulse.
+"""Sensitivities of flight time, force and energy to each constant of hammer and pulse.
 
 The derivatives come from the tangent flow of the constants along one run
-(`printhammer.derivatives.constants`), not from differences of runs. The table that follows also tells how
-tolerances of the constants show in what is printed.
+(`printhammer.derivatives.constants`), not from differences of runs. `Spread` derives from them the effect of
+tolerances on the dots.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from printhammer.run.simulate import end_of_run
 from printhammer.run.start import initial_state
 from printhammer.support.arrays import FloatArray
 
-_IN_PARTS: Final = "change of a quantity in parts of it for a change of a constant in parts of it"
+_IN_PARTS: Final = "relative change of a quantity per relative change of a constant"
 _INDEPENDENT: Final = "standard deviation for independent constants"
 _WORST: Final = "deviation with all constants at their worst ends"
 
 TOLERANCE: Final = 1e-12
-"""Tolerance of the run unless told otherwise."""
+"""Default tolerance of the run."""
 
 
 class Sensitivities(Result):
-    """Derivatives of what a hammer prints with respect to its constants.
+    """Derivatives of the printed dots with respect to the constants.
 
-    Units differ along `quantity` and `constant`, and stand beside them as coordinates.
+    Units differ along `quantity` and `constant`, and are coordinates of the table.
     """
 
     hammer: Hammer = part("the hammer")
@@ -97,17 +97,17 @@ class Sensitivities(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the table is."""
+        """Title of the table."""
         return f"sensitivities of {self.hammer.name}"
 
     @property
     def ok(self) -> bool:
-        """Whether the run went as asked."""
+        """Whether the run reached its end."""
         return self.status == "ok"
 
     @property
     def lost(self) -> tuple[int, ...]:
-        """Numbers of the firings, from 0, whose dot is lost and has no sensitivities."""
+        """Indices of the firings, from 0, whose dot is lost and has no sensitivities."""
         return tuple(int(k) for k in np.flatnonzero(np.isnan(self.dots[:, 0])))
 
     @property
@@ -122,11 +122,11 @@ class Sensitivities(Result):
     @property
     @derived("1", _IN_PARTS, "energy constant")
     def run_logarithmic(self) -> FloatArray:
-        """The same for the energies of the run, shape (energies, n); NaN for an energy that is zero."""
+        """Relative change of the run's energies per relative change of a constant; NaN for zero energies."""
         return _relative(self.run_derivatives, self.values, self.run)
 
     def spread(self, spreads: Mapping[str, float | str]) -> Spread:
-        """Return how relative spreads of constants show in the quantities, to first order.
+        """Propagate relative spreads of constants to the quantities, to first order.
 
         Parameters
         ----------
@@ -163,11 +163,11 @@ class Sensitivities(Result):
         )
 
     def notes(self) -> dict[str, Any]:
-        """Return what the derivatives leave out, for the attributes of the Dataset."""
+        """Return the omitted constants and limits of validity, as attributes of the Dataset."""
         return {"smooth": str(self.smooth), "left_out": "; ".join(self.left_out.values())}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the columns, with units and meanings of the quantities beside their names."""
+        """Return the columns, with units and meanings of the quantities as coordinates."""
         known = {
             "quantity_unit": ("quantity", "SI unit of the quantity", self.quantities, DOT_QUANTITIES, 0),
             "quantity_meaning": ("quantity", "meaning of the quantity", self.quantities, DOT_QUANTITIES, 1),
@@ -189,7 +189,7 @@ class Sensitivities(Result):
         )
 
     def summary(self) -> Summary:
-        """Return how many dots struck, the constants, and how the run ended."""
+        """Summarise the number of dots, the constants, and the status of the run."""
         struck = len(self.dots) - len(self.lost)
         rows = [
             ("dots", f"{struck} of {len(self.dots)} dots struck"),
@@ -200,7 +200,7 @@ class Sensitivities(Result):
 
 
 class Spread(Result):
-    """How tolerances of constants show in what is printed, to first order."""
+    """Effect of tolerances of the constants on the dots, to first order."""
 
     sensitivities: Sensitivities = part("what it follows from", repr=False)
     spreads: FloatArray = column("1", "relative spread of a constant", "constant", name="spread")
@@ -215,7 +215,7 @@ class Spread(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the table is."""
+        """Title of the table."""
         return f"spread of what {self.sensitivities.hammer.name} prints"
 
     @property
@@ -244,21 +244,21 @@ class Spread(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the sensitivities come from."""
+        """Provenance of the sensitivities."""
         return self.sensitivities.provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return what is known of the run, for the attributes of the Dataset."""
+        """Return the notes on the run, as attributes of the Dataset."""
         return {"duration": self.sensitivities.duration, **self.sensitivities.notes()}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return deviations beside the values and coordinates of the sensitivities."""
+        """Return the deviations, with the values and coordinates of the sensitivities."""
         kept = self.sensitivities.entries()
         names = [name for name, (note, _) in kept.items() if note.kind == "coordinate"]
         return super().entries() | {name: kept[name] for name in (*names, "value", "run_value")}
 
     def plot(self, **options: Any) -> Any:
-        """Draw the sensitivities that the spread follows from; returns a matplotlib figure."""
+        """Draw the underlying sensitivities; returns a matplotlib figure."""
         return self.sensitivities.plot(**options)
 
 
@@ -271,7 +271,7 @@ def sensitivities(
     state: tuple[float, float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Sensitivities:
-    """Return how flight time, force and energy change with the constants of a hammer and its drive.
+    """Compute the sensitivities of flight time, force and energy to the constants of hammer and drive.
 
     Parameters
     ----------
@@ -281,8 +281,8 @@ def sensitivities(
         Names such as "pack.stiffness", "waveform.width", "period", "rate" or "firing.1" (the second firing;
         they are counted from 0); by default all of the hammer, of the pulse and of the firing times.
     state : tuple of float, optional
-        Displacement, m, and velocity, m/s, at time 0, which then do not change with the constants; by
-        default the rest state, which does.
+        Displacement, m, and velocity, m/s, at time 0, independent of the constants; by default the rest
+        state, which depends on them.
     tolerance : float, optional
         Error allowed in one step of the run.
 
@@ -341,7 +341,7 @@ def sensitivities(
 def _constants(
     hammer: Hammer, drive: Drive, names: Sequence[str] | None
 ) -> tuple[list[Parameter], dict[str, str]]:
-    """Return the constants, and of those not asked for by name why some are left out."""
+    """Return the constants, and the reasons for which unrequested constants are omitted."""
     if names is not None:
         return parameters(hammer, drive, list(dict.fromkeys(names))), {}
     wanted: list[Parameter] = []

@@ -1,8 +1,8 @@
-"""The tangent flow: how a small change of the state grows through all contacts, and the exponents of a train.
+"""Tangent flow of the state through all contacts, and the Lyapunov exponents of a train.
 
-A neighbouring motion meets every switch a little earlier or later; the jumps that follow are derived in
-docs/tangent.md. The flow is taken from the record of a run in a second pass, so that runs which do not ask
-for it pay nothing.
+A neighbouring motion meets every switch slightly earlier or later; docs/tangent.md derives the resulting
+jumps (saltation matrices). The flow is integrated in a second pass over the record of a run, so that other
+runs do not pay for it.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from printhammer.support.arrays import FloatArray
 
 _NODES: Final = 4096
 _WARM_UP: Final = 100
-"""Firings over which the directions of growth settle before growth counts."""
+"""Firings during which the growth directions converge before growth is counted."""
 _FEWEST: Final = 8
-"""Growths below which their scatter says nothing."""
+"""Smallest number of growth factors from which a standard error is estimated."""
 
 
 class TangentMap(Declared):
-    """The derivative of the state at one time with respect to the state at an earlier one.
+    """Derivative of the state at one time with respect to the state at an earlier time (monodromy of a run).
 
     The state is displacement, m, and velocity, m/s; on the unloading branch of a pack with memory also the
-    displacement of the latest local maximum, m (0 in `state_at_start` and `state_at_end` where it is not part
-    of the state). Where a voltage drives the coil, its flux linkage, Wb, follows, that of its shorted turn,
-    Wb, if it has one, and the voltage of the reservoir, V, if there is one. Without a current the linkage is
-    that of the place: its row goes with the displacement, its column is zero.
+    displacement of the latest local maximum, m (0 in `state_at_start` and `state_at_end` if it is not part of
+    the state). If a voltage drives the coil, the flux linkages of the coil and of its shorted turn, Wb, and
+    the voltage of the reservoir, V, follow, as far as they exist. Without a current the displacement
+    determines the linkage: its row equals that of the displacement, its column is zero.
     """
 
     matrix: FloatArray = part(
@@ -61,17 +61,17 @@ class TangentMap(Declared):
 
     @property
     def ok(self) -> bool:
-        """Whether the run went as asked."""
+        """Whether the run reached its end."""
         return self.status == STATUS_NAMES[OK]
 
     @property
     def determinant(self) -> float:
-        """Factor by which volumes of states grow; 0 where the state loses its memory on the way.
+        """Growth factor of volumes in state space; 0 if the state loses its memory on the way.
 
         Raises
         ------
         ValueError
-            The end has a memory that the start has not.
+            The state at the end has a memory, the state at the start has none.
         """
         rows, columns = self.matrix.shape
         if rows > columns:
@@ -82,7 +82,7 @@ class TangentMap(Declared):
 
 
 class Exponent(Declared):
-    """Exponents of a strobe map: mean logarithms of the growth of small changes from firing to firing."""
+    """Lyapunov exponents of a strobe map: mean logarithmic growth of small perturbations per firing."""
 
     value: float = part(
         "the largest exponent, per firing",
@@ -113,17 +113,17 @@ class Exponent(Declared):
 
     @property
     def ok(self) -> bool:
-        """Whether the run went as asked."""
+        """Whether the run reached its end."""
         return self.status == STATUS_NAMES[OK]
 
     @property
     def per_second(self) -> float:
-        """The largest exponent per second, 1/s."""
+        """Largest exponent per second, 1/s."""
         return self.value / self.period
 
     @property
     def total(self) -> float:
-        """Sum of both exponents: mean logarithm of the growth of areas, per firing."""
+        """Sum of both exponents: mean logarithmic growth of areas, per firing."""
         return self.value + self.second
 
 
@@ -136,7 +136,7 @@ def tangent_map(
     state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> TangentMap:
-    """Return the derivative of the state at `end` with respect to the state at `start`.
+    """Compute the derivative of the state at `end` with respect to the state at `start`.
 
     Parameters
     ----------
@@ -145,10 +145,10 @@ def tangent_map(
     drive : Drive
         The drive.
     start, end : float
-        Times, s, anywhere in a run from time 0. At the instant of a switch: the state after it.
+        Times, s, in a run from time 0. At the instant of a switch, the state after the switch.
     state : sequence of float, optional
-        Displacement, m, and velocity, m/s, at time 0, and what else belongs to it, as for
-        `printhammer.simulate`; by default the rest state.
+        Displacement, m, velocity, m/s, and any further components at time 0, as for `printhammer.simulate`;
+        by default the rest state.
     tolerance : float, optional
         Error allowed in one step of the run.
 
@@ -190,7 +190,7 @@ def problem_between(
     state: Sequence[float] | None,
     tolerance: float,
 ) -> Problem:
-    """Return the run of a map from `start` to `end`, s, its arguments checked as `tangent_map` says."""
+    """Return the problem of a map from `start` to `end`, s, with arguments checked as for `tangent_map`."""
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(
             f"start = {start!r} s and end = {end!r} s",
@@ -202,14 +202,14 @@ def problem_between(
 
 
 def components(mode: float) -> int:
-    """Return how many components the state has in a mode; on the unloading branch it has a memory."""
+    """Return the number of state components in a mode; the unloading branch has a memory."""
     return 3 if mode in (UNLOADING, RELOADING, HELD_UNLOADING) else 2
 
 
 def state_rows(problem: Problem, mode: float, electric: int = 3) -> list[int]:
-    """Return the rows of `Flow.changes` of what is the state in a mode; `electric` is the first electric row.
+    """Return the rows of `Flow.changes` that form the state in a mode; `electric` is the first electric row.
 
-    They are also the places of the components in the initial columns of `carry_columns`.
+    They are also the indices of these components in the initial columns of `carry_columns`.
     """
     rows = list(range(components(mode)))
     if problem.laws.circuit:
@@ -233,25 +233,25 @@ def strobe_exponent(
     state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Exponent:
-    """Return the largest exponent of the strobe map, with its standard error.
+    """Compute the Lyapunov exponents of the strobe map, with a standard error.
 
-    Two changes of the state, orthonormal at first, are carried along with the motion and made orthonormal
-    again at every step (G. Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and
-    21). The standard error is that of the mean of an autocorrelated series, from overlapping batch means of
-    length sqrt(n) (M. S. Meketon and B. Schmeiser, Proc. Winter Simulation Conf. 1984, 227; J. M. Flegal and
-    G. L. Jones, Ann. Statist. 38 (2010) 1034).
+    Two perturbations, initially orthonormal, are integrated along the motion and re-orthonormalised at every
+    step (G. Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21). The
+    standard error is that of the mean of an autocorrelated series, from overlapping batch means of length
+    sqrt(n) (M. S. Meketon and B. Schmeiser, Proc. Winter Simulation Conf. 1984, 227; J. M. Flegal and G. L.
+    Jones, Ann. Statist. 38 (2010) 1034).
 
     Parameters
     ----------
     hammer, state, tolerance
         As for `tangent_map`.
     waveform_or_drive : Waveform or Drive
-        What is fired every `period`; or a drive, whose firings are taken if it has several, and else the
-        multiples of the period after its first.
+        Waveform fired every `period`; or a drive: its own firings if it has several, else multiples of the
+        period after its first.
     period : float, optional
         Time between firings, s; for a drive by default its own.
     first, last : int
-        Numbers of the firings between which growth counts, the very first firing being 1.
+        Firings between which growth is averaged, counted from 1.
 
     Returns
     -------
@@ -286,10 +286,10 @@ def strobe_exponent(
 
 
 def standard_error(series: npt.ArrayLike) -> float:
-    """Return the standard error of the mean of an autocorrelated series, from overlapping batch means.
+    """Estimate the standard error of the mean of an autocorrelated series, by overlapping batch means.
 
-    With n numbers, batches of b = floor(sqrt(n)) and their means m_j, its square is
-    b / ((n - b)(n - b + 1)) sum (m_j - m)^2. Infinite for fewer than eight numbers, or infinite ones.
+    With n numbers, batches of length b = floor(sqrt(n)) and their means m_j, its square is b / ((n - b)(n - b
+    + 1)) sum (m_j - m)^2. Infinite for fewer than eight numbers, or infinite numbers.
     """
     numbers = np.asarray(series, dtype=np.float64)
     n = numbers.size
@@ -340,9 +340,9 @@ def _strobes(
 
 
 def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Flow:
-    """Run a problem to the last mark and carry columns of initial states along from the first.
+    """Simulate a problem up to the last mark and integrate columns of initial states from the first mark.
 
-    The record is kept in stretches: memory does not grow with the length of the run.
+    The record is processed in stretches, so that memory does not grow with the length of the run.
     """
     return problem.in_stretches(
         float(marks[-1]),

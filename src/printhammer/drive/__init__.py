@@ -1,1 +1,1 @@
-"""Drives: when a hammer is fired, and with what."""
+"""Drives: firing times and waveforms."""

@@ -1,4 +1,4 @@
-"""What every drive is: a waveform, the times at which it is fired, and a rule for overlapping pulses."""
+"""Base class of drives: a waveform, its firing times, and a rule for overlapping pulses."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ OVERLAPS: Final = get_args(Overlap)
 
 
 class Drive:
-    """A waveform and its firing times; see `printhammer.drive.trains` for the kinds. A drive never changes.
+    """Waveform with its firing times, immutable; `printhammer.drive.trains` has the kinds.
 
-    Two drives are equal if they do the same: equal segment tables, firing times, overlap rule and quantity.
+    Two drives are equal if their segment tables, firing times, overlap rules and quantities are equal.
     """
 
     bounded: ClassVar[bool] = False
-    """Whether `largest_pulse` is a bound that is stated, and does not follow from the pieces."""
+    """Whether `largest_pulse` is a stated bound instead of a consequence of the pieces."""
 
     def __init__(
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap = "add", period: float | None = None
@@ -48,7 +48,7 @@ class Drive:
 
     @property
     def waveform(self) -> Waveform:
-        """What every firing does."""
+        """Waveform of every firing."""
         return self._waveform
 
     @property
@@ -58,36 +58,36 @@ class Drive:
 
     @property
     def uniform(self) -> bool:
-        """Whether every firing does the same."""
+        """Whether all firings have the same waveform."""
         return True
 
     @property
     def overlap(self) -> Overlap:
-        """Rule for overlapping pulses: "add" or "replace", which a driver of a voltage always does."""
+        """Rule for overlapping pulses: "add" or "replace"; a driver of a voltage always replaces."""
         return self._overlap
 
     @property
     def period(self) -> float | None:
-        """Time between firings, or period of the force, s; None where there is no single one."""
+        """Time between firings, or period of the force, s; None for uneven firings."""
         return self._period
 
     @property
     def quantity(self) -> QuantityName:
-        """What is driven: "current" (A), "force" (N) or "voltage" (V)."""
+        """Driven quantity: "current" (A), "force" (N) or "voltage" (V)."""
         return self._waveform.quantity
 
     @property
     def end(self) -> float:
-        """Time from which on the drive is zero, s; possibly infinite."""
+        """Time after which the drive is zero, s; possibly infinite."""
         return float(self._ends().max())
 
     @property
     def fingerprint(self) -> str:
-        """Hexadecimal digest of what the drive does; equal for equal drives."""
+        """Hexadecimal digest of the drive; equal drives have equal digests."""
         digest = hashlib.sha256(f"{self.quantity} {self.overlap} {self._segments.shape}".encode())
         if self.quantity == "voltage":
             digest.update(repr(self._waveform.supply()).encode())
-        # Adding 0.0 makes -0.0 and 0.0, which are equal, digest alike.
+        # Adding 0.0 turns -0.0 into 0.0, so that equal numbers have equal digests.
         for array in (self._segments, self._times):
             digest.update((array + 0.0).tobytes())
         return digest.hexdigest()
@@ -97,16 +97,17 @@ class Drive:
         return self._segments
 
     def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
-        """Return the drive as the kernel wants it.
+        """Return the arrays of the drive for the kernel.
 
-        Firing times, s; the row at which the segment table of each firing begins; the tables one after the
-        other (`printhammer.drive.segments.stacked`); whether pulses replace; whether the drive is a force.
+        Firing times, s; first row of each firing's segment table; all tables stacked
+        (`printhammer.drive.segments.stacked`); whether pulses replace each other; whether the drive is a
+        force.
         """
         return self._times, self._begins(), self._pieces, self._overlap == "replace", self.quantity == "force"
 
     @property
     def overlapping(self) -> int:
-        """Largest number of pulses that are under way at once; 1 where the latest replaces the others."""
+        """Largest number of simultaneous pulses; 1 if each firing replaces the pulse before."""
         if self._overlap == "replace":
             return 1
         ended = np.searchsorted(np.sort(self._ends()), self._times, side="right")
@@ -124,26 +125,26 @@ class Drive:
 
     @property
     def largest_pulse(self) -> float:
-        """Largest absolute value of any one pulse, A or N."""
+        """Largest absolute value of a single pulse, A or N."""
         return largest(self._segments)
 
     @property
     def peak(self) -> float:
-        """Largest absolute value of the total current, A, or force, N; exact where pulses do not overlap."""
+        """Largest absolute value of the total current, A, or force, N; exact if pulses do not overlap."""
         several = self.overlapping
         if several == 1:
             return self.largest_pulse
-        # From the time when `several` pulses are under way, an even train repeats itself until it ends.
+        # Once `several` pulses overlap, an even train is periodic until it ends.
         count = several + 1 if self._period is not None else len(self._times)
         shortest = Drive(self._waveform, self._times[:count], self._overlap)
         return largest_sum(np.unique(np.add.outer(shortest.times, self._segments[:, 0])), shortest.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return the same drive with every value multiplied by a factor."""
+        """Return a copy scaled by `factor`."""
         return self._with_waveform(self._waveform.scaled(read_number(factor, "1", "factor")))
 
     def to_toml(self) -> str:
-        """Return the text of a drive file; reading it back gives an equal drive."""
+        """Return the text of a drive file; parsing it yields an equal drive."""
         name, table = self._table()
         tables = {name: table}
         if name != "sine":
@@ -161,20 +162,20 @@ class Drive:
         return result
 
     def _begins(self) -> IntArray:
-        """Return the row of the kernel's tables at which that of each firing begins."""
+        """Return, for each firing, the first row of its table in the kernel's tables."""
         return np.zeros(len(self._times), np.int64)
 
     def _ends(self) -> FloatArray:
-        """Return the times at which the pulses end, s."""
+        """Return the end times of the pulses, s."""
         ends: FloatArray = self._times + self._waveform.support
         return ends
 
     def _reach(self) -> int:
-        """Return how many of the latest firings may be under way, with all between them."""
+        """Return the number of latest firings, counted without gaps, that may still be active."""
         return self.overlapping
 
     def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
-        """Return the values at given times, s, of the pulses with given numbers."""
+        """Return the values of the pulses with given indices at given times, s."""
         return evaluate(self._segments, time, self._times[pulse])
 
     def __eq__(self, other: object) -> bool:
@@ -199,5 +200,5 @@ class Drive:
         return f"<{type(self).__name__}: {self._shapes()}, {fired}, overlap {self._overlap}>"
 
     def _shapes(self) -> str:
-        """Say what is fired."""
+        """Describe the waveforms for `repr`."""
         return f"{self._waveform.shape} {self.quantity}"

@@ -1,6 +1,6 @@
-"""Many trains side by side, as arrays of firing times: what a map fires, or a report over patterns.
+"""Batches of pulse trains as flat arrays of firing times, for maps and reports over patterns.
 
-Rows of unequal length, one after the other in one array: firing times, strobe times, dots of many runs.
+`Ragged` holds rows of unequal length in one array: firing times, strobe times, dots of many runs.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class Ragged:
     Attributes
     ----------
     values : array, shape (all, ...)
-        The entries of all rows, one row after the other.
+        Entries of all rows, concatenated.
     starts : int array, shape (rows + 1,)
-        Where each row begins in it, and the end of all.
+        Index of the first entry of each row, and the total number of entries.
     """
 
     values: npt.NDArray[Any]
@@ -44,25 +44,25 @@ class Ragged:
 
     @classmethod
     def of(cls, rows: Sequence[npt.NDArray[Any]]) -> Self:
-        """Put rows one after the other."""
+        """Concatenate rows."""
         counts = np.array([len(row) for row in rows], dtype=np.int64)
         return cls(np.concatenate(rows) if rows else np.zeros(0), starts_of(counts))
 
     @classmethod
     def even(cls, table: npt.NDArray[Any]) -> Self:
-        """Take the rows of a table, shape (rows, columns)."""
+        """Convert a table, shape (rows, columns), to rows."""
         rows, columns = table.shape
         return cls(table.ravel(), columns * np.arange(rows + 1, dtype=np.int64))
 
     @classmethod
     def sorted_by(cls, keys: npt.NDArray[Any]) -> Self:
-        """Return the places of equal keys, a row for each key, by rising keys."""
+        """Group the indices of equal keys into rows, in ascending order of the keys."""
         _, counts = np.unique(keys, return_counts=True)
         return cls(np.argsort(keys, kind="stable"), starts_of(counts))
 
     @classmethod
     def empty(cls, rows: int) -> Self:
-        """Make so many rows with nothing in them."""
+        """Create a number of empty rows."""
         return cls(np.zeros(0), np.zeros(rows + 1, np.int64))
 
     def __len__(self) -> int:
@@ -70,7 +70,7 @@ class Ragged:
         return len(self.starts) - 1
 
     def __getitem__(self, row: int) -> npt.NDArray[Any]:
-        """Return a row, by its number; negative ones count from the end."""
+        """Return a row by index; negative indices count from the end."""
         place = range(len(self))[row]
         return self.values[self.starts[place] : self.starts[place + 1]]
 
@@ -81,26 +81,26 @@ class Ragged:
 
     @property
     def longest(self) -> int:
-        """Length of the longest row; 0 where there is none."""
+        """Length of the longest row; 0 without rows."""
         return int(self.counts.max(initial=0))
 
     @property
     def last(self) -> FloatArray:
-        """Last entry of each row, none of which is empty."""
+        """Last entry of each row; no row may be empty."""
         return self.values[self.starts[1:] - 1]
 
     def places(self, rows: IntArray) -> IntArray:
-        """Return where the entries of some rows are in `values`, one row after the other."""
+        """Return the indices in `values` of the entries of several rows, concatenated."""
         counts = self.counts[rows]
         starts = starts_of(counts)
         return np.arange(starts[-1]) + np.repeat(self.starts[rows] - starts[:-1], counts)
 
     def take(self, rows: IntArray) -> Self:
-        """Return some of the rows, by their numbers."""
+        """Return the rows with the given indices."""
         return type(self)(self.values[self.places(rows)], starts_of(self.counts[rows]))
 
     def filled(self, columns: int | None = None) -> npt.NDArray[Any]:
-        """Return a table, shape (rows, columns, ...), filled up with NaN; by default it fits."""
+        """Return a table, shape (rows, columns, ...), padded with NaN; by default as wide as needed."""
         counts, width = self.counts, self.longest if columns is None else columns
         shape = (len(self), width, *self.values.shape[1:])
         if (counts == width).all():
@@ -112,22 +112,22 @@ class Ragged:
 
 
 def starts_of(counts: IntArray) -> IntArray:
-    """Return where rows of so many entries begin, and the end of all."""
+    """Return the start index of each row, and the total, from the lengths of the rows."""
     starts = np.zeros(len(counts) + 1, np.int64)
     np.cumsum(counts, out=starts[1:])
     return starts
 
 
 class PulseTrains(Sequence[PulseTrain]):
-    """Pulse trains side by side that fire the same waveform, or one of a few.
+    """Batch of pulse trains that fire one waveform, or a few different ones.
 
-    All firing times are in one array, which an ensemble takes as it is; a member is made into a `PulseTrain`
-    only when it is looked at.
+    All firing times are in one array, in the form that an ensemble uses; indexing builds a `PulseTrain` on
+    demand.
 
     Parameters
     ----------
     waveform
-        What every firing does.
+        Waveform of every firing.
     at
         Firing times of each train, s, ascending.
     overlap
@@ -149,7 +149,7 @@ class PulseTrains(Sequence[PulseTrain]):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> Self:
-        """Make trains of so many pulses at constant rates, Hz, all of them fired first at `start`, s."""
+        """Create trains of equal length at constant rates, Hz, with the first firing at `start`, s."""
         grid = read_array(rates, "rates", "numbers, Hz").reshape(-1)
         steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
         with np.errstate(all="ignore"):
@@ -165,7 +165,7 @@ class PulseTrains(Sequence[PulseTrain]):
 
     @classmethod
     def of_parts(cls, parts: Sequence[PulseTrains]) -> Self:
-        """Return all trains of at least one sequence of them, in order."""
+        """Concatenate one or more batches of trains."""
         places: dict[tuple[int, str], int] = {}
         pulses: list[PulseTrain] = []
         pulse_of = []
@@ -193,7 +193,7 @@ class PulseTrains(Sequence[PulseTrain]):
         firings.values.flags.writeable = False
 
     def _check(self) -> None:
-        """Refuse times that are no firing times, with the sentence that a single train has for them."""
+        """Raise InputError for invalid firing times, with the message of a single train."""
         if not len(self):
             raise InputError("no train is given", key="train", expected="at least one")
         times, starts = self._firings.values, self._firings.starts
@@ -216,12 +216,12 @@ class PulseTrains(Sequence[PulseTrain]):
 
     @property
     def pulses(self) -> tuple[PulseTrain, ...]:
-        """The single pulses that are fired, each with the overlap rule of its trains."""
+        """Distinct single pulses, each with the overlap rule of its trains."""
         return self._pulses
 
     @property
     def pulse_of(self) -> IntArray:
-        """Which of the `pulses` each train fires, shape (trains,)."""
+        """Index into `pulses` for each train, shape (trains,)."""
         return self._pulse_of
 
     def __len__(self) -> int:
@@ -233,7 +233,7 @@ class PulseTrains(Sequence[PulseTrain]):
     @overload
     def __getitem__(self, index: slice) -> Self: ...
     def __getitem__(self, index: int | slice) -> PulseTrain | Self:
-        """Return a train by its number, or the trains of a slice as a sequence of the same kind."""
+        """Return a train by index, or a slice as a batch of the same kind."""
         if isinstance(index, slice):
             return self.take(np.arange(len(self))[index])
         place = range(len(self))[index]
@@ -242,7 +242,7 @@ class PulseTrains(Sequence[PulseTrain]):
         return pulse._with_checked_times(self._firings[place], None if np.isnan(rate) else rate)
 
     def take(self, which: IntArray) -> Self:
-        """Return some of the trains, by their numbers."""
+        """Return the trains with the given indices."""
         result = type(self).__new__(type(self))
         result._place(self._pulses, self._pulse_of[which], self._firings.take(which), self._rates[which])
         return result
@@ -252,12 +252,12 @@ class PulseTrains(Sequence[PulseTrain]):
 
 
 def firings_of(drives: Sequence[Drive]) -> Ragged:
-    """Return the firing times of some drives, s."""
+    """Return the firing times of several drives, s."""
     return drives.firings if isinstance(drives, PulseTrains) else Ragged.of([drive.times for drive in drives])
 
 
 def joined(parts: Sequence[Sequence[Drive]]) -> Sequence[Drive]:
-    """Return the drives of some sequences in order, as arrays where all of these are."""
+    """Concatenate sequences of drives, as flat arrays if all of them are batches."""
     trains = [part for part in parts if isinstance(part, PulseTrains)]
     if not parts or len(trains) < len(parts):
         return [drive for part in parts for drive in part]

@@ -1,4 +1,4 @@
-"""Drive files: a drive as TOML, read and written back.
+"""Drive files: reading and writing drives as TOML.
 
 A file has ``format = 1``, optionally ``overlap = "add"`` or ``"replace"``, and exactly one of five tables::
 
@@ -71,7 +71,7 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
     path
         TOML file.
     waveform
-        What to fire if the file has no ``[waveform]`` table: the hammer's waveform.
+        Waveform to use if the file has no ``[waveform]`` table, usually the hammer's.
 
     Raises
     ------
@@ -86,11 +86,11 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
 def read_drive(
     text: str, waveform: Waveform | None = None, *, name: str = "drive", folder: Path | None = None
 ) -> Drive:
-    """Read the text of a drive file; `name` stands in messages, `folder` is where sampled waveforms lie."""
+    """Parse the text of a drive file; `name` is used in messages, `folder` holds sampled waveforms."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        # tomllib raises a bare ValueError for a number of thousands of digits.
+        # tomllib raises a bare ValueError for a number with thousands of digits.
         raise InputError(f"{name}: expected TOML ({' '.join(str(error).split())})", file=name) from None
     return drive_of(data, waveform, name=name, folder=folder)
 
@@ -102,13 +102,13 @@ def drive_of(
     name: str = "drive",
     folder: Path | None = None,
 ) -> Drive:
-    """Return the drive of a drive file, from its tables; arguments and errors as for `read_drive`."""
+    """Build a drive from the tables of a drive file; arguments and errors as for `read_drive`."""
     with located(name):
         return _drive(data, waveform, folder or Path())
 
 
 def save_drive(drive: Drive, path: str | Path) -> None:
-    """Write a drive file; reading it back gives an equal drive."""
+    """Write a drive file; reading it yields an equal drive."""
     try:
         Path(path).write_text(drive.to_toml(), encoding="utf-8")
     except OSError as error:
@@ -197,7 +197,7 @@ def _required(table: Mapping[str, Any], keys: tuple[str, ...], name: str) -> Non
 
 
 def _arguments(table: dict[str, Any], kind: str) -> dict[str, Any]:
-    """Read the keys of a timing table into SI."""
+    """Parse the keys of a timing table into SI."""
     _known(table, set(_KEYS[kind]), kind)
     result: dict[str, Any] = {}
     for key, value in table.items():
@@ -212,7 +212,7 @@ def _arguments(table: dict[str, Any], kind: str) -> dict[str, Any]:
 
 
 def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, str]:
-    """Read one quantity of one of the given SI units, and tell which it is."""
+    """Parse a quantity in one of several SI units; return the value and its unit."""
     from printhammer.units import split, to_si
 
     if isinstance(value, str):
@@ -245,7 +245,7 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
 
 
 def _column(value: Any, si: str, where: str) -> list[float]:
-    """Read several quantities: a list of strings with units, or values with one unit."""
+    """Parse several quantities: a list of strings with units, or values with a common unit."""
     if isinstance(value, list):
         return [_quantity(entry, (si,), where)[0] for entry in value]
     if not isinstance(value, dict):
@@ -263,7 +263,7 @@ def _column(value: Any, si: str, where: str) -> list[float]:
 
 
 def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]:
-    """Return the waveforms of a sequence, which name the tables of a file."""
+    """Return the waveforms of a sequence, in the order of the names."""
     tables = _table(data.get("waveforms", {}), "waveforms")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise InputError.of(
@@ -323,7 +323,7 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
 
 
 def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
-    """Read a chain: a list of waveforms, each with its offset."""
+    """Parse a chain: a list of waveforms, each with its offset."""
     _known(data, {"parts"}, where)
     _required(data, ("parts",), where)
     if not isinstance(data["parts"], list) or not data["parts"]:
@@ -349,7 +349,7 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
 
 
 def _switched(data: dict[str, Any], where: str) -> Switched:
-    """Read a switched waveform; the unit of its levels decides what is driven."""
+    """Parse a switched waveform; the unit of its levels determines the driven quantity."""
     _known(data, {"at", "levels", "edge", "initial"}, where)
     _required(data, ("at", "levels", "edge"), where)
     levels, refused = None, None
@@ -380,7 +380,7 @@ def _switched(data: dict[str, Any], where: str) -> Switched:
 
 
 def _samples(data: dict[str, Any], where: str) -> Waveform:
-    """Read a sampled waveform whose samples the file holds."""
+    """Parse a sampled waveform whose samples are in the file."""
     si = {name: unit for unit, name in QUANTITY_UNITS.items()}
     _known(data, {"interpolation", "time", *si}, where)
     driven = [name for name in si if name in data]

@@ -1,4 +1,4 @@
-"""What a drive accepts: numbers in SI or strings with a unit, counts, firing times."""
+"""Parsing of drive arguments: numbers in SI or strings with a unit, counts, firing times."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from printhammer.errors import InputError, located
 from printhammer.support.arrays import FloatArray
 
 PULSES: Final = 9
-"""Number of firings of a train that is known by its rate or period alone, as in the bursts of the paper."""
+"""Default number of firings of a train, as in the bursts of the paper."""
 
 MOST_PULSES: Final = 10_000_000
-"""Number of firings above which a drive is refused."""
+"""Largest number of firings of a drive; arbitrary, to refuse typing errors."""
 
 SPACING_UNITS: Final = {"rate": "Hz", "period": "s"}
-"""The two ways to say how far firings lie apart, and their SI units."""
+"""The two ways to specify the spacing of firings, and their SI units."""
 
 
 def read_number(value: float | str, si: str, name: str) -> float:
-    """Read a number in SI or a string with a unit."""
+    """Parse a number in SI or a string with a unit."""
     if isinstance(value, str):
         from printhammer.units import parse
 
@@ -41,7 +41,7 @@ def read_number(value: float | str, si: str, name: str) -> float:
 
 
 def read_positive(value: float | str, si: str, name: str) -> float:
-    """Read a number above 0 whose inverse is finite; errors as for `read_number`."""
+    """Parse a number above 0 whose inverse is finite; errors as for `read_number`."""
     number = read_number(value, si, name)
     if number <= 0.0 or not math.isfinite(1.0 / number):
         unit = "" if si == "1" else f" {si}"
@@ -50,16 +50,15 @@ def read_positive(value: float | str, si: str, name: str) -> float:
 
 
 def period_of_rate(rate: float | str) -> float:
-    """Read a rate, Hz, and return its period, s, which is what trains are fired with.
+    """Parse a rate, Hz, and return its period, s.
 
-    Firing k of a train is at k times its period, so that a rate and its period mean the same firing times
-    to the last bit.
+    Firing k of a train is at k times its period, so that a rate and its period yield identical firing times.
     """
     return 1.0 / read_positive(rate, "Hz", "rate")
 
 
 def read_start(value: float | str) -> float:
-    """Read the time of a first firing, s; errors as for `read_number`, or it is negative."""
+    """Parse the time of a first firing, s, which is not negative; errors as for `read_number`."""
     number = read_number(value, "s", "start")
     if number < 0.0:
         raise InputError.of("start", value, "0 s or later", said=" is expected to be")
@@ -67,7 +66,7 @@ def read_start(value: float | str) -> float:
 
 
 def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
-    """Read a whole number, such as that of firings; InputError below `least` and above `MOST_PULSES`."""
+    """Parse an integer, such as a number of firings, from `least` to `MOST_PULSES`."""
     try:
         count = least - 1 if value is None or isinstance(value, bool) else operator.index(value)
     except TypeError:
@@ -80,7 +79,7 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
 
 
 def read_array(values: npt.ArrayLike, name: str, what: str = "numbers") -> FloatArray:
-    """Read numbers, of any shape, as a new array; InputError where they are none."""
+    """Parse numbers into a new array of any shape."""
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -90,11 +89,11 @@ def read_array(values: npt.ArrayLike, name: str, what: str = "numbers") -> Float
 def even_times(
     rate: float | str | None, period: float | str | None, count: int
 ) -> tuple[FloatArray, tuple[str, float], float]:
-    """Make the firing times of an even train that starts at 0.
+    """Compute the firing times of an even train that starts at 0.
 
     Returns
     -------
-    Firing times, s; "rate" or "period" with its value, as given; time between firings, s.
+    Firing times, s; "rate" or "period" with the value passed; time between firings, s.
     """
     steps = np.arange(count, dtype=np.float64)
     if rate is not None:
@@ -108,7 +107,7 @@ def even_times(
 
 
 def read_times(at: Iterable[float | str]) -> FloatArray:
-    """Read firing times given as an array, s, or one by one; errors as for `read_number`."""
+    """Parse firing times, an array, s, or a sequence of strings with units; errors as for `read_number`."""
     if isinstance(at, np.ndarray) and at.dtype.kind in "fiu":
         return at.astype(np.float64)
     try:
@@ -121,7 +120,7 @@ def read_times(at: Iterable[float | str]) -> FloatArray:
 
 
 def checked_times(times: npt.ArrayLike) -> FloatArray:
-    """Check firing times, s, and return them read-only."""
+    """Validate firing times, s, and return them read-only."""
     result = np.array(times, dtype=np.float64)
     if result.ndim != 1 or not 1 <= result.size <= MOST_PULSES:
         raise InputError(

@@ -1,22 +1,18 @@
-"""Segment tables: how every waveform is written down for the kernel.
+"""Segment tables: the representation of every waveform in the kernel.
 
 A table is a float64 array of shape (segments + 1, 6) with rows ``[start, kind, p0, p1, p2, p3]``. With tau
 the time since the firing and s = tau - start, a segment's value is
 
-====  ==================================  =================
-kind  value                               used by
-====  ==================================  =================
-0     p0 + s (p1 + s (p2 + s p3))         plateaus, ramps, sampled records
-1     p0 + p1 exp(-p2 s)                  rise and decay of a coil current
-2     p0 + p1 sin(p2 s + p3)              half sine, sinusoidal force
-4     p0, a voltage; thresholds p2, p3    supply on, with a chopper
-5     0; decays against p0                supply off
-6     p0, at first                        reservoir
-====  ==================================  =================
+====  ==================================  ================= kind  value                               used by
+====  ==================================  ================= 0     p0 + s (p1 + s (p2 + s p3))
+plateaus, ramps, sampled records 1     p0 + p1 exp(-p2 s)                  rise and decay of a coil current 2
+p0 + p1 sin(p2 s + p3)              half sine, sinusoidal force 4     p0, a voltage; thresholds p2, p3
+supply on, with a chopper 5     0; decays against p0                supply off 6     p0, at first
+reservoir ====  ==================================  =================
 
-The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end
-of the support (possibly infinite); the value is zero before 0 and from the end on. Values are
-right-continuous at every start.
+The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end of
+the support (possibly infinite); the value is zero before 0 and from the end on. Values are right-continuous
+at every start.
 """
 
 from __future__ import annotations
@@ -36,11 +32,11 @@ POLYNOMIAL: Final = 0
 EXPONENTIAL: Final = 1
 SINE: Final = 2
 END: Final = 3
-"""Kind that the last row has where the kernel gets several tables in one array."""
+"""Kind of the last row if the kernel receives several tables in one array."""
 SWITCHED: Final = 4
 DECAY: Final = 5
 RESERVOIR: Final = 6
-"""Kinds of the pieces of a driver, whose value is the voltage p0 of the supply, and 0 while it is off."""
+"""Kinds of the segments of a driver, whose value is the supply voltage p0, and 0 while the supply is off."""
 COLUMNS: Final = 6
 
 _CHUNK: Final = 1024
@@ -65,11 +61,11 @@ def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:
 
 
 def stacked(tables: Sequence[FloatArray]) -> tuple[list[int], FloatArray]:
-    """Put segment tables one after the other for the kernel, the longest support last, each end marked.
+    """Concatenate segment tables for the kernel, the longest support last, with each end marked.
 
     Returns
     -------
-    The row at which each table begins; all rows, shape (all rows, 6), read-only.
+    First row of each table; all rows, shape (all rows, 6), read-only.
     """
     order = sorted(range(len(tables)), key=lambda number: float(tables[number][-1, 0]))
     begins, row = [0] * len(tables), 0
@@ -85,22 +81,22 @@ def stacked(tables: Sequence[FloatArray]) -> tuple[list[int], FloatArray]:
 def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0) -> FloatArray:
     """Evaluate a segment table at times t for pulses fired at the times ``fired``.
 
-    The two are broadcast together, both in s. Right-continuous; an edge lies at the rounded sum of fired and
-    start, where the kernel has it. NaN gives NaN.
+    Both arrays, in s, are broadcast together. Values are right-continuous; an edge lies at the rounded sum of
+    fired and start, as in the kernel. NaN yields NaN.
     """
     time, fire = np.broadcast_arrays(np.asarray(t, dtype=np.float64), np.asarray(fired, dtype=np.float64))
     starts = segments[:, 0]
     last = len(starts) - 1
     tau = time - fire
     index = np.searchsorted(starts, tau, side="right") - 1
-    # (fired + start) - fired may round below start, so the edges themselves decide.
+    # (fired + start) - fired may round below start; comparing with the edges avoids that.
     late = (index < last) & (fire + starts[np.minimum(index + 1, last)] <= time)
     index = np.where(late, index + 1, index)
     early = (index >= 0) & (fire + starts[np.maximum(index, 0)] > time)
     index = np.where(early, index - 1, index)
     active = (index >= 0) & (index < last) & np.isfinite(tau)
     _, kind, p0, p1, p2, p3 = np.moveaxis(segments[np.where(active, index, last)], -1, 0)
-    # What a driver's piece has beside its voltage is not its course in time.
+    # The further numbers of a driver's segment are not a function of time.
     p0 = np.where(kind == DECAY, 0.0, p0)
     p1, p2, p3 = (np.where(kind >= SWITCHED, 0.0, each) for each in (p1, p2, p3))
     s = np.where(active, np.maximum(tau - starts[np.where(active, index, 0)], 0.0), 0.0)
@@ -113,14 +109,14 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
 
 
 def _inner_extremes(row: FloatArray, length: float) -> list[float]:
-    """Return the places s in (0, length) where the slope of one segment vanishes."""
+    """Return the points s in (0, length) where the slope of a segment vanishes."""
     _, kind, _, p1, p2, p3 = (float(entry) for entry in row)
     if kind == SINE:
         if not math.isfinite(length):
             length = 4.0 * math.pi / abs(p2)
         first, last = sorted((p3, p3 + p2 * length))
         steps = range(math.ceil(first / math.pi - 0.5), math.floor(last / math.pi - 0.5) + 1)
-        # Three turning points hold both the largest and the smallest value.
+        # Three turning points include both the maximum and the minimum.
         return [((k + 0.5) * math.pi - p3) / p2 for k in list(steps)[:3]] if p2 != 0.0 else []
     if kind == EXPONENTIAL:
         return []
@@ -160,12 +156,11 @@ def largest(segments: FloatArray) -> float:
 
 
 def largest_sum(edges: FloatArray, value: Callable[[FloatArray], FloatArray]) -> float:
-    """Find the largest absolute value of a sum of pulses, given as a function of times, s.
+    """Find the largest absolute value of a sum of pulses; `value` evaluates the sum at times, s.
 
-    Every interval between neighbouring edges, the times at which a segment of one of them begins or ends, s,
-    ascending, at least two, is smooth inside. It is sampled (densely near its start, where exponentials
-    change), and the intervals with the largest samples are refined until the place of their largest value is
-    known to 1e-9 of the interval.
+    `edges` are the ascending start and end times of all segments, s, at least two; between them the sum is
+    smooth. Each interval is sampled, densely near its start, where exponentials vary; the intervals with the
+    largest samples are refined until the position of the maximum is known to 1e-9 of the interval.
     """
     fractions = np.union1d(np.linspace(0.0, 1.0, 33), np.geomspace(1e-6, 1.0, 31))
     starts, ends = edges[:-1], np.nextafter(edges[1:], -np.inf)

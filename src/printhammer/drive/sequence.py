@@ -1,4 +1,4 @@
-"""A drive whose firings each have a waveform of their own: harder, softer, longer, with a brake pulse."""
+"""Drive with a waveform of its own for each firing: harder, softer, longer, with a brake pulse."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ __all__ = ["PulseSequence"]
 class PulseSequence(Drive):
     """Pulses at given times, each with its own waveform.
 
-    A sequence of equal waveforms is equal to the `PulseTrain` with the same times. Where the exponentials of
-    all waveforms have at most two different rates, as with rectangles of common rise and decay, an ensemble
-    runs as fast as with one waveform; widths and amplitudes may differ.
+    A sequence of equal waveforms is equal to the `PulseTrain` with the same times. If the exponentials of all
+    waveforms have at most two different rates, as in rectangles of common rise and decay, an ensemble runs as
+    fast as with a single waveform; widths and amplitudes may differ.
 
     Parameters
     ----------
     waveforms
-        What each firing does, all of them currents or all of them forces.
+        Waveform of each firing; all currents or all forces.
     at
         Firing times, s, ascending, one for each waveform.
     overlap
@@ -67,22 +67,22 @@ class PulseSequence(Drive):
 
     @property
     def waveform(self) -> Waveform:
-        """What the first firing does."""
+        """Waveform of the first firing."""
         return self._waveform
 
     @property
     def waveforms(self) -> tuple[Waveform, ...]:
-        """What each firing does."""
+        """Waveforms of all firings."""
         return self._waveforms
 
     @property
     def uniform(self) -> bool:
-        """Whether every firing does the same."""
+        """Whether all firings have the same waveform."""
         return len(self._tables) == 1
 
     @property
     def fingerprint(self) -> str:
-        """Hexadecimal digest of what the drive does; equal for equal drives."""
+        """Hexadecimal digest of the drive; equal drives have equal digests."""
         plain = super().fingerprint
         if len(self._tables) == 1:
             return plain
@@ -95,14 +95,14 @@ class PulseSequence(Drive):
 
     @property
     def largest_pulse(self) -> float:
-        """Largest absolute value of any one pulse, A or N."""
+        """Largest absolute value of a single pulse, A or N."""
         if math.isnan(self._largest):
             self._largest = max(largest(table) for table in self._tables)
         return self._largest
 
     @property
     def peak(self) -> float:
-        """Largest absolute value of the total current, A, or force, N; exact unless pulses meet."""
+        """Largest absolute value of the total current, A, or force, N; exact if pulses do not overlap."""
         if self._waveform.replaces:
             return self.largest_pulse
         whole = np.append(self._ends()[:-1] <= self._times[1:], True)
@@ -116,7 +116,7 @@ class PulseSequence(Drive):
         return largest_sum(np.unique(np.concatenate([some.ravel() for some in edges])), self.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return the same drive with every value multiplied by a factor; errors as for `Drive.scaled`."""
+        """Return a copy scaled by `factor`; errors as for `Drive.scaled`."""
         number = read_number(factor, "1", "factor")
         scaled = {id(waveform): waveform.scaled(number) for waveform in self._waveforms}
         result = copy(self)
@@ -124,7 +124,7 @@ class PulseSequence(Drive):
         return result
 
     def with_times(self, times: Iterable[float | str]) -> PulseSequence:
-        """Return a drive that fires the same waveforms in the same order at as many other times, s.
+        """Return a drive with the same waveforms at new firing times, s, as many as before.
 
         Raises
         ------
@@ -134,7 +134,7 @@ class PulseSequence(Drive):
         return PulseSequence(self._waveforms, times, self._overlap)
 
     def to_toml(self) -> str:
-        """Return the text of a drive file; reading it back gives an equal drive."""
+        """Return the text of a drive file; parsing it yields an equal drive."""
         names = [f"pulse-{number + 1}" for number in range(len(self._tables))]
         first = np.unique(self._which, return_index=True)[1]
         shapes = {names[k]: waveform_text(self._waveforms[i]) for k, i in enumerate(first.tolist())}
@@ -143,7 +143,7 @@ class PulseSequence(Drive):
         return document({"format": FORMAT, "overlap": self._overlap}, tables)
 
     def _place(self, waveforms: Sequence[Waveform]) -> None:
-        """Take over the waveforms of the firings: which segment tables there are, and whose is which."""
+        """Store the waveforms: the distinct segment tables, and the table of each firing."""
         numbers: dict[bytes, int] = {}
         tables: list[FloatArray] = []
         supports: list[float] = []
@@ -152,7 +152,7 @@ class PulseSequence(Drive):
             if id(waveform) in known:
                 continue
             segments = waveform.segments()
-            # Adding 0.0 makes -0.0 and 0.0 the same.
+            # Adding 0.0 turns -0.0 into 0.0.
             content = (segments + 0.0).tobytes()
             if content not in numbers:
                 numbers[content] = len(tables)
@@ -164,7 +164,7 @@ class PulseSequence(Drive):
         self._segments = tables[0]
         self._tables = tables
         self._supports = supports
-        # Looked for when first asked for.
+        # Computed on first use.
         self._largest = math.nan
         self._which = np.array([known[id(waveform)] for waveform in waveforms], dtype=np.int64)
         rows, self._pieces = stacked(tables)
@@ -187,7 +187,7 @@ class PulseSequence(Drive):
     def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
         moments, numbers = np.ravel(time), np.ravel(pulse)
         result = np.zeros(moments.shape)
-        # Pulses of the same waveform side by side: each table is evaluated once.
+        # Group pulses of the same waveform: each table is evaluated once.
         order = np.argsort(self._which[numbers], kind="stable")
         bounds = np.searchsorted(self._which[numbers[order]], np.arange(len(self._tables) + 1))
         for k in np.flatnonzero(np.diff(bounds)):
@@ -200,7 +200,7 @@ class PulseSequence(Drive):
 
 
 def _checked(waveforms: Any) -> list[Waveform]:
-    """Return the waveforms of a sequence, all of one quantity and with an end."""
+    """Validate the waveforms of a sequence: one common quantity, all finite in time."""
     try:
         fired = [] if isinstance(waveforms, Waveform) else list(waveforms)
     except TypeError:

@@ -1,6 +1,6 @@
-"""Drives and waveforms as TOML text; `printhammer.drive.file` reads it back.
+"""Drives and waveforms as TOML text; `printhammer.drive.file` reads it.
 
-Numbers are written in SI with all their digits, so that what is read back is the same drive to the last bit.
+Numbers are written in SI with all digits, so that reading restores the drive exactly.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def column_text(values: Iterable[float], unit: str) -> dict[str, Any]:
 
 
 def waveform_text(waveform: Waveform) -> dict[str, Any]:
-    """Return the ``[waveform]`` table of a drive file; the samples of a record are part of it."""
+    """Return the ``[waveform]`` table of a drive file, including the samples of a record."""
     result: dict[str, Any] = {"shape": waveform.shape}
     if isinstance(waveform, Chain):
         result["parts"] = [
@@ -56,7 +56,7 @@ def waveform_text(waveform: Waveform) -> dict[str, Any]:
 
 
 def inline(value: Any) -> str:
-    """Write one TOML value on one line."""
+    """Format a TOML value on one line."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{_key(key)} = {inline(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, list):
@@ -67,12 +67,12 @@ def inline(value: Any) -> str:
 
 
 def _key(name: str) -> str:
-    """Write a TOML key, in quotes where it needs them."""
+    """Format a TOML key, quoted if necessary."""
     return name if _BARE.fullmatch(name) else inline(name)
 
 
 def document(head: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Write a TOML document: keys first, then one table after the other."""
+    """Format a TOML document: top-level keys first, then the tables."""
     blocks = ["\n".join(f"{key} = {inline(value)}" for key, value in head.items())]
     for name, table in tables.items():
         blocks.append(

@@ -1,8 +1,8 @@
-"""The drive: a waveform fired as a train of pulses, in bursts, at given times; or a sinusoidal force.
+"""Drives: a waveform fired as a train, in bursts or at given times; or a sinusoidal force.
 
-A drive is a current through the coil or, for hammers of the textbook kind, a force on the armature. Pulses
-may overlap: with ``overlap="add"`` what they do adds up, with ``overlap="replace"`` only the latest pulse
-counts from its firing on. Every number is SI; a string with a unit ("1.2 kHz") is taken as well.
+A drive is a current through the coil or, for textbook hammers, a force on the armature. Pulses may overlap:
+with ``overlap="add"`` their values add up, with ``overlap="replace"`` only the latest pulse counts from its
+firing on. Numbers are SI; strings with a unit ("1.2 kHz") are accepted as well.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = ["Burst", "Drive", "Overlap", "PulseTrain", "SineForce"]
 
 
 class _Pulsed(Drive):
-    """A drive of pulses that end."""
+    """Drive of pulses of finite duration."""
 
     def __init__(
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap, period: float | None
@@ -59,23 +59,23 @@ class _Pulsed(Drive):
         return self._with_waveform(waveform)
 
     def with_times(self, times: Iterable[float | str]) -> PulseTrain:
-        """Return a drive that fires the same waveform, under the same overlap rule, at the given times, s."""
+        """Return a drive that fires the same waveform, under the same overlap rule, at new times, s."""
         return PulseTrain(self._waveform, at=times, overlap=self._overlap)
 
 
 class PulseTrain(_Pulsed):
-    """Pulses at a constant rate, at given times, or a single one.
+    """Pulses at a constant rate, at given times, or a single pulse.
 
     Parameters
     ----------
     waveform
-        What every firing does.
+        Waveform of every firing.
     rate, period
         Firings per second, Hz, or the time between them, s; one of the two.
     at
         Instead: firing times, s, ascending.
     pulses
-        Number of firings; by default nine, as in the bursts of the paper, and one without rate or period.
+        Number of firings; by default nine, as in the bursts of the paper, or one without rate and period.
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
     start
@@ -124,9 +124,9 @@ class PulseTrain(_Pulsed):
         super().__init__(waveform, first + steps, overlap, spacing)
 
     def _with_checked_times(self, times: FloatArray, rate: float | None) -> PulseTrain:
-        """Return the train that fires the same at times, s, which have been checked.
+        """Return a train of the same waveform at validated times, s.
 
-        `rate` is the one that they follow, Hz, or None.
+        `rate` is the rate of these times, Hz, or None.
         """
         result = copy(self)
         result._times = times
@@ -148,7 +148,7 @@ class Burst(_Pulsed):
     Parameters
     ----------
     waveform
-        What every firing does.
+        Waveform of every firing.
     rate, period
         Firings per second within a burst, Hz, or the time between them, s; one of the two.
     pulses

@@ -1,1 +1,1 @@
-"""A hammer: its constants, its file and its statics."""
+"""Hammer: constants, file format and statics."""

@@ -1,6 +1,6 @@
-"""Edits of a hammer file: the same change in plain dictionaries and in the text.
+"""Edits of a hammer file, applied to plain dictionaries and to the text alike.
 
-In the text everything else stays as it is, comments and layout too.
+An edit of the text preserves everything else, including comments and layout.
 """
 
 from __future__ import annotations
@@ -26,15 +26,16 @@ from printhammer.hammer.uncertainty import UNCERTAINTY
 from printhammer.support.constants import Constant, quantities, shown
 
 Edit = tuple[str, Any]
-"""A dotted key and the TOML value to put there; None takes the key away."""
+"""Dotted key and its new TOML value; None deletes the key."""
 
 
 def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
-    """Turn a key and a value as a user gives them into an edit of a TOML document.
+    """Convert a key and value from the user to an edit of a TOML document.
 
-    A key is such as "mass", "pack.stiffness", "pack.reloading", or a table such as "backstop". Its value is
-    text with a unit, a number in SI or a `Constant`; the value of an option; a part, a waveform or a mapping
-    for a whole table; None to take something away. Status and source are those of the constants.
+    The key is a constant or option, such as "mass" or "pack.stiffness", or a table, such as "backstop". The
+    value is, for a constant, text with a unit, a number in SI or a `Constant`; for an option, its value; for
+    a table, a part, a waveform or a mapping; None deletes the key. New constants get the status and source
+    passed.
     """
     section, _, name = key.rpartition(".")
     if key in SELECTORS:
@@ -64,7 +65,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         raise InputError(f"the key {shown(key)} is not known", key=key, expected=expected)
     if note is None or value is None:
         return key, value
-    # A bare number is in the unit of what it replaces, where the constant may have several.
+    # A bare number takes the unit of the constant that it replaces, in case several dimensions are allowed.
     before = document.get(section, {}).get(name) if note.also else None
     unit = before.get("unit") if isinstance(before, Mapping) else None
     si = note.si if unit is None else si_unit_of(note, unit)
@@ -76,7 +77,7 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
 
     if isinstance(value, Mapping):
         whole = {"status": status, "source": source, **value}
-        # Value and unit first, as files are written.
+        # Hammer files list value and unit first.
         return dict(sorted(whole.items(), key=lambda item: item[0] in ("status", "source")))
     if isinstance(value, Constant):
         return {"value": value.value, "unit": value.unit, "status": value.status, "source": value.source}
@@ -94,7 +95,7 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
 
 
 def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]:
-    """Return the TOML table of a part, a waveform or a mapping of what `edit_of` takes."""
+    """Return the TOML table of a part, waveform or mapping, as accepted by `edit_of`."""
     selector = SELECTORS[section]
     content = dict(value) if isinstance(value, Mapping) else _fields(section, value)
     if content.get(selector, UNSAID.get(section)) not in kinds_of(section):
@@ -117,7 +118,7 @@ def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]
 
 
 def _fields(section: str, value: Any) -> dict[str, Any]:
-    """Return selector, constants and options of a part or waveform object."""
+    """Return selector, constants and options of a part or waveform."""
     selector = SELECTORS[section]
     kind = getattr(type(value), selector, None)
     if kind not in kinds_of(section) or type(value) is not model_of(section, kind):
@@ -143,7 +144,7 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
 
 
 def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
-    """Return a plain document with edits made; what is not edited is shared with the one given."""
+    """Return a plain document with edits applied; unedited values are shared with the original."""
     result = dict(document)
     for key, value in edits:
         section, _, name = key.rpartition(".")
@@ -157,14 +158,14 @@ def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any
 
 
 def _copied(value: Any) -> Any:
-    """Return a copy of a plain value: tables and lists are new, what they hold cannot change."""
+    """Copy a plain value: tables and lists are copied, scalars are immutable."""
     if isinstance(value, Mapping):
         return {name: _copied(entry) for name, entry in value.items()}
     return [_copied(entry) for entry in value] if isinstance(value, list) else value
 
 
 def changed_text(text: str, edits: Iterable[Edit]) -> str:
-    """Return the text of a document with edits made; everything else stays as it is, comments too."""
+    """Apply edits to the text of a document; everything else is preserved, including comments."""
     import tomlkit
 
     def inline(value: Mapping[str, Any]) -> Any:
@@ -197,7 +198,7 @@ def _put(document: MutableMapping[str, Any], key: str, value: Any, table: Callab
     if value is None:
         holder.pop(name, None)
     elif isinstance(value, Mapping) and isinstance(holder.get(name), Mapping) and name not in SELECTORS:
-        # In place, so that a comment behind the constant stays.
+        # Edit in place, which keeps a comment behind the constant.
         for part, entry in value.items():
             holder[name][part] = entry
     else:

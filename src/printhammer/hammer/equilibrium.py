@@ -1,9 +1,9 @@
-"""Where the armature can rest: the equilibria of a hammer, their stability, and how firmly it is held.
+"""Statics of a hammer: equilibria of the armature, their stability, and the holding margin.
 
 An equilibrium is a displacement at which the static forces cancel: magnet at a constant current, spring,
-elastic force of the backstop, and the loading branch of the pack (as when fresh paper is pressed slowly;
-its equilibria are held up to the hysteresis of the paper). The paper finds the rest state "by an iteration
-on x such that Ft = 0" at zero current, with the armature compressing the backstop.
+elastic force of the backstop, and the loading branch of the pack (as when fresh paper is pressed slowly; its
+equilibria are held up to the hysteresis of the paper). The paper finds the rest state "by an iteration on x
+such that Ft = 0" at zero current, with the armature compressing the backstop.
 """
 
 from __future__ import annotations
@@ -24,51 +24,51 @@ from printhammer.support.roots import Root, bisect, roots
 _NEAREST: Final = 1e-18
 _LARGEST_CURRENT: Final = 1e6
 FARTHER: Final = (10.0, 100.0, 1000.0)
-"""How far from the origin an equilibrium is sought where nothing limits the search and none is nearer, m."""
+"""Search radii about the origin, m, if nothing limits the search and no equilibrium is nearer; arbitrary."""
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """One equilibrium."""
+    """Equilibrium at a constant current."""
 
     x: float
     """Displacement, m."""
     stable: bool
     """Whether the force drives the armature back after a small displacement to either side."""
     frequency: float | None
-    """Natural frequency of small undamped oscillations, Hz; None where unstable, on a rigid backstop, or in a
-    pack with memory, which has no single stiffness."""
+    """Natural frequency of small undamped oscillations, Hz; None if unstable, on a rigid backstop, or in a
+    pack with memory, which has no unique stiffness."""
     surface: str | None
-    """"backstop" or "pack" where the armature touches it."""
+    """Surface in contact, "backstop" or "pack"; None for a free armature."""
 
 
 @dataclass(frozen=True)
 class EquilibriumPicture:
-    """The statics of a hammer."""
+    """Statics of a hammer: equilibria, release current and holding margin."""
 
     rest: float | None
     """Rest state at zero current, m."""
     no_rest: str
-    """Why there is none; empty where there is one."""
+    """Reason for a missing rest state; empty if there is a rest state."""
     equilibria: tuple[Equilibrium, ...]
-    """At zero current, ascending."""
+    """Equilibria at zero current, in ascending order."""
     release_current: float | None
     """Current at which the armature lifts off the backstop, A."""
     x: FloatArray
     margin: FloatArray
-    """Displacements from the backstop to the end of the stroke, m, and the holding margin there, N."""
+    """Displacements from the backstop to the end of the stroke, m, and the holding margin at each, N."""
     weakest: tuple[float, float]
-    """Where on that grid the armature is held least, m and N."""
+    """Displacement, m, and value, N, of the smallest holding margin on that grid."""
     positive_intervals: tuple[tuple[float, float], ...]
-    """Displacements, m, where the net force at zero current drives the armature toward the paper."""
+    """Intervals of x, m, in which the net force at zero current drives the armature toward the paper."""
 
 
 def rest_state(hammer: HammerLike) -> float:
     """Return the displacement at which the armature rests at zero current, m.
 
-    With a backstop against which the net force presses: the equilibrium there, compressing it (on a rigid
-    one, and where there is no force at all, its position). Without a magnet, and without a backstop: the
-    nearest stable equilibrium otherwise.
+    With a backstop against which the net force presses, the equilibrium in contact, which compresses the
+    backstop (for a rigid backstop, or without any force, its position). Without a magnet or without a
+    backstop: otherwise the nearest stable equilibrium.
     """
     force = StaticForce(hammer)
     if hammer.backstop is not None:
@@ -85,7 +85,7 @@ def rest_state(hammer: HammerLike) -> float:
                 )
             return rest
         if pressing == 0.0 and hammer.magnet is not None:
-            # Nothing moves it: a plunger without a spring.
+            # Without any force, such as a plunger without a spring, the armature stays at the backstop.
             return position
         if hammer.magnet is not None:
             because = f"at the backstop the net force at zero current is {pressing:.6g} N"
@@ -112,9 +112,9 @@ def equilibria(
 ) -> list[Equilibrium]:
     """Find all equilibria at a constant current, ascending.
 
-    Sought from the lower limit of the magnet's law (or the rigid backstop) to the platen, or else to where
-    pack or magnet law end; where nothing limits the search, 1 m to either side, or where no stable one is
-    there 10, 100 or 1000 m. Stretches without any force are left out.
+    The search runs from the lower limit of the magnet's law (or the rigid backstop) to the platen, or else to
+    the end of the pack or of the magnet's law. Without such limits it covers 1 m on either side, and 10, 100
+    and 1000 m if no stable equilibrium is nearer. Intervals without any force are excluded.
 
     Parameters
     ----------
@@ -149,9 +149,9 @@ def equilibria(
 def release_current(hammer: HammerLike) -> float:
     """Return the smallest current that lifts the armature off the backstop, A.
 
-    At that current the force of magnet and spring at the position of the backstop vanishes. For equation
-    (3) it is (Am - sqrt((F0 + Fs(b)) sqrt(b))) / Bm. Of two currents of different sign the smaller counts;
-    0 if the net force is not negative at zero current.
+    At that current the force of magnet and spring at the position of the backstop vanishes. For equation (3),
+    I = (Am - sqrt((F0 + Fs(b)) sqrt(b))) / Bm. Of two solutions of opposite sign, the smaller magnitude is
+    returned; 0 if the net force at zero current is not negative.
 
     Raises
     ------
@@ -185,8 +185,9 @@ def release_current(hammer: HammerLike) -> float:
 def holding_margin(hammer: HammerLike, x: npt.ArrayLike) -> FloatArray:
     """Return the force that holds the armature back at zero current, N, at displacements x, m.
 
-    Minus the net force of magnet and spring, without contacts: positive where the armature is driven to the
-    backstop, at rest the force with which it presses against it. NaN outside the range of the magnet's law.
+    The margin is minus the net force of magnet and spring, without contacts: positive where the net force
+    drives the armature to the backstop. At rest it equals the force on the backstop. NaN outside the range of
+    the magnet's law.
     """
     force = StaticForce(hammer)
     places = np.asarray(x, dtype=np.float64)
@@ -196,8 +197,8 @@ def holding_margin(hammer: HammerLike, x: npt.ArrayLike) -> FloatArray:
 def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
     """Return the intervals of the stroke where the net force at zero current is positive; ends in m.
 
-    There magnet and spring drive the armature toward the paper, so that it may never return. Sought from the
-    backstop to the platen, or to the back of the pack; empty without a backstop.
+    In these intervals magnet and spring drive the armature toward the paper, and it may never return. The
+    search covers backstop to platen, or to the back of the pack; the list is empty without a backstop.
     """
     if hammer.backstop is None:
         return []
@@ -216,7 +217,7 @@ def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
 
 
 def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPicture:
-    """Return the whole statics of a hammer, with the holding margin at a number of points."""
+    """Return the statics of a hammer, with the holding margin on a uniform grid."""
     force = StaticForce(hammer)
     try:
         rest, reason = rest_state(hammer), ""
@@ -243,7 +244,7 @@ def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPic
 
 
 def _compressed(force: StaticForce, position: float, current: float = 0.0) -> float | None:
-    """Find the equilibrium next to the surface of an elastic backstop on which the armature is pressed."""
+    """Find the equilibrium at which the armature compresses an elastic backstop, next to its surface."""
 
     def total(x: float) -> float:
         return force.total(x, current)
@@ -260,7 +261,7 @@ def _compressed(force: StaticForce, position: float, current: float = 0.0) -> fl
 
 
 def _described(force: StaticForce, root: Root, current: float) -> Equilibrium:
-    """Tell stability, frequency and surface of an equilibrium."""
+    """Return a root as an `Equilibrium`, with stability, frequency and surface."""
     stable = _is_stable(root, force)
     surface = None
     if force.hammer.backstop is not None and root.x < force.hammer.backstop.position:
@@ -290,7 +291,7 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
     crossings = roots(lambda x: force.total(x, current), _grid(force, low, high))
     if within is not None:
         return crossings
-    # Oscillators in units of their own may rest some metres away.
+    # Dimensionless oscillators may have their equilibria some metres away.
     for far in FARTHER:
         if any(_is_stable(root, force) for root in crossings) or force.reach(far) == (low, high):
             break
@@ -301,7 +302,7 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
 
 
 def _same_rest(force: StaticForce, current: float, within: tuple[float, float] | None) -> list[Root]:
-    """Find all roots, the one next to the surface of the backstop to the same bits as `rest_state`."""
+    """Find all roots; the root at the backstop equals `rest_state` bit for bit."""
     crossings = _roots(force, current, within)
     backstop = force.hammer.backstop
     if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
@@ -314,7 +315,7 @@ def _same_rest(force: StaticForce, current: float, within: tuple[float, float] |
 
 
 def _grid(force: StaticForce, low: float, high: float) -> list[float]:
-    """Return places between two limits, even ones and ever closer ones about the anchors."""
+    """Return a search grid between two limits: evenly spaced points, and clusters about the anchors."""
     places = set(np.linspace(low, high, 1025).tolist())
     for anchor in (*force.anchors(), low, high):
         for sign in (1.0, -1.0):
@@ -325,7 +326,7 @@ def _grid(force: StaticForce, low: float, high: float) -> list[float]:
 
 
 def _away_from_zero(first: float, limit: float) -> list[float]:
-    """Return 0 and steps that grow geometrically up to a limit, 12 a decade."""
+    """Return 0 and a geometric sequence up to a limit, 12 points per decade."""
     if limit <= first:
         return [0.0, limit]
     count = max(2, math.ceil(12.0 * math.log10(limit / first)) + 1)
@@ -333,7 +334,7 @@ def _away_from_zero(first: float, limit: float) -> list[float]:
 
 
 def _currents(hammer: HammerLike) -> tuple[float, float]:
-    """Return the currents for which the law of the magnet holds, A."""
+    """Return the range of currents of the magnet's law, A."""
     low, high = getattr(hammer.magnet, "current_range", (-_LARGEST_CURRENT, _LARGEST_CURRENT))
     return float(low), float(high)
 

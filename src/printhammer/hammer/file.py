@@ -1,12 +1,10 @@
-"""Hammer files: TOML to parts, constants and waveform, every fault told in one sentence.
+"""Hammer files: parsing of TOML into parts, constants and waveform, and the JSON schema.
 
 A file has ``format = 1``, ``name``, optionally ``title`` and ``note``, the constants ``mass`` and ``platen``,
 and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``, ``[backstop]`` and
 ``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, and ``[uncertainty]`` with standard
-errors of constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is
-``{ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
-
-JSON schema of hammer files, made of what the parts say about their constants.
+errors of constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is ``{
+value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
 """
 
 from __future__ import annotations
@@ -49,19 +47,19 @@ TEXTS: Final = {
     "title": "one line that says what it is",
     "note": "what a reader must know about the constants",
 }
-"""The texts of a file and what they say."""
+"""Text entries of a hammer file and their meanings."""
 
 SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape"}
-"""The tables of a file, and the key that selects what kind of part each one is."""
+"""Tables of a hammer file, with the key that selects the law or shape of each."""
 
 UNSAID: Final = {"coil": "winding"}
-"""Of a table that may leave its kind out: the kind that it is then."""
+"""Default kind of the tables that may omit the selecting key."""
 
 _M = TypeVar("_M", bound=BaseModel)
 
 
 class Body(BaseModel):
-    """The constants at the top of a hammer file."""
+    """Constants at the top level of a hammer file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -71,7 +69,7 @@ class Body(BaseModel):
 
 @dataclass(frozen=True)
 class Contents:
-    """What a hammer file says, SI; `parts` by role."""
+    """Contents of a hammer file in SI; `parts` by role."""
 
     name: str
     title: str
@@ -88,7 +86,7 @@ def read_document(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        # tomllib raises a bare ValueError for a number of thousands of digits.
+        # tomllib raises a bare ValueError for a number with thousands of digits.
         raise InputError(
             f"{where}: expected a TOML file ({' '.join(str(error).split())})", file=where
         ) from None
@@ -100,10 +98,10 @@ def build(
     folder: Path,
     like: tuple[Mapping[str, Any], Contents] | None = None,
 ) -> Contents:
-    """Build and check the contents of a hammer file, parts and constants in SI, from its TOML document.
+    """Build and validate the contents of a hammer file, in SI, from its TOML document.
 
-    Messages begin with `where`, usually the file; `folder` is where a force table or a sampled waveform lies.
-    What the document shares with another one, read in the same folder, is taken from the contents of that.
+    Messages begin with `where`, usually the file; force tables and sampled waveforms are read from `folder`.
+    Tables that are the same object as in the document `like` are reused from its contents.
 
     Raises
     ------
@@ -116,7 +114,7 @@ def build(
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
-    """Return the model class of a table, such as ("pack", "power")."""
+    """Return the model class of a table, for a section and kind such as "pack" and "power"."""
     if section == "waveform":
         from printhammer.drive.waveforms.shapes import SHAPES
 
@@ -127,7 +125,7 @@ def model_of(section: str, kind: str) -> type[BaseModel]:
 
 
 def kinds_of(section: str) -> tuple[str, ...]:
-    """List what may stand for the law or shape of a table."""
+    """List the valid laws or shapes of a table."""
     if section == "waveform":
         from printhammer.drive.waveforms.shapes import SHAPES
 
@@ -137,7 +135,7 @@ def kinds_of(section: str) -> tuple[str, ...]:
 
 
 def file_options(model: type[BaseModel]) -> dict[str, Any]:
-    """List the options of a model that a file may give; what a waveform drives follows from its unit."""
+    """List the options of a model that a file may set; the quantity of a waveform follows from its unit."""
     return {name: kind for name, kind in options(model).items() if name != "quantity"}
 
 
@@ -171,7 +169,7 @@ def _build(
                     section, table, f"a table [{section}]", written=shown(table), said=": expected"
                 )
             keys = [f"{section}.{name}" for name in table if name != selector]
-            # An option may name a file, which is read again: it may have changed.
+            # An option may name a file that has changed since, so that it is read again.
             if known is not None and table is before.get(section) and known.constants.keys() >= set(keys):
                 made[section] = known.parts.get(section, known.waveform)
                 constants |= {key: known.constants[key] for key in keys}
@@ -215,7 +213,7 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
 
 
 def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
-    """Refuse a key that is not known; where one comes close, name that one alone."""
+    """Raise InputError for an unknown key; the message suggests the closest known key."""
     known = list(known)
     for key in table:
         if key not in known:
@@ -235,9 +233,9 @@ def _read(
     before: Mapping[str, Any],
     read: Contents | None,
 ) -> _M:
-    """Read the constants and options of one table into its model, and the constants also into `constants`.
+    """Parse the constants and options of one table into its model; add the constants to `constants`.
 
-    Constants that are shared with the table `before` have been read.
+    Constants shared with the table `before` are already parsed.
     """
     known, choices = quantities(model), file_options(model)
     _only(table, (*known, *choices), prefix)
@@ -314,7 +312,7 @@ _WANTED: Final = {
 
 
 def si_unit_of(note: Quantity, unit: str) -> str:
-    """Return the SI unit that goes with a unit, of a constant that may have several dimensions."""
+    """Return the SI unit for a unit, of a constant that may have several dimensions."""
     from printhammer.units import to_si
 
     for other in note.also:
@@ -325,7 +323,7 @@ def si_unit_of(note: Quantity, unit: str) -> str:
 
 
 def _check_order(contents: Contents) -> None:
-    """Refuse positions out of order: backstop, front of the pack, platen, where the magnet's law holds."""
+    """Check the order of positions: backstop, front of the pack, platen, within the magnet's range."""
     places: dict[str, float] = {}
     backstop, pack = contents.parts.get("backstop"), contents.parts.get("pack")
     if isinstance(backstop, BackstopPart):
@@ -358,10 +356,10 @@ _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON schema (draft 2020-12) of hammer files: what a file may hold.
+    """Return the JSON schema (draft 2020-12) of hammer files.
 
-    Dimensions, the order of positions and constants that stand in the place of others are left to
-    `printhammer hammer check`.
+    The schema does not express dimensions, the order of positions, or constants that replace others;
+    `printhammer hammer check` does.
     """
     properties: dict[str, Any] = {"format": {"const": FORMAT, "description": "version of the file format"}}
     properties |= {name: {"type": "string", "description": meaning} for name, meaning in TEXTS.items()}
@@ -410,7 +408,7 @@ def _constants(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _constant_schema(note: Quantity) -> dict[str, Any]:
-    """Return the schema of one constant; of its bounds only the sign does not depend on the unit."""
+    """Return the schema of one constant; of the bounds only the sign is independent of the unit."""
     units = " or ".join((note.si, *(unit for unit in note.also if unit != note.si)))
     result: dict[str, Any] = {
         "$ref": "#/$defs/constant",

@@ -1,7 +1,7 @@
-"""The hammer: one actuator, its constants with unit, status and source, and where they come from.
+"""The class `Hammer`: one actuator and its constants, with unit, status and source.
 
-A hammer is read from a TOML file (`load`, `Hammer.from_toml`), changed by `Hammer.replace`, and written back
-without loss. Numbers are SI inside; the file keeps its own units, comments and layout.
+A hammer is read from a TOML file (`load`, `Hammer.from_toml`), modified by `Hammer.replace`, and written
+without loss. Numbers are SI in memory; the file keeps its units, comments and layout.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from printhammer.support.constants import Constant, quantities
 _CHANGED: Final = ", changed"
 
 REPLACED: Final = "replaced"
-"""Source of a constant that `Hammer.replace` has set, unless another is given."""
+"""Default source of a constant set by `Hammer.replace`."""
 
 
 def shipped() -> tuple[str, ...]:
-    """List the names of the hammers that come with the program."""
+    """List the names of the shipped hammers."""
     folder = files("printhammer").joinpath("hammers")
     return tuple(sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml")))
 
@@ -73,9 +73,9 @@ def load(name_or_path: str | Path) -> Hammer:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Hammer:
-    """One actuator: armature, magnet, spring, backstop, the pack before it, its waveform and coil.
+    """Actuator: armature, magnet, spring, backstop, the pack in front of it, pulse waveform and coil.
 
-    Made by `load` or `Hammer.from_toml`. Two hammers are equal if their files say the same.
+    Created by `load` or `Hammer.from_toml`. Two hammers are equal if their files have equal contents.
     """
 
     _contents: Contents
@@ -87,16 +87,16 @@ class Hammer:
 
     @classmethod
     def from_toml(cls, text: str, name: str = "hammer", folder: str | Path | None = None) -> Hammer:
-        """Read a hammer from the text of a hammer file.
+        """Parse the text of a hammer file.
 
         Parameters
         ----------
         text : str
             TOML.
         name : str, optional
-            What to name in a message, usually the file.
+            Name for error messages, usually the file.
         folder : path, optional
-            Where a force table or a sampled waveform lies; the working directory by default.
+            Folder of force tables and sampled waveforms; by default the working directory.
         """
         place = Path(folder) if folder is not None else Path()
         document = read_document(text, name)
@@ -112,7 +112,7 @@ class Hammer:
         source: str = "given in Python",
         **parts: Any,
     ) -> Hammer:
-        """Make a hammer of parts, such as a textbook impact oscillator.
+        """Build a hammer from parts, such as a textbook impact oscillator.
 
         Parameters
         ----------
@@ -121,10 +121,10 @@ class Hammer:
         name : str, optional
             Short name.
         status, source : str, optional
-            Of all constants.
+            Status and source of all constants.
         **parts
-            `magnet`, `spring`, `pack`, `backstop`, `damping`, `waveform`, `platen`, `coil`, each as `replace`
-            takes it.
+            `magnet`, `spring`, `pack`, `backstop`, `damping`, `waveform`, `platen`, `coil`, each in a form
+            that `replace` accepts.
         """
         constant = 'mass = { value = 1.0, unit = "kg", status = "assumed", source = "to be replaced" }'
         bare = cls.from_toml(f'format = {FORMAT}\nname = "hammer"\n\n{constant}\n')
@@ -137,17 +137,17 @@ class Hammer:
 
     @property
     def title(self) -> str:
-        """One line that says what it is; may be empty."""
+        """One-line description; may be empty."""
         return self._contents.title
 
     @property
     def note(self) -> str:
-        """What a reader must know about the constants; may be empty."""
+        """Remarks on the constants that every reader should know; may be empty."""
         return self._contents.note
 
     @property
     def path(self) -> str:
-        """File that it was read from, as messages name it; of a hammer that was changed they say so."""
+        """Path of the hammer file for messages; for a modified hammer, a remark says so."""
         return self._where
 
     @property
@@ -197,13 +197,13 @@ class Hammer:
 
     @cached_property
     def damping(self) -> DampingPart | None:
-        """Damping of the armature wherever it is."""
+        """Damping of the armature that acts at every displacement."""
         part = self._contents.parts.get("damping")
         return part if isinstance(part, DampingPart) else None
 
     @property
     def parts(self) -> Mapping[str, Part]:
-        """The parts that the hammer has, by role."""
+        """Parts of the hammer, by role."""
         return MappingProxyType(self._contents.parts)
 
     @property
@@ -228,20 +228,20 @@ class Hammer:
 
     @property
     def constants(self) -> Mapping[str, Constant]:
-        """Every constant that the file gives, by dotted key such as "magnet.F0"."""
+        """Constants in the hammer file, by dotted key such as "magnet.F0"."""
         return MappingProxyType(self._contents.constants)
 
     @property
     def uncertainty(self) -> Uncertainty | None:
-        """Standard errors and correlations of constants; None where the file has none, and all are exact."""
+        """Standard errors and correlations of the constants; None if all constants are exact."""
         return self._contents.uncertainty
 
     @cached_property
     def fingerprint(self) -> str:
         """Digest of the physics: laws, SI values, options and tables, in hexadecimal.
 
-        Names, notes, units, sources, statuses, errors, comments and file names do not enter; an option or
-        constant at its default counts as left out.
+        Names, notes, units, sources, statuses, errors, comments and file names do not affect the digest; an
+        option or constant at its default equals a missing one.
         """
         content: dict[str, Any] = {"mass": self.mass.hex()}
         if self.platen is not None:
@@ -250,7 +250,7 @@ class Hammer:
             content["coil.resistance"] = self.coil_resistance.hex()
         models: dict[str, tuple[str, Any]] = {role: (part.law, part) for role, part in self.parts.items()}
         if not _physics(self.coil).keys() - {"resistance"}:
-            # A resistance alone is no circuit.
+            # A resistance alone is not a circuit.
             models.pop("coil", None)
         if self.waveform is not None:
             models["waveform"] = (self.waveform.shape, self.waveform)
@@ -267,7 +267,7 @@ class Hammer:
         status: str = "assumed",
         source: str = REPLACED,
     ) -> Hammer:
-        """Return a new hammer with constants, options or whole parts replaced; this one stays as it is.
+        """Return a new hammer with constants, options or whole parts replaced; the original is unchanged.
 
         Parameters
         ----------
@@ -279,13 +279,13 @@ class Hammer:
             value; for a part: a part, or a mapping of its keys with "law"; None takes away what is optional.
             The standard errors of constants that are set go, unless "uncertainty" is set too.
         status, source : str, optional
-            Of the constants set.
+            Status and source of the constants that are set.
         """
         wanted = {key: value} if isinstance(key, str) else dict(key)
         return self._with(wanted, status, source, f"{self._where.removesuffix(_CHANGED)}{_CHANGED}")
 
     def _with(self, wanted: Mapping[str, Any], status: str, source: str, where: str) -> Hammer:
-        """Return a new hammer with keys replaced; `where` is what messages call it."""
+        """Return a new hammer with keys replaced; messages refer to it as `where`."""
         document = dict(self._document)
         edits: list[Edit] = []
         with located(where):
@@ -304,11 +304,11 @@ class Hammer:
         return Hammer(contents, document, self._text, (*self._edits, *edits), where, self._folder)
 
     def to_toml(self) -> str:
-        """Return the text of the hammer file: as it was read, with what was replaced."""
+        """Return the text of the hammer file, with the original layout and all replacements."""
         return changed_text(self._text, self._edits) if self._edits else self._text
 
     def save(self, path: str | Path) -> None:
-        """Write the hammer file, and beside it the tables that it names.
+        """Write the hammer file, and the tables it refers to beside it.
 
         Raises
         ------
@@ -331,7 +331,7 @@ class Hammer:
             ) from None
 
     def _tables(self, target: Path) -> dict[str, bytes]:
-        """Return the files named in the hammer file that are missing beside `target`."""
+        """Return the contents of referenced files that are missing beside `target`."""
         missing: dict[str, bytes] = {}
         for model in (self.magnet, self.waveform):
             name = getattr(model, "file", None)
@@ -352,7 +352,7 @@ class Hammer:
         return rest_state(self)
 
     def check(self) -> None:
-        """Refuse a hammer that does not rest at its backstop.
+        """Raise InputError if the hammer does not rest at its backstop.
 
         Raises
         ------
@@ -365,10 +365,10 @@ class Hammer:
                 _ = self.rest
 
     def warnings(self) -> list[str]:
-        """Say what is odd about a hammer that can still be simulated.
+        """List warnings about a hammer that can still be simulated.
 
-        A sentence for each interval between backstop and platen in which the net force of magnet and spring
-        at zero current is positive.
+        There is one sentence for each interval between backstop and platen in which the net force of magnet
+        and spring at zero current is positive.
         """
         from printhammer.hammer.equilibrium import positive_intervals
         from printhammer.units import from_si
@@ -391,7 +391,7 @@ class Hammer:
         return schema()
 
     def __eq__(self, other: object) -> bool:
-        """Compare what the files say, whatever their layout."""
+        """Compare the contents of the hammer files, regardless of their layout."""
         if not isinstance(other, Hammer):
             return NotImplemented
         return self.fingerprint == other.fingerprint and self._document == other._document
@@ -404,7 +404,7 @@ class Hammer:
 
 
 def _physics(model: Any) -> dict[str, Any]:
-    """Return what of a part or waveform enters the fingerprint; nothing of none."""
+    """Return the fields of a part or waveform that enter the fingerprint; empty for None."""
     if model is None:
         return {}
     kind: type[BaseModel] = type(model)

@@ -1,18 +1,17 @@
 """Names of constants: one vocabulary for files, edits, sweeps, regimes, derivatives, tolerances and controls.
 
 ===================== ====================================================================================
-name                  what it is
-===================== ====================================================================================
-``mass``              a number of the hammer itself
-``pack.stiffness``    a constant of a part, spelled as in a hammer file
+name                  what it is =====================
+==================================================================================== ``mass``              a
+number of the hammer itself ``pack.stiffness``    a constant of a part, spelled as in a hammer file
 ``waveform.width``    a constant of the pulse that is fired: the hammer's own, or that of the drive
 ``period``, ``rate``  time between firings and firings per second, of a train or of a force
-``drive.amplitude``   of an endless force, as is ``drive.phase``
-===================== ====================================================================================
+``drive.amplitude``   of an endless force, as is ``drive.phase`` =====================
+====================================================================================
 
-What a constant is measured in, what it means and where it may lie is declared once, with its part or waveform
-(`printhammer.support.constants.quantity`); here it is looked up. The range in which a control moves it, and
-whether evenly or by factors, is that of `range_of`.
+The unit, meaning and bounds of a constant are declared once, with its part or waveform
+(`printhammer.support.constants.quantity`), and looked up here. `range_of` returns the range of a constant on
+a control, and whether its scale is linear or logarithmic.
 """
 
 from __future__ import annotations
@@ -46,29 +45,29 @@ FORCE: Final = {
 """Constants of a sinusoidal force."""
 
 PLACES: Final = ("platen", "pack.front", "backstop.position")
-"""Constants that are places on the axis of the armature."""
+"""Constants that are positions on the axis of the armature."""
 
 _ZERO: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
-"""How far a constant that is zero may rise, by its SI unit: about what is met in impact print hammers."""
+"""Upper end of the range of a constant that is zero, by SI unit: typical of impact print hammers."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Where a control moves a constant."""
+    """Range of a constant on a control."""
 
     low: float
     high: float
-    """Its ends, SI."""
+    """Ends of the range, SI."""
     logarithmic: bool
-    """Whether equal steps are equal factors."""
+    """Whether the scale is logarithmic: equal steps are equal factors."""
 
 
 def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
-    """Return the range of a constant of a hammer file about the value that it has in a hammer.
+    """Return the control range of a constant, around its value in a hammer.
 
-    The ranges are ours, wide enough for every hammer of the paper and narrow enough to be met with a slider.
-    Places on the axis move by half the way from backstop to platen; other constants by a factor up and down,
-    a coefficient of restitution up to 1; what is zero has a range of its dimension.
+    The ranges are arbitrary: wide enough for every hammer of the paper, narrow enough for a slider. Positions
+    move by half the distance from backstop to platen; other constants by `factor` up and down, with a
+    coefficient of restitution at most 1; a constant that is zero gets a range typical of its dimension.
     """
     constant = hammer.constants[name]
     value = constant.si
@@ -85,7 +84,7 @@ def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
 
 
 def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
-    """Return what a hammer file says of a constant; None if the hammer can have none of that name."""
+    """Return the declaration of a constant of a hammer; None if no such constant exists."""
     section, _, field = name.rpartition(".")
     if not section:
         return quantities(Body).get(field)
@@ -101,17 +100,17 @@ def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
 
 
 def quantities_of(waveform: Waveform) -> dict[str, Quantity]:
-    """Return what is known of the constants of a waveform, amplitudes in the unit of what it drives."""
+    """Return the declarations of a waveform's constants, amplitudes in the unit of the driven quantity."""
     return {name: in_unit_of_drive(note, waveform.unit) for name, note in quantities(type(waveform)).items()}
 
 
 def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
-    """Return what is known of a constant that may be a current or a force, as the one that it is."""
+    """Return the declaration of a constant that may be a current or a force, in the unit of the drive."""
     return replace(note, si=unit, also=()) if note.also else note
 
 
 def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
-    """Return the error that says that a constant is not known, with the nearest name or all of them."""
+    """Return the error for an unknown constant, with the nearest known name or all names."""
     file, _, key = where.rpartition(": ")
     return InputError(
         f"{where or 'constant'} = {shown(name)} is not known",

@@ -1,4 +1,4 @@
-"""The force on an armature at rest, from the laws of the parts of a hammer."""
+"""Static force on the armature, from the laws of the parts of a hammer."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any, Final, Protocol
 from printhammer.parts import BackstopPart, MagnetPart, PackPart, Part, SpringPart, absent
 
 FAR: Final = 1.0
-"""Distance from the origin up to which equilibria are sought where the hammer sets no limit, m."""
+"""Search radius about the origin for equilibria if the hammer sets no limit, m; arbitrary."""
 
 
 class HammerLike(Protocol):
-    """What this module reads of a hammer."""
+    """Attributes of a hammer that the statics use."""
 
     @property
     def name(self) -> str:
@@ -50,13 +50,13 @@ class HammerLike(Protocol):
 
 
 class StaticForce:
-    """The force of the parts on an armature at rest at x, and where it is defined.
+    """Static force on the armature as a function of x, and its domain.
 
-    Magnet, spring and the elastic force of the backstop are functions of x; the pack acts with the loading
-    branch at rest, as when fresh paper is slowly pressed. Below a `rigid` backstop there are no positions. In
-    the `limits`, m, the law of the magnet holds and a rigid backstop lets the armature be; between `low` and
-    `high`, m, equilibria are sought by default: from the lower limit, at most 1 m off the origin, up to the
-    platen, or to where the pack ends, or to the upper limit.
+    Magnet, spring and the elastic force of the backstop are functions of x; the pack acts on its loading
+    branch, as when fresh paper is pressed slowly. A `rigid` backstop excludes positions below its surface.
+    Within `limits`, m, the magnet's law is valid and a rigid backstop admits the armature; `low` and `high`,
+    m, bound the default search for equilibria: from the lower limit, at most 1 m off the origin, up to the
+    platen, or to the end of the pack, or to the upper limit.
     """
 
     def __init__(self, hammer: HammerLike) -> None:
@@ -83,7 +83,8 @@ class StaticForce:
 
     def total(self, x: float, current: float = 0.0) -> float:
         """Net force with the contacts, N."""
-        # As by `free`, `elastic` and `pack`, of which a search for equilibria spends its time in the calls.
+        # Inlined from `free`, `elastic` and `pack`: function calls dominate the time of an equilibrium
+        # search.
         force = float(self._magnet(self._magnet_constants, x, current)) + float(
             self._spring(self._spring_constants, x)
         )
@@ -107,13 +108,13 @@ class StaticForce:
         return float(self._backstop(self._backstop_constants, math.sqrt(depth)))
 
     def pack(self, x: float) -> float:
-        """Force of the pack pressed slowly, N."""
+        """Force of a slowly pressed pack, N."""
         return float(self._pack(self._pack_constants, x, 0.0)) if x > self.front else 0.0
 
     def slope(self, x: float, current: float = 0.0) -> float:
-        """Differentiate the force with the contacts by x, N/m.
+        """Return the derivative of the total force, with contacts, with respect to x, N/m.
 
-        Each part is differentiated by itself, within its contact or range; the backstop with respect to
+        Each part is differentiated separately, within its contact or range; the backstop with respect to
         sqrt(depth), in which its laws are smooth.
         """
         room = min(x - self._domain[0], self._domain[1] - x)
@@ -130,24 +131,24 @@ class StaticForce:
         return total
 
     def anchors(self) -> list[float]:
-        """Places about which forces vary on short scales, m."""
+        """Positions, m, near which forces vary on short scales."""
         places = [self.low, self.high, self._position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
 
     def reach(self, far: float = FAR) -> tuple[float, float]:
-        """Return between which places equilibria are sought, at most so far from the origin, m."""
+        """Return the search interval for equilibria, m, at most `far` from the origin."""
         hammer = self.hammer
         low, high = self.limits
         if hammer.platen is not None:
             high = min(high, hammer.platen)
         elif hammer.pack is not None:
-            # A pack without thickness is searched as deep as its front is away from the origin.
+            # Search a pack without thickness to a depth equal to the distance of its front from the origin.
             high = min(high, self.front + getattr(hammer.pack, "thickness", abs(self.front - hammer.origin)))
         return max(low, hammer.origin - far), min(high, hammer.origin + far)
 
 
 def derivative(function: Callable[[float], float], x: float, step: float) -> float:
-    """Differentiate by central differences extrapolated to step 0.
+    """Differentiate by central differences, extrapolated to step size 0.
 
     C. J. F. Ridders, Adv. Eng. Software 4 (1982) 75.
     """
@@ -173,7 +174,7 @@ def derivative(function: Callable[[float], float], x: float, step: float) -> flo
 def law_of(
     hammer: HammerLike, part: Part | None, name: str
 ) -> tuple[Callable[..., float], tuple[float, ...]]:
-    """Return a law function of a part and its packed constants."""
+    """Return the compiled law function of a part and its packed constants."""
     standard: Callable[..., float] = getattr(absent, name)
     if part is None:
         return standard, ()

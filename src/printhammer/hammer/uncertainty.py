@@ -1,8 +1,8 @@
-"""How well the constants of a hammer are known: standard errors and correlations, as its file keeps them.
+"""Uncertainty of the constants of a hammer: standard errors and correlations, as stored in its file.
 
-A fit writes them beside its constants, and the next fit that takes these as known counts with them. In the
-file they are a table ``[uncertainty]``: ``constants``, their ``standard_errors`` with units, the
-``correlation`` of each constant with those before it, and the ``records`` of motions that are used up.
+A fit writes these errors beside its constants, and the next fit uses them as priors. In the file they are a
+table ``[uncertainty]``: ``constants``, their ``standard_errors`` with units, the ``correlation`` of each
+constant with those before it, and ``records``, the fingerprints of the motions already used.
 """
 
 from __future__ import annotations
@@ -27,32 +27,32 @@ ENTRIES: Final = {
     "records": "fingerprints of the records of motion that the constants were fitted to",
 }
 _NEGATIVE: Final = -1e-9
-"""Least eigenvalue of a matrix of correlations that may be one, but for rounding."""
+"""Smallest eigenvalue accepted for a correlation matrix, to allow for rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """What is known of the errors of constants."""
+    """Covariance of the constants of a hammer."""
 
     keys: tuple[str, ...]
-    """Dotted keys."""
+    """Dotted keys of the uncertain constants."""
     covariance: FloatArray
-    """SI, shape (n, n)."""
+    """Covariance matrix, SI, shape (n, n)."""
     records: tuple[str, ...] = ()
-    """Fingerprints of the records of motion that went into it."""
+    """Fingerprints of the records of motion that entered the covariance."""
 
     def error(self, key: str) -> float:
-        """Return a standard error, SI; 0 of a constant that is not among them."""
+        """Return the standard error of a constant, SI; 0 for a constant known exactly."""
         return float(np.sqrt(self.covariance.diagonal()[self.keys.index(key)])) if key in self.keys else 0.0
 
     def without(self, gone: Container[str]) -> Uncertainty:
-        """Return what is known of the other constants."""
+        """Return the uncertainty without some constants (marginalised)."""
         rows = [row for row, key in enumerate(self.keys) if key not in gone]
         keys = tuple(self.keys[row] for row in rows)
         return Uncertainty(keys, self.covariance[np.ix_(rows, rows)], self.records)
 
     def table(self, units: Mapping[str, str]) -> dict[str, Any] | None:
-        """Return the table of a file, SI units by key; None where every constant is exact."""
+        """Return the table for a hammer file, with SI units by key; None if every constant is exact."""
         errors = np.sqrt(self.covariance.diagonal())
         exact = [key for key, error in zip(self.keys, errors.tolist(), strict=True) if not error > 0.0]
         if exact:
@@ -71,13 +71,13 @@ class Uncertainty:
 
 
 def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertainty:
-    """Read the table of a file, given the constants of the hammer.
+    """Parse the table of a hammer file; `constants` are those of the hammer.
 
     Raises
     ------
     InputError
-        It names what is no constant of the hammer, a standard error is no positive quantity of its
-        dimension, or the correlations are none.
+        A name is not a constant of the hammer, a standard error is not a positive quantity of its dimension,
+        or the correlations are not those of a covariance matrix.
     """
     if not isinstance(table, Mapping):
         raise InputError.of(
@@ -131,7 +131,7 @@ def _error(key: str, text: str, constant: Constant) -> float:
 
 
 def _correlation(table: Mapping[str, Any], count: int) -> FloatArray:
-    """Return the matrix of correlations; without any written, the constants are independent."""
+    """Return the correlation matrix; the identity if the table has no correlations."""
     matrix = np.eye(count)
     rows = table.get("correlation", [])
     wanted = f"expected {max(count - 1, 0)} rows of 1, 2, ... numbers, those of a covariance"

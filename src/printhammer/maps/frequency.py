@@ -1,4 +1,4 @@
-"""The frequency-time map: what a hammer does in a burst of pulses, against the firing rate.
+"""Frequency-time map: displacement during a burst of pulses, against time and firing rate.
 
 Figs. 8 and 9 of F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), show bursts of nine
 pulses at gradually rising rates.
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LOWEST: Final = 500.0
-"""Lowest rate of a map unless told otherwise, Hz."""
+"""Default lowest rate of a map, Hz, as in Figs. 8 and 9."""
 
 HIGHEST: Final = 2000.0
-"""Highest rate of a map unless told otherwise, Hz."""
+"""Default highest rate of a map, Hz, as in Figs. 8 and 9."""
 
 RATES: Final = 512
-"""Number of rates of a map unless told otherwise."""
+"""Default number of rates of a map; arbitrary."""
 
 TIMES: Final = 512
-"""Number of times of a map unless told otherwise."""
+"""Default number of times of a map; arbitrary."""
 
 TAIL: Final = 1e-3
-"""Time after the last firing, s, that a map shows at its lowest rate."""
+"""Time after the last firing, s, shown at the lowest rate; arbitrary."""
 
 MOST_CELLS: Final = 200_000_000
-"""Number of displacements above which a map is refused."""
+"""Largest number of displacements in a map; arbitrary, to refuse typing errors."""
 
 
 @computation
@@ -59,7 +59,7 @@ def frequency_map(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> xr.Dataset:
-    """Compute the displacement against time and firing rate, from rest, and what each firing does.
+    """Compute the displacement against time and firing rate, from rest, and the dot of each firing.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ def frequency_map(
     pulses : int, optional
         Number of firings at each rate.
     times : array or int, optional
-        Times from the first firing, s, ascending, or their number, spread evenly from the first firing to
-        1 ms after the last one at the lowest rate; by default 512.
+        Times from the first firing, s, ascending, or their number, spread evenly from the first firing to 1
+        ms after the last one at the lowest rate; by default 512.
     waveform : Waveform, optional
-        What every firing does; by default the waveform of the hammer.
+        Waveform of every firing; by default that of the hammer.
     overlap : str, optional
         "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
 
@@ -125,20 +125,20 @@ def frequency_map(
 
 
 def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArray, FloatArray]:
-    """Compare two maps, rate by rate, at the times of the one whose times lie further apart.
+    """Compare two maps rate by rate, at the times of the coarser one.
 
     Parameters
     ----------
     computed, measured : xarray.Dataset
-        Maps; the one with the closer times is joined by straight lines between them.
+        Maps; the finer one is interpolated linearly.
 
     Returns
     -------
     rates : array, shape (n,)
-        The rates that both have, Hz.
+        Rates common to both maps, Hz.
     difference : array, shape (n,)
-        Root mean square of the difference of their displacements, m, over the times at which both are
-        known; NaN where there is no such time.
+        Root mean square of the difference of their displacements, m, over the times at which both are known;
+        NaN where there is no such time.
     """
     rows, others = matching(computed, measured)
     times = max((chart["time"].values for chart in (measured, computed)), key=_spacing)
@@ -152,7 +152,7 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
 
 
 def summary_of(chart: xr.Dataset, beside: xr.Dataset | None = None) -> Summary:
-    """Return what was computed: size, dots, the first lost one, the difference from a measured map."""
+    """Summarise size, dots, the first lost dot, and the difference from a measured map."""
     rates, time = chart["rate"].values, chart["time"].values
     fired = np.isfinite(chart["fired_at"].values)
     lost = fired & ~chart["struck"].values

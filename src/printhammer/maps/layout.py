@@ -1,8 +1,8 @@
-"""The Dataset of a frequency-time map: its variables, their units, and files that hold it.
+"""Dataset of a frequency-time map: variables, units, and files.
 
 Computed and measured maps have the same layout. `displacement` [m] lies over the dimensions `rate` [Hz] and
-`time` [s, from the first firing on]; what the firings did lies over `rate` and `firing`, and is only known of
-computed maps. A missing number is NaN.
+`time` [s, from the first firing on]; the dots lie over `rate` and `firing`, in computed maps only. A missing
+number is NaN.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ LAYOUT: Final = {
 """Unit, meaning and dimensions of the variables of a map, by name."""
 
 PLACES: Final = {"backstop": "backstop_m", "pack": "pack_front_m", "platen": "platen_m"}
-"""Attributes of a map that hold the positions of the hammer, m, by the names of the places."""
+"""Attributes of a map that hold positions of the hammer, m, by the name of the position."""
 
 
 def map_dataset(
@@ -48,10 +48,10 @@ def map_dataset(
     attributes: Mapping[str, Any],
     notes: Mapping[str, Mapping[str, str]] | None = None,
 ) -> xr.Dataset:
-    """Return a map as a Dataset over rates, Hz, and times from the first firing, s.
+    """Build the Dataset of a map over rates, Hz, and times from the first firing, s.
 
-    The variables are arrays by name, SI, of the dimensions in `LAYOUT`, `displacement` among them; the
-    attributes those of the set, the notes further ones of single variables, by name.
+    `variables` are arrays by name, SI, with the dimensions in `LAYOUT`, including `displacement`;
+    `attributes` belong to the Dataset, `notes` to single variables, by name.
     """
     more = notes or {}
     values: dict[str, Any] = {"rate": rates, "time": times, **variables}
@@ -64,12 +64,12 @@ def map_dataset(
 
 
 def places_of(chart: xr.Dataset) -> dict[str, float]:
-    """Return the positions that a map knows of "backstop", "pack" and "platen", m, in this order."""
+    """Return the positions of "backstop", "pack" and "platen" stored in a map, m, in this order."""
     return {name: float(chart.attrs[key]) for name, key in PLACES.items() if key in chart.attrs}
 
 
 def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
-    """Return the rates of a map, Hz, at which the run did not reach its end, by the name of the status."""
+    """Return the rates, Hz, of runs that stopped early, by the name of the status."""
     if "status" not in chart:
         return {}
     codes = str(chart["status"].attrs.get("codes", ""))
@@ -82,7 +82,7 @@ def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
 
 
 def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
-    """Return what a map says about its hammer: how its constants came about, and its places."""
+    """Return the attributes of a map that describe its hammer: origin of its constants, and positions."""
     statuses = {constant.status for constant in hammer.constants.values()}
     guessed = [status for status in ("reconstructed", "assumed") if status in statuses]
     places = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
@@ -93,7 +93,7 @@ def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
 
 
 def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
-    """Return the rows of two maps that have the same rate, up to a part in 10^9."""
+    """Return the row indices of two maps with the same rate, up to a part in 10^9."""
     here, there = chart["rate"].values, other["rate"].values
     nearest = np.abs(here[:, np.newaxis] - there).argmin(axis=1)
     same = np.isclose(here, there[nearest], rtol=1e-9, atol=0.0)
@@ -101,14 +101,14 @@ def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
 
 
 def on_times(chart: xr.Dataset, row: int, times: FloatArray) -> FloatArray:
-    """Return the displacement of one rate of a map, m, at other times, s; NaN beside gaps and outside."""
+    """Interpolate the displacement of one rate, m, at other times, s; NaN next to gaps and outside."""
     return interpolated(chart["time"].values, chart["displacement"].values[row], times)
 
 
 def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) -> FloatArray:
-    """Join samples by straight lines; NaN outside, and between a sample that is NaN and its neighbours.
+    """Interpolate samples linearly; NaN outside, and between a NaN sample and its neighbours.
 
-    The samples lie `at` ascending times, s. At the time of a sample the value is the sample itself.
+    The samples lie at ascending times `at`, s. At the time of a sample the value is the sample itself.
     """
     known, samples = np.asarray(at, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if known.size == 0:

@@ -3,9 +3,7 @@
 Hendriks (1983) hoped for them: "It is hoped that similar plots, derived from experimental displacement plots,
 will become available in the future."
 
-Measured displacement records at several firing rates, from CSV files.
-
-Two tables are understood, each with its units in the heading, SI or any other:
+Two layouts of CSV tables are accepted, each with units in the heading, SI or any other:
 
 - one row for each sample: the columns ``rate [Hz],time [us],displacement [um]``, in any order;
 - one row for each time: ``time [us]``, then a column for each rate, such as ``500 Hz [um],1.2 kHz [um]``.
@@ -55,7 +53,7 @@ class RateRecord(Declared):
 
 @dataclass(frozen=True)
 class Cells:
-    """A CSV file: cells of the heading, numbers of the lines, and rows of cells."""
+    """CSV file: heading, line numbers, and rows of cells."""
 
     what: str
     heading: list[str]
@@ -68,7 +66,7 @@ class Cells:
         Raises
         ------
         InputError
-            The unit is of another dimension, or a cell is no finite number, nor an allowed gap.
+            The unit is of another dimension, or a cell is neither a finite number nor an allowed gap.
         """
         name = self.heading[index]
         with located(f"{self.what}: column {name!r}", file=self.what, key=name):
@@ -95,13 +93,13 @@ class Cells:
 
 
 def read_records(path: Path) -> list[RateRecord]:
-    """Read the records of a CSV file, by rising rate.
+    """Read the records of a CSV file, by ascending rate.
 
     Raises
     ------
     InputError
-        The file cannot be read, its heading is not one of the two, a cell is no number, or a time is given
-        twice for one rate.
+        The file cannot be read, its heading fits neither layout, a cell is not a number, or a time is
+        repeated for one rate.
     """
     cells = _cells(path)
     names = [_named(cells.what, cell) for cell in cells.heading]
@@ -115,14 +113,14 @@ def read_records(path: Path) -> list[RateRecord]:
 def checked(
     what: str, rate: float, times: FloatArray, displacement: FloatArray, places: Sequence[str]
 ) -> RateRecord:
-    """Return a record, of samples in SI in any order, with its samples in order of time.
+    """Validate the samples of one rate, SI, in any order; return a record in ascending order of time.
 
-    Messages name the file, `what`, and where each sample stands, its entry in `places`.
+    Messages name the file, `what`, and the origin of each sample, its entry in `places`.
 
     Raises
     ------
     InputError
-        The rate is not positive, a time is given twice, or fewer than two displacements are known.
+        The rate is not positive, a time is repeated, or fewer than two displacements are known.
     """
     if not (math.isfinite(rate) and rate > 0.0):
         raise InputError(
@@ -206,7 +204,7 @@ def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateR
 
 
 def _named(what: str, cell: str) -> tuple[str, str]:
-    """Split the cell of a heading into its name and its unit."""
+    """Split a heading cell into name and unit."""
     name, unit = split_heading(cell)
     if not unit:
         raise InputError(
@@ -239,7 +237,7 @@ def _cells(path: Path) -> Cells:
 
 
 MOST_TIMES: Final = 8192
-"""Number of times of a common grid above which it is made coarser."""
+"""Largest number of times of a common grid; beyond it the grid is made coarser. Arbitrary."""
 
 _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
 
@@ -255,15 +253,15 @@ def load_measured_map(path: str | Path, *, times: npt.ArrayLike | None = None) -
         `displacement` lies over `rate` and one more dimension, and `time` over that one, or over both where
         every rate has times of its own.
     times : array, optional
-        Times from the first firing, s, ascending, to which the records are brought by straight lines between
-        samples. By default those of the samples if all rates have the same ones; otherwise even ones, as
-        close as the samples of the closest record.
+        Times from the first firing, s, ascending, at which the records are interpolated linearly. By default
+        the times of the samples if they are the same at all rates, else evenly spaced times with the spacing
+        of the finest record.
 
     Returns
     -------
     xarray.Dataset
         `displacement` [m, float32] over `rate` [Hz] and `time` [s]; NaN in gaps, and before and after a
-        record. What the firings did is not known.
+        record. Dots are not included.
 
     Raises
     ------
@@ -309,7 +307,7 @@ def _common_times(records: list[RateRecord]) -> FloatArray:
     start = min(float(record.times[0]) for record in records)
     end = max(float(record.times[-1]) for record in records)
     closest = min(float(np.median(np.diff(record.times))) for record in records)
-    # Room for the last bit, so that even samples make the grid that they are on.
+    # Allow for rounding, so that even samples define their own grid.
     count = int(min(np.ceil((end - start) / closest * (1.0 - 1e-9)), MOST_TIMES - 1)) + 1
     return np.linspace(start, end, count)
 
@@ -362,7 +360,7 @@ def _opened(path: Path) -> Any:
 
     if path.suffix.lower() == ".zarr":
         need_for(path)
-        # Metadata in one place are there or not; each array's own always are.
+        # Consolidated metadata may be missing; the metadata of each array always exist.
         options: dict[str, Any] = {"engine": "zarr", "consolidated": False}
     elif _magic(path).startswith(_CLASSIC):
         options = {"engine": "scipy"}

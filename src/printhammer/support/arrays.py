@@ -1,4 +1,4 @@
-"""The types of arrays: of numbers, whole numbers, truth values and words."""
+"""Array types: floating-point numbers, integers, Booleans and text."""
 
 import numpy as np
 import numpy.typing as npt

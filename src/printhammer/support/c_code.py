@@ -1,4 +1,4 @@
-"""Pieces of C headers: names, comments and arrays of whole numbers."""
+"""Building blocks of C headers: identifiers, comments and integer arrays."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import numpy.typing as npt
 
 
 def identifier(text: str) -> str:
-    """Return a name that C takes, in lower case, from any text."""
+    """Return a valid C identifier, in lower case, made from any text."""
     return re.sub(r"\W+", "_", f"printhammer_{text}", flags=re.ASCII).lower()
 
 
 def comment(text: str) -> str:
-    """Return a text that can stand in a comment: plain ASCII that does not end it."""
+    """Return a text that is safe inside a C comment: printable ASCII without "*/"."""
     plain = text.encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/")
     return "".join(letter if letter.isprintable() else " " for letter in plain)
 
 
 def numbers(values: npt.ArrayLike) -> str:
-    """Return whole numbers, ten a line."""
+    """Format integers, ten to a line."""
     texts = [str(int(value)) for value in np.asarray(values).tolist()]
     return ",\n".join("    " + ", ".join(texts[at : at + 10]) for at in range(0, len(texts), 10))
 
 
 def nested(values: npt.ArrayLike) -> str:
-    """Return the initialiser of an array of whole numbers, of any dimensions."""
+    """Format the initialiser of an integer array of any number of dimensions."""
     whole = np.asarray(values)
     if whole.ndim == 1:
         return f"{{\n{numbers(whole)}\n  }}"
@@ -35,6 +35,6 @@ def nested(values: npt.ArrayLike) -> str:
 
 
 def table(kind: str, name: str, values: npt.ArrayLike) -> str:
-    """Return the definition of an array of two dimensions."""
+    """Format the definition of a two-dimensional array."""
     whole = np.asarray(values)
     return f"static const {kind} {name}[{whole.shape[0]}][{whole.shape[1]}] = {nested(whole)};\n"

@@ -1,13 +1,13 @@
-"""Measured constants: how a field of a part or waveform says its unit, symbol and meaning.
+"""Physical constants of parts and waveforms: declarations of unit, symbol, meaning and bounds.
 
 Parts (`printhammer.parts`) and waveforms are frozen pydantic models whose physical constants are plain SI
-floats. `quantity` declares such a field; `quantities` lists the declarations of a model, which is all that
-the file reader, the JSON schema, the tables of `printhammer hammer show` and the documentation need to know
-about it.
+floats. `quantity` declares such a field, and `quantities` lists the declarations of a model. The file reader,
+the JSON schema, the tables of `printhammer hammer show` and the documentation all derive from these
+declarations.
 
-A model that reads a file of its own (a measured table, a sampled waveform) finds the folder of the hammer or
-drive file in `info.context["folder"]` of its validators (a `pathlib.Path`; the working directory when there
-is no context).
+A model that reads a file of its own (a measured table, a sampled waveform) resolves its name against
+`info.context["folder"]` of its validators: the folder of the hammer or drive file, a `pathlib.Path`; without
+a context, the working directory.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ _KEY = "quantity"
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a model field says about a physical constant."""
+    """Declaration of a physical constant: the metadata of a model field."""
 
     si: str
     """SI unit of the stored float, as `printhammer.units` writes it; "1" for a pure number."""
     symbol: str
     """Symbol in the paper or the usual textbook, plain text."""
     meaning: str
-    """One phrase for tables and help."""
+    """Meaning of the constant in one phrase, for tables and help."""
     also: tuple[str, ...] = ()
-    """Further SI units of other dimension that a file may give instead (a waveform's amplitude: A or N)."""
+    """SI units of other dimensions that a file may use instead (for the amplitude of a waveform: A or N)."""
     gt: float | None = None
     ge: float | None = None
     lt: float | None = None
     le: float | None = None
     """Bounds of the SI value."""
     required: bool = True
-    """Whether a file must give it."""
+    """Whether the constant is required in a file."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """One constant of a hammer as its file gives it, with its SI value beside."""
+    """Constant of a hammer: value and unit as written in its file, and the SI value."""
 
     key: str
     """Dotted key, such as "magnet.F0"."""
@@ -64,10 +64,10 @@ class Constant:
     status: str
     """One of `STATUSES`."""
     source: str
-    """Where the value comes from."""
+    """Origin of the value, such as a figure, a measurement or a textbook."""
     meaning: str
     symbol: str
-    """As of the field's `Quantity`."""
+    """Meaning and symbol, from the `Quantity` of the field."""
     si_unit: str
     """SI unit of `si`."""
 
@@ -86,8 +86,8 @@ def quantity(
 ) -> Any:
     """Declare a pydantic field that holds a physical constant in SI; arguments as for `Quantity`.
 
-    It is the right-hand side of a `float` (or `float | None`) annotation. NaN and infinity are always
-    refused; a `default` makes the constant optional.
+    The result is the default of a `float` (or `float | None`) annotation. NaN and infinity are always
+    rejected; a `default` makes the constant optional.
     """
     note = Quantity(si, symbol, meaning, also, gt, ge, lt, le, default is PydanticUndefined)
     limits: dict[str, Any] = {"gt": gt, "ge": ge, "lt": lt, "le": le, "allow_inf_nan": False}
@@ -120,7 +120,7 @@ def folder_of(info: ValidationInfo) -> Path:
 
 
 def expected(note: Quantity) -> str:
-    """Return what a message says of the bounds of a constant, such as "more than 0 m"."""
+    """Describe the bounds of a constant for an error message, such as "more than 0 m"."""
     pure = note.si == "1"
     unit = "" if pure else f" {note.si}"
     bounds = (
@@ -134,7 +134,7 @@ def expected(note: Quantity) -> str:
 
 
 def shown(value: object, *, quotes: bool = True) -> str:
-    """Return the text of a value for a message, on one line and not too long; printable text also bare."""
+    """Format a value for an error message, on one line of 80 characters; `quotes=False` omits the quotes."""
     text = value if isinstance(value, str) and not quotes and value.isprintable() else repr(value)
     return text if len(text) <= 80 else text[:77] + "..."
 
@@ -142,7 +142,7 @@ def shown(value: object, *, quotes: bool = True) -> str:
 def invalid(
     error: ValidationError, model: type[BaseModel], prefix: str = "", written: Mapping[str, str] | None = None
 ) -> InputError:
-    """Return the first fault of a pydantic validation as an error.
+    """Convert the first fault of a pydantic validation to an `InputError`.
 
     Parameters
     ----------
@@ -151,14 +151,14 @@ def invalid(
     model : type of BaseModel
         The model class.
     prefix : str
-        What stands before a field's name in a key, such as "magnet.".
+        Prefix of the field's name in the key, such as "magnet.".
     written : mapping, optional
         Text of values as the user wrote them, by field name.
 
     Returns
     -------
     InputError
-        With key, value and what was expected; one that a validator raised, as it is.
+        Error with key, value and expectation; an InputError raised by a validator is passed on unchanged.
     """
     fault = error.errors(include_url=False)[0]
     cause = fault.get("ctx", {}).get("error")

@@ -1,7 +1,4 @@
-"""Files that the program writes: whole or not at all, and never over what it reads.
-
-Text files that the program reads.
-"""
+"""Text files: atomic writing that never overwrites an input, and reading."""
 
 from __future__ import annotations
 
@@ -15,9 +12,10 @@ from printhammer.errors import InputError
 
 
 def write_file(path: str | Path, content: str | bytes) -> None:
-    """Write a file; text in UTF-8.
+    """Write a file atomically; text is encoded in UTF-8.
 
-    It is written beside its place first and then moved there, so that what was there stays if anything fails.
+    The content goes to a temporary file in the same folder, which then replaces the target, so that an
+    existing file survives any failure.
     """
     target = Path(path)
     data = content.encode("utf-8") if isinstance(content, str) else content
@@ -26,7 +24,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
         handle, draft = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         with os.fdopen(handle, "wb") as file:
             file.write(data)
-        # A temporary file is for its owner only.
+        # mkstemp makes the file readable by its owner only.
         mask = os.umask(0)
         os.umask(mask)
         Path(draft).chmod(0o666 & ~mask)
@@ -41,7 +39,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Make a folder, and those above it, and make sure that files can be written there."""
+    """Create a folder and its parents, and check that files can be written there."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -55,12 +53,12 @@ def make_folder(path: str | Path) -> Path:
 
 
 def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
-    """Make sure, before any work, that files can be written and that none of them is read, or named twice.
+    """Check, before a computation, that output files are writable, distinct, and not input files.
 
     Raises
     ------
     InputError
-        A file lies in no folder that can be written to, is a folder, is read as well, or is named twice.
+        The folder of a file is missing or read-only, or the file is a folder, an input, or named twice.
     """
     read = {path.resolve() for path in inputs}
     named: set[Path] = set()
@@ -72,7 +70,7 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
             raise InputError(f"{path}: expected a file of its own, this one is written twice", file=path)
         named.add(place)
         store = place.suffix.lower() == ".zarr"
-        # A Zarr store is a folder, and written over as a whole.
+        # A Zarr store is a folder, and is overwritten as a whole.
         if place.is_dir() and not (store and (place / "zarr.json").is_file()):
             wanted = "a new store, this is no Zarr store" if store else "a file to write, this is a folder"
             raise InputError(f"{path}: expected {wanted}", file=path)
@@ -88,7 +86,7 @@ def read_text(path: Path, what: str, *, wanted: str = "", encoding: str = "utf-8
     Raises
     ------
     InputError
-        The file cannot be read, or is not UTF-8; `wanted` may say what was expected instead.
+        The file cannot be read, or is not UTF-8; `wanted` is the expectation in that message.
     """
     try:
         return path.read_text(encoding)

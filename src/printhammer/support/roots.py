@@ -1,8 +1,7 @@
 """All roots of a scalar function on an interval, to full double precision.
 
-A function of one variable, smooth between the points of a grid, is searched for changes of sign and for
-pairs of roots between grid points; what is found is narrowed down to neighbouring floating-point numbers by
-bisection.
+The function is smooth between the points of a grid. The search looks for sign changes, and for pairs of roots
+between grid points, and bisects each bracket down to neighbouring floating-point numbers.
 """
 
 from __future__ import annotations
@@ -16,13 +15,13 @@ _PIECES: Final = 16
 _ROUNDS: Final = 16
 _PROBE: Final = 1e-6
 _SLOPE: Final = 1e-3
-# Rounding makes a root a short stretch of zeros.
+# Rounding turns a root into a short stretch of zeros.
 _FLAT: Final = 1e-12
 
 
 @dataclass(frozen=True)
 class Root:
-    """A root and the sign of the function on either side of it, -1 or 1; 0 at an end of the grid."""
+    """Root of a function, with its sign on either side: -1 or 1, and 0 at an end of the grid."""
 
     x: float
     before: int
@@ -30,12 +29,11 @@ class Root:
 
 
 def bisect(function: Callable[[float], float], low: float, high: float) -> float:
-    """Find a root between two points at which the function has different signs.
+    """Find a root by bisection, in a bracket with a sign change.
 
     Returns
     -------
-    Of the two neighbouring floating-point numbers between which the sign changes, the one with the smaller
-    value.
+    The float next to the sign change at which the absolute value of the function is smaller.
     """
     at_low, at_high = function(low), function(high)
     while True:
@@ -54,10 +52,9 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Root]:
     """Find the roots of a function on an ascending grid.
 
-    Stretches where the function is NaN are passed over, as are those longer than 1e-12 where it is zero,
-    which hold no isolated root. A pair of roots between two neighbouring grid points is found; of three only
-    one, and two that lie closer together than about 1e-8 of the distance of the grid points may be missed
-    or given as one.
+    Stretches where the function is NaN are skipped, as are stretches longer than 1e-12 where it is zero,
+    which hold no isolated root. Two roots between neighbouring grid points are found, unless they lie closer
+    together than about 1e-8 of the grid spacing; of three roots only one is found.
     """
     isolated: list[Root] = []
     points = _with_probes(function, grid)
@@ -67,7 +64,7 @@ def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Roo
 
 
 def _with_probes(function: Callable[[float], float], grid: Sequence[float]) -> list[tuple[float, float]]:
-    """Evaluate on the grid, and beside grid points that are roots, to see the signs around them."""
+    """Evaluate on the grid, and next to grid points that are roots, for the signs on both sides."""
     points: list[tuple[float, float]] = []
     for k, x in enumerate(grid):
         value = function(x)
@@ -82,7 +79,7 @@ def _with_probes(function: Callable[[float], float], grid: Sequence[float]) -> l
 
 
 def _stretches(values: Sequence[float]) -> Iterator[tuple[int, int]]:
-    """Split a grid where the function is NaN."""
+    """Split the grid into stretches without NaN; return the index ranges."""
     start = None
     for k, value in enumerate([*values, math.nan]):
         if math.isnan(value):
@@ -121,7 +118,7 @@ def _in_stretch(function: Callable[[float], float], points: Sequence[tuple[float
 def _pair(
     function: Callable[[float], float], start: tuple[float, float], end: tuple[float, float]
 ) -> list[Root]:
-    """Look for a pair of roots between two points at which the function has the same sign."""
+    """Search for a pair of roots between two points at which the function has the same sign."""
     (low, at_low), (high, at_high) = start, end
     sign = _sign(at_low)
     step = _SLOPE * (high - low)
@@ -140,7 +137,7 @@ def _pair(
             ]
         if height == 0.0:
             return [Root(best, sign, sign)]
-        # A dip that reaches zero is sampled far below its rims.
+        # Sample a dip that reaches zero far below its rims.
         if height > max(values) - height:
             return []
         left, right = grid[max(k - 1, 0)], grid[min(k + 1, _PIECES)]

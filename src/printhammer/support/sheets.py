@@ -1,7 +1,7 @@
-"""CSV tables whose heading gives every column its unit: cells, lines and comments, before they mean anything.
+"""CSV tables with units in the heading: cells, line numbers and comments, not yet interpreted.
 
-Blank lines and lines that begin with # are passed over; a comment such as ``# sampling rate: 1 MHz`` is kept
-as a key and its text.
+Blank lines and lines that begin with # are skipped; a comment such as ``# sampling rate: 1 MHz`` is kept as a
+key with its text.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ class Sheet:
     where: str
     """Name of the file, for messages."""
     rows: list[tuple[int, list[str]]]
-    """Line of the file, counted from 1, and cells; the heading first."""
+    """Line numbers, from 1, with the cells of each line; the heading comes first."""
     comments: dict[str, str]
-    """Comments of the form ``# key: value``; of a key given twice, the last."""
+    """Comments of the form ``# key: value``; the last one wins if a key is repeated."""
 
 
 def read_sheet(path: Path, what: str, *, gaps: bool = False) -> Sheet:
     """Read a CSV table; `what` names it in messages, such as "the force table".
 
-    With `gaps`, a row of nothing but empty cells is a row.
+    With `gaps`, a line of empty cells counts as a row.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def read_sheet(path: Path, what: str, *, gaps: bool = False) -> Sheet:
 
 
 def sheet_of(text: str, where: str, *, gaps: bool = False, delimiter: str = ",") -> Sheet:
-    """Split the text of a CSV table as `read_sheet` does; `where` stands in messages."""
+    """Split the text of a CSV table as `read_sheet` does; `where` names the file in messages."""
     comments: dict[str, str] = {}
     reader = csv.reader(_uncommented(text, comments), strict=True, delimiter=delimiter)
     rows = []
@@ -61,14 +61,14 @@ def sheet_of(text: str, where: str, *, gaps: bool = False, delimiter: str = ",")
 
 
 def split_heading(cell: str) -> tuple[str, str]:
-    """Split a heading such as "time [us]" into name and unit; the unit is empty where it is none."""
+    """Split a heading such as "time [us]" into name and unit; a heading without a unit yields ""."""
     name, _, rest = cell.strip().partition("[")
     unit, closed, tail = rest.partition("]")
     return name.strip(), unit.strip() if closed and not tail.strip() else ""
 
 
 def finite(cell: str, where: str) -> float:
-    """Read a finite number."""
+    """Parse a finite number."""
     try:
         number = float(cell)
     except ValueError:
@@ -81,7 +81,7 @@ def finite(cell: str, where: str) -> float:
 
 
 def _uncommented(text: str, comments: dict[str, str]) -> Iterator[str]:
-    """Give the lines, empty ones in place of comments; keep the comments that have a key."""
+    """Yield the lines, with comments blanked; collect comments of the form ``key: value`` in `comments`."""
     for line in io.StringIO(text):
         bare = line.strip()
         if not bare.startswith("#"):

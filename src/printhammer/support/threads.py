@@ -1,9 +1,10 @@
-"""Work in threads: pieces of a range, handed out one by one.
+"""Threads over ranges, and cooperative computations that share their expensive evaluations.
 
-Works that ask: computations that leave what costs time to others, so that many share it.
+`in_threads` splits ranges of indices into pieces, which threads fetch one at a time.
 
-A work is a generator. It yields a list of what it asks for, is sent the answers in the same order, and
-returns its result. Works side by side ask together, and what they ask for is computed at once.
+A `Work` is a generator that delegates expensive evaluations: it yields a list of queries, receives the
+answers in the same order, and returns its result. `together` merges the queries of several works, so that one
+vectorised call answers them all.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _INTERVAL: Final = 0.1
 
 
 def thread_count(threads: int | None) -> int:
-    """Return a number of threads; by default that of the cores that this process may use."""
+    """Return the number of threads; None stands for the number of cores available to this process."""
     if threads is None:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
@@ -37,7 +38,7 @@ def thread_count(threads: int | None) -> int:
 
 
 def shifted(progress: Progress | None, begun: int, total: int) -> Progress | None:
-    """Return what a part of some work calls as its progress: after `begun` numbers, of `total` in all."""
+    """Return a progress callback for a part of a computation: `begun` steps are done, of `total`."""
     return None if progress is None else lambda done, _all: progress(begun + done, total)
 
 
@@ -49,9 +50,9 @@ def mapped(
     *,
     length: int | None = None,
 ) -> list[B]:
-    """Return the values of a function at some items, in their order, computed in threads.
+    """Map a function over items in threads; return the values in input order.
 
-    Arguments as for `in_threads`, `threads` by default as many as there are cores.
+    Further arguments as for `in_threads`; `threads` defaults to the number of cores.
     """
     values: dict[int, B] = {}
 
@@ -70,25 +71,25 @@ def in_threads(
     progress: Progress | None = None,
     lengths: Sequence[int] | None = None,
 ) -> None:
-    """Do all of several works, each on a range of numbers from 0, in threads.
+    """Run several works in threads, each over a range of indices from 0.
 
     Parameters
     ----------
     works : sequence of callable
-        Each takes the first number of a piece and the one after its last.
+        Functions of the first index of a piece and the index after its last.
     sizes : sequence of int
         Length of the range of each work.
     threads : int
         Number of threads; with one, the calling thread does all.
     progress : callable, optional
-        Called now and then, in the calling thread, with how many numbers are done and how many there are.
+        Called from time to time, in the calling thread, with the number of indices done and in total.
     lengths : sequence of int, optional
-        Length of the pieces of each work; by default such that a thread has a few dozen.
+        Length of the pieces of each work; by default a thread gets a few dozen pieces.
 
     Raises
     ------
     KeyboardInterrupt
-        Where it is interrupted; the pieces under way are done before.
+        On Ctrl-C, after the pieces under way are finished.
     """
     total = sum(sizes)
     if lengths is None:
@@ -151,14 +152,14 @@ Work: TypeAlias = Generator[list[A], list[B], T]
 
 
 def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
-    """Do works side by side: those that are not over ask together. Returns their results in order."""
+    """Run works concurrently, merging the queries of all unfinished works; return the results in order."""
     ends: dict[int, T] = {}
     answers: dict[int, list[B] | None] = dict.fromkeys(range(len(works)))
     while answers:
         asked = {}
         for k, own in answers.items():
             try:
-                # A generator begins with None.
+                # The first value sent to a generator has to be None.
                 asked[k] = works[k].send(own)  # type: ignore[arg-type]
             except StopIteration as end:
                 ends[k] = end.value
@@ -168,11 +169,11 @@ def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
 
 
 def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[B]]]) -> Work[C, D, T]:
-    """Do a work whose questions are answered by works that ask for something else."""
+    """Run a work whose queries are answered by further works with queries of another kind."""
     answers: list[B] | None = None
     while True:
         try:
-            # A generator begins with None.
+            # The first value sent to a generator has to be None.
             asked = work.send(answers)  # type: ignore[arg-type]
         except StopIteration as end:
             result: T = end.value
@@ -181,7 +182,7 @@ def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[
 
 
 def answered(work: Work[A, B, T], answer: Callable[[list[A]], list[B]]) -> T:
-    """Do a work to its end, its questions answered by a function."""
+    """Run a work to its end; a function answers its queries."""
     answers: list[B] | None = None
     while True:
         try:

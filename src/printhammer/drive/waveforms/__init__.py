@@ -1,1 +1,1 @@
-"""Waveforms: what one firing does, current or force against time."""
+"""Waveforms: current, force or voltage of one firing as a function of time."""

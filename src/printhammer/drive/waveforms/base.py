@@ -1,4 +1,4 @@
-"""What every waveform of a current, a force or a voltage has in common; the shapes are in `waveforms`."""
+"""Base class of the waveforms of a current, a force or a voltage."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from printhammer.support.constants import invalid, quantities
 
 QuantityName = Literal["current", "force", "voltage"]
 QUANTITY_UNITS: Final[dict[str, QuantityName]] = {"A": "current", "N": "force", "V": "voltage"}
-"""What a waveform drives, by the SI unit of its amplitude."""
+"""Driven quantity, by the SI unit of the amplitude."""
 UNITS: Final = {driven: unit for unit, driven in QUANTITY_UNITS.items()}
-"""The SI unit of what is driven."""
+"""SI unit of each driven quantity."""
 
 DECAY_TIMES: Final = 27.6310211159
-"""Number of decay time constants after which a decaying current is zero by definition: 1e-12 is left then."""
+"""Number of decay time constants after which a decaying current is set to zero: 1e-12 of it is left then."""
 
 
 class Supply(NamedTuple):
-    """A supply of a voltage, see `printhammer.kernel.model.layout`."""
+    """Voltage supply, see `printhammer.kernel.model.layout`."""
 
     diode: float = 0.0
-    """Voltage of the diode in which a chopped current circulates, V."""
+    """Voltage of the diode that carries a chopped current, V."""
     series: float = 0.0
     """Resistance in series with an ideal source, ohm."""
     capacitance: float = 0.0
-    """Of a reservoir, F."""
+    """Capacitance of the reservoir, F."""
     charging: float = 0.0
-    """Resistance from which that is charged, ohm."""
+    """Resistance through which the reservoir is charged, ohm."""
     charged: float = 0.0
-    """Voltage to which it is charged, V."""
+    """Voltage to which the reservoir is charged, V."""
     coils: float = 1.0
-    """Number of equal coils on it."""
+    """Number of equal coils on the supply."""
 
 
 class Waveform(BaseModel):
-    """What one fired pulse does, as a function of tau, the time since its firing.
+    """Waveform of one pulse, as a function of tau, the time since its firing.
 
-    Numbers are SI; a string with a unit ("350 us") is taken as well. An amplitude in N makes it a force, one
-    in V a voltage across a coil with its circuit.
+    Numbers are SI; strings with a unit ("350 us") are accepted as well. An amplitude in N makes the waveform
+    a force, one in V a voltage across a coil with its circuit.
 
     Raises
     ------
@@ -65,13 +65,13 @@ class Waveform(BaseModel):
             except ValidationError as error:
                 raise invalid(error, type(self), f"{self.shape} waveform: ") from None
 
-        # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.
+        # A custom __init__ would lose the context of model_validate (the folder of the file).
         __init__.__pydantic_base_init__ = True
 
     @model_validator(mode="before")
     @classmethod
     def _read_units(cls, data: Any) -> Any:
-        """Turn strings with units into SI numbers; the amplitude's unit decides what is driven."""
+        """Convert strings with units to SI; the unit of the amplitude determines the driven quantity."""
         if not isinstance(data, dict) or not any(isinstance(data.get(name), str) for name in quantities(cls)):
             return data
         from printhammer.units import parse
@@ -102,7 +102,7 @@ class Waveform(BaseModel):
 
     @abstractmethod
     def scaled(self, factor: float) -> Self:
-        """Return the same waveform with every value multiplied by a factor."""
+        """Return a copy scaled by `factor`."""
 
     def value(self, tau: npt.ArrayLike) -> FloatArray:
         """Value, A or N, at times tau since the firing, s; right-continuous, zero outside the support."""
@@ -120,7 +120,7 @@ class Waveform(BaseModel):
 
     @property
     def replaces(self) -> bool:
-        """Whether the latest firing always replaces those before it."""
+        """Whether the latest firing always replaces earlier ones."""
         return False
 
     @property
@@ -129,9 +129,9 @@ class Waveform(BaseModel):
         return UNITS[self.quantity]
 
     def supply(self) -> Supply:
-        """Return what the kernel has to know of the supply of a voltage: an ideal source."""
+        """Return the supply of a voltage waveform: by default an ideal source."""
         return Supply()
 
     def content(self) -> dict[str, FloatArray]:
-        """Return the arrays that identify the waveform beside its fields: none for a formula."""
+        """Return the arrays that identify the waveform besides its fields; none for a formula."""
         return {}

@@ -1,4 +1,4 @@
-"""A waveform made of several that follow one another, such as a print pulse and a later brake pulse."""
+"""Waveform composed of consecutive ones, such as a print pulse and a later brake pulse."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 
 TAIL: Final = 1e-3
-"""What may be cut off of a decaying part where the next one begins, in parts of its peak."""
+"""Largest remainder of a decaying part that may be cut off when the next part begins, as a fraction of its
+peak."""
 
 _SAMPLES: Final = 257
 _ROUNDING: Final = 1e-14
 
 
 class Chain(Waveform):
-    """Several waveforms in one firing, each begun at an offset from it; between them the drive is zero.
+    """Several consecutive waveforms in one firing, each at an offset; the drive is zero between them.
 
-    `parts` holds pairs of the offset, s or a string with a unit, and the waveform. They ascend, and all are
-    currents or all are forces. None begins before the one before it has ended, or decayed to `TAIL` of its
-    peak: what is left of that is cut off then. The part of a chain fired at an offset has its edges at the
-    rounded sums of offset and edge.
+    `parts` holds pairs of the offset, s or a string with a unit, and the waveform, in ascending order; all
+    are currents or all are forces. A part may begin once the part before has ended or decayed to `TAIL` of
+    its peak; the remainder is cut off. The edges of a part lie at the rounded sums of offset and edge.
     """
 
     shape: ClassVar[str] = "chain"
@@ -36,7 +36,7 @@ class Chain(Waveform):
     @model_validator(mode="before")
     @classmethod
     def _read_parts(cls, data: Any) -> Any:
-        """Check the parts one by one; what they drive, the chain drives."""
+        """Validate the parts one by one; the chain drives the same quantity as its parts."""
         if not isinstance(data, dict) or "parts" not in data:
             return data
         parts = _checked(data["parts"])
@@ -49,37 +49,37 @@ class Chain(Waveform):
 
     @property
     def replaces(self) -> bool:
-        """Whether the parts are those of a driver, which is one output stage."""
+        """Whether the parts belong to a driver, which has a single output stage."""
         return self.parts[0][1].replaces
 
     @property
     def support(self) -> float:
-        """Time from the firing to the end of the last part, s; a current in a coil may last longer."""
+        """Time from the firing to the end of the last part, s; the current in a coil may last longer."""
         offset, last = self.parts[-1]
         return offset + last.support
 
     def supply(self) -> Supply:
-        """Return the supply, that of the first part."""
+        """Return the supply of the first part."""
         return self.parts[0][1].supply()
 
     def segments(self) -> FloatArray:
-        """Return the segment table: those of the parts one after the other, zero in between."""
+        """Return the segment tables of the parts in sequence, with zeros in between."""
         rows: list[tuple[float, ...]] = []
         for offset, part in self.parts:
             own = [tuple(float(number) for number in row) for row in part.segments()]
             while rows and offset <= rows[-1][0]:
-                # The end of the part before gives way to what begins there.
+                # The remainder of the previous part is cut off here.
                 rows.pop()
             rows += [(offset + start, *rest) for start, *rest in own]
         return table(rows[:-1], rows[-1][0])
 
     def scaled(self, factor: float) -> Self:
-        """Return the same chain with every value multiplied by a factor."""
+        """Return a copy scaled by `factor`."""
         return type(self)(parts=tuple((offset, part.scaled(factor)) for offset, part in self.parts))
 
 
 def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
-    """Return offsets, s, and waveforms of a chain, none beginning before the one before it is over."""
+    """Return the validated offsets, s, and waveforms; each begins after the previous one is over."""
     try:
         pairs = [tuple(pair) for pair in parts]  # type: ignore[attr-defined]
     except TypeError:
@@ -118,11 +118,11 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
 
 
 def _over(begun: float, waveform: Waveform, time: float) -> bool:
-    """Tell whether a waveform that has begun has ended or decayed to its tail at a time, both in s."""
+    """Whether a waveform that began at `begun` has ended or decayed to its tail at `time`, both in s."""
     segments = waveform.segments()
-    # After the end of a driver's supply the coil's circuit goes on, whatever comes next.
+    # The circuit of the coil remains after the supply of a driver ends.
     end = waveform.support
-    # Two parts may meet, by rounding a little early.
+    # Rounding may place the end slightly after the beginning of the next part.
     if time >= begun + end or math.isclose(time, begun + end, rel_tol=_ROUNDING):
         return True
     if time <= begun or waveform.replaces:
@@ -133,7 +133,7 @@ def _over(begun: float, waveform: Waveform, time: float) -> bool:
 
 
 def _offset(written: object, number: int) -> float:
-    """Read the offset of a part: a number in s, or a string with a unit."""
+    """Parse the offset of a part: a number in s, or a string with a unit."""
     if isinstance(written, str):
         return read_number(written, "s", f"parts[{number}]")
     if isinstance(written, bool) or not isinstance(written, float | int) or not math.isfinite(written):

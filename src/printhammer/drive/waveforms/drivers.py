@@ -1,15 +1,15 @@
-"""Drivers of a coil with its circuit: a supply that is switched on and off, and the paths of the current.
+"""Drivers of a coil with its circuit: a switched supply, and the paths of the decaying current.
 
-The latest firing always replaces those before it: a driver is one output stage. Voltages are those of the
-supply; a diode, the resistance of the supply and the thresholds of a chopper act where the coil's circuit
-has them act, see `printhammer.kernel.model.circuit`. After the supply is switched off the current decays
-against a voltage, and once it is zero it stays zero until the coil would drive it again.
+The latest firing always replaces earlier ones, because a driver is a single output stage. Voltages are those
+of the supply; a diode, the resistance of the supply and the thresholds of a chopper act in the circuit of the
+coil, see `printhammer.kernel.model.circuit`. After the supply is switched off the current decays against a
+voltage to zero, and stays zero until the coil drives it again.
 
-A coil switched between currents by a driver of finite speed.
+`Switched` is a current switched between levels by a driver of finite speed.
 
-The driver holds the coil at one current after another. After each switching the current goes to its new
-value exponentially, with one time constant for all, as in a coil behind a driver that holds a voltage; it is
-never beyond the largest of the values, since every piece is a mean of where it comes from and where it goes.
+After each switching the current approaches its new level exponentially, with one time constant, as in a coil
+behind a driver that holds a voltage. It never exceeds the largest level, since every value is a weighted mean
+of the old and the new level.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from printhammer.support.constants import quantity
 from printhammer.support.constants import quantity as measured
 
 DIODE = 0.7
-"""Voltage of a silicon diode, V."""
+"""Forward voltage of a silicon diode, V; the usual textbook value."""
 
 
 class _Driver(Waveform):
-    """A supply switched on for a time, and what the current does after it."""
+    """Supply switched on for a time, and the path of the current afterwards."""
 
     quantity: QuantityName = "voltage"
     voltage: float = measured("V", "V", "voltage of the supply", gt=0.0)
@@ -62,12 +62,12 @@ class _Driver(Waveform):
 
     @property
     def replaces(self) -> bool:
-        """Always: a driver is one output stage."""
+        """Whether the latest firing replaces earlier ones: always, a driver has a single output stage."""
         return True
 
     @property
     def series(self) -> float:
-        """Resistance that the current of one coil meets in the supply, ohm."""
+        """Resistance of the supply as seen by the current of one coil, ohm."""
         return self.source_resistance * self.coils
 
     @property
@@ -80,11 +80,11 @@ class _Driver(Waveform):
         return Supply(diode=self.diode_voltage, coils=self.coils)
 
     def scaled(self, factor: float) -> Self:
-        """Return the same driver on a supply of another voltage; its currents are not in proportion."""
+        """Return the driver with its supply voltage scaled by `factor`; currents do not scale with it."""
         return type(self)(**{**self.model_dump(), "voltage": self.voltage * factor})
 
     def _off(self, at: float) -> tuple[float, ...]:
-        """Return the row of the piece that begins when the supply is switched off."""
+        """Return the row of the segment that begins when the supply is switched off."""
         against = self.decay_voltage
         if against is None:
             against = self.voltage if self.decay == "rail" else DIODE
@@ -96,7 +96,7 @@ class _Driver(Waveform):
 
 
 class Rail(_Driver):
-    """The supply on for the width, then off."""
+    """Supply on for the width, then off."""
 
     shape: ClassVar[str] = "rail"
 
@@ -106,7 +106,7 @@ class Rail(_Driver):
 
 
 class Chopper(_Driver):
-    """The supply on for the width, chopped between two currents, or off for a fixed time at the upper one.
+    """Supply on for the width, chopped between two currents, or off for a fixed time at the upper current.
 
     While it is chopped off, the current circulates through a diode.
     """
@@ -131,7 +131,7 @@ class Chopper(_Driver):
 
 
 class PeakAndHold(_Driver):
-    """The full supply for a time, then chopped between two lower currents for the rest of the width."""
+    """Full supply for a time, then chopped between two lower currents for the rest of the width."""
 
     shape: ClassVar[str] = "peak-and-hold"
     peak_time: float = measured("s", "tp", "time of the full supply", gt=0.0)
@@ -158,7 +158,7 @@ class PeakAndHold(_Driver):
 
 
 class Capacitor(_Driver):
-    """A capacitor that is discharged through the coil for the width, and charged from the supply always."""
+    """Capacitor discharged through the coil for the width, and always charged from the supply."""
 
     shape: ClassVar[str] = "capacitor"
     capacitance: float = measured("F", "C", "capacitance", gt=0.0)
@@ -181,7 +181,7 @@ class Capacitor(_Driver):
 
 
 class Bridge(_Driver):
-    """An H-bridge: the supply for the width, then for a time the reversed supply, then off."""
+    """H-bridge: supply for the width, then reversed supply for a time, then off."""
 
     shape: ClassVar[str] = "bridge"
     reverse: float = measured("s", "tr", "time of the reversed supply", gt=0.0)
@@ -193,13 +193,13 @@ class Bridge(_Driver):
 
 
 DRIVERS: tuple[type[Waveform], ...] = (Rail, Chopper, PeakAndHold, Capacitor, Bridge)
-"""The drivers."""
+"""Classes of the drivers."""
 
 _KEPT: Final = 256
 
 
 class Switched(Waveform):
-    """A drive switched between values.
+    """Drive switched between levels.
 
     Attributes
     ----------
@@ -207,11 +207,11 @@ class Switched(Waveform):
         Times of the switchings since the firing, s or strings with units, ascending, the first one not
         negative.
     levels : tuple of float
-        Value to which each switching leads, A, or strings with units; in N it is a force. The last one is 0.
+        Level after each switching, A, or strings with units; in N for a force. The last level is 0.
     edge : float
         Time constant of the edges, s.
     initial : float
-        Value at the firing, A or N, which is 0 unless a run begins within a pulse.
+        Value at the firing, A or N; 0 unless a run begins within a pulse.
     """
 
     shape: ClassVar[str] = "switched"
@@ -223,7 +223,7 @@ class Switched(Waveform):
     @model_validator(mode="before")
     @classmethod
     def _read_columns(cls, data: Any) -> Any:
-        """Turn strings with units into SI numbers; the unit of the levels decides what is driven."""
+        """Convert strings with units to SI; the unit of the levels determines the driven quantity."""
         if not isinstance(data, dict):
             return data
         result = dict(data)
@@ -261,7 +261,7 @@ class Switched(Waveform):
         return switched_table(self.at, self.levels, self.edge, self.initial)
 
     def scaled(self, factor: float) -> Self:
-        """Return the same waveform with every value multiplied by a factor."""
+        """Return a copy scaled by `factor`."""
         levels = tuple(factor * level for level in self.levels)
         return self.model_copy(update={"levels": levels, "initial": factor * self.initial})
 
@@ -289,12 +289,12 @@ def _has_text(entries: object) -> bool:
 
 
 def _number(entry: object, unit: str, name: str) -> Any:
-    """Read one entry of a column; one that is no text is left to pydantic."""
+    """Parse an entry of a column; pydantic validates entries that are not text."""
     return read_number(entry, unit, name) if isinstance(entry, str) else entry
 
 
 def _levels(entries: Any) -> tuple[tuple[Any, ...], str]:
-    """Read levels, all of them A or all of them N, and return the unit as well."""
+    """Parse levels, all in A or all in N; return them with their unit."""
     for unit in QUANTITY_UNITS:
         try:
             return tuple(_number(entry, unit, "levels") for entry in entries), unit

@@ -1,6 +1,6 @@
-"""A sampled waveform: a measured record of current or force.
+"""Sampled waveforms: measured records of a current or force.
 
-Records of a measured current or force: checked samples, and CSV files with units in the heading.
+Records are validated samples, from arrays or from CSV files with units in the heading.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
 
 @dataclass(frozen=True)
 class Samples:
-    """Samples in SI: times since the firing, values, and what they drive."""
+    """Samples in SI: times since the firing, values, and the driven quantity."""
 
     times: tuple[float, ...]
     values: tuple[float, ...]
@@ -35,7 +35,7 @@ class Samples:
 
 
 def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName, what: str) -> Samples:
-    """Check samples and make a record of them.
+    """Validate samples and return them as a record.
 
     Raises
     ------
@@ -89,13 +89,13 @@ def read_csv(path: Path) -> Samples:
     """Read a record from a CSV file.
 
     Its columns are ``time [unit]`` and ``current [unit]`` or ``force [unit]``. Blank lines and lines that
-    begin with # are passed over.
+    begin with # are skipped.
 
     Raises
     ------
     InputError
-        The file cannot be read, is empty, lacks units, or holds something else than finite numbers at
-        increasing times.
+        The file cannot be read, is empty, lacks units, or holds anything but finite numbers at increasing
+        times.
     """
     what = str(path)
     rows = read_sheet(path, "the sampled waveform").rows
@@ -124,7 +124,7 @@ def read_csv(path: Path) -> Samples:
 
 
 def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
-    """Return the unit of time, what is driven, and its unit."""
+    """Return the unit of time, the driven quantity, and its unit."""
     if len(cells) != 2:
         raise InputError(
             f"{what}: {len(cells)} columns", file=what, key="columns", expected=f"the 2 columns {_HEADINGS}"
@@ -159,13 +159,13 @@ Interpolation = Literal["pchip", "linear"]
 
 
 class Sampled(Waveform):
-    """A measured record: samples joined by a curve, zero before the first and from the last on.
+    """Measured record: interpolated samples, zero before the first and from the last on.
 
     The file is a CSV with units in its heading, ``time [us],current [A]`` or ``time [us],force [N]``; times
-    are counted from the firing, are not negative and increase. Between samples the curve is a
-    shape-preserving cubic (PCHIP: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238, with the slopes
-    of Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300), once continuously differentiable and
-    without overshoot, or a straight line.
+    count from the firing, are not negative and increase. Between samples the curve is a shape-preserving
+    cubic (PCHIP: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238, with the slopes of Fritsch and
+    Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300), once continuously differentiable and without overshoot,
+    or a straight line.
     """
 
     shape: ClassVar[str] = "sampled"
@@ -197,7 +197,7 @@ class Sampled(Waveform):
         interpolation: Interpolation = "pchip",
         file: str = "",
     ) -> Self:
-        """Make a sampled waveform from arrays, SI; `file` is only remembered."""
+        """Create a sampled waveform from arrays, SI; `file` is stored as its name only."""
         record = checked(times, values, quantity, "sampled waveform")
         fields = {"file": file, "interpolation": interpolation}
         return cls.model_validate(fields, context={"record": record})
@@ -221,7 +221,7 @@ class Sampled(Waveform):
         else:
             from scipy.interpolate import PchipInterpolator
 
-            # Slopes so small that their inverse overflows become zero, as they should.
+            # Slopes whose inverse overflows are set to zero.
             with np.errstate(over="ignore"):
                 cubics = np.asarray(PchipInterpolator(t, y).c)[::-1].T
         starts = t[:-1].tolist()
@@ -229,11 +229,11 @@ class Sampled(Waveform):
         return table(rows, float(t[-1]))
 
     def scaled(self, factor: float) -> Self:
-        """Return the same record with every sample multiplied by a factor."""
+        """Return a copy scaled by `factor`."""
         return self.from_samples(
             self.times, self.values * factor, quantity=self.quantity, interpolation=self.interpolation
         )
 
     def content(self) -> dict[str, FloatArray]:
-        """Return the samples, which belong to the identity of the waveform: times, s, and values, A or N."""
+        """Return the samples, part of the identity of the waveform: times, s, and values, A or N."""
         return {"times": self.times, "values": self.values}

@@ -1,8 +1,8 @@
-"""The shapes of a current or force pulse.
+"""Shapes of a current or force pulse.
 
-The paper gives no formula for its current pulse. The four shapes here are those of common hammer drivers: a
-half sine, a rectangle whose current rises and decays with the time constant L/R of a coil, a trapezoid, and
-a measured record. `SHAPES` maps the word in a file to the class.
+The paper gives no formula for its current pulse. The four shapes in this module are those of common hammer
+drivers: a half sine, a rectangle whose current rises and decays with the time constant L/R of a coil, a
+trapezoid, and a measured record. `SHAPES` maps the name in a file to the class.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ __all__ = [
 
 
 def _rate(time_constant: float) -> float:
-    """Return 1 / time constant; infinite where the time constant is zero or too small to divide by."""
+    """Return 1 / time constant; infinite for a time constant that is zero or too small to divide by."""
     return 1.0 / time_constant if time_constant > 1e-300 else math.inf
 
 
 class _Pulse(Waveform):
-    """A pulse with an amplitude."""
+    """Pulse with an amplitude."""
 
     amplitude: float = quantity("A", "I", "amplitude of the pulse", also=("N", "V"))
 
     def scaled(self, factor: float) -> Self:
-        """Return the same pulse with its amplitude multiplied by a factor."""
+        """Return a copy with its amplitude scaled by `factor`."""
         return type(self)(**{**self.model_dump(), "amplitude": self.amplitude * factor})
 
 
@@ -61,11 +61,11 @@ class HalfSine(_Pulse):
 
 
 class Rectangle(_Pulse):
-    """Rectangle with exponential rise and decay, the current of a coil switched on and off.
+    """Rectangle with exponential rise and decay: the current of a coil that is switched on and off.
 
-    I(tau) = amplitude (1 - exp(-tau / rise)) for 0 <= tau < width, then I(width) exp(-(tau - width) /
-    decay), and zero from `DECAY_TIMES` decay constants after the width on, where 1e-12 of it is left. A
-    rise or decay of 0 is a sharp edge.
+    I(tau) = amplitude (1 - exp(-tau / rise)) for 0 <= tau < width, then I(width) exp(-(tau - width) / decay),
+    and zero from `DECAY_TIMES` decay constants after the width on, where 1e-12 of it is left. A rise or decay
+    of 0 is a sharp edge.
     """
 
     shape: ClassVar[str] = "rectangle"
@@ -126,4 +126,4 @@ class Sine(_Pulse):
 _PULSES: Final[tuple[type[Waveform], ...]] = (HalfSine, Rectangle, Trapezoid, Sampled)
 
 SHAPES: Final[dict[str, type[Waveform]]] = {shape.shape: shape for shape in (*_PULSES, *DRIVERS)}
-"""Shape of a pulse as a file names it, to its class."""
+"""Waveform class of each shape name."""
