@@ -187,12 +187,13 @@ def two_pulses_660us(context: Context, claim: Claim) -> Measured:
         "peak_after_firing_m": None if peak is None else peak[1],
         "position_at_firing_m": float(x[1]),
         "velocity_at_firing_m_per_s": float(v[1]),
+        "second_coil_work_J": (work := second_coil_work(context, interval)),
     }
     after = "no peak follows" if peak is None else f"the peak after it is {peak[1] * 1e6:.1f} um"
     return Measured(
         value,
         f"Fired again at {x[1] * 1e6:.1f} um with {v[1]:+.3f} m/s: {after}, the pack at"
-        f" {context.front * 1e6:.1f} um.",
+        f" {context.front * 1e6:.1f} um; the coil does {work * 1e3:+.2f} mJ of work.",
     )
 
 
@@ -217,6 +218,7 @@ def two_pulses_700us(context: Context, claim: Claim) -> Measured:
         "flight_time_gain_s": gain,
         "position_at_firing_m": float(x[1]),
         "velocity_at_firing_m_per_s": float(v[1]),
+        "second_coil_work_J": (work := second_coil_work(context, interval)),
     }
     speed = value["velocity_at_half_current_m_per_s"]
     if ratio is None or gain is None:
@@ -227,8 +229,15 @@ def two_pulses_700us(context: Context, claim: Claim) -> Measured:
     return Measured(
         value,
         f"The second dot has {ratio:.3f} of the force of the first and flies {gain * 1e6:.1f} us shorter;"
-        f" at half its current the armature moves at {speed:+.3f} m/s.",
+        f" at half its current the armature moves at {speed:+.3f} m/s, and the coil does"
+        f" {work * 1e3:+.2f} mJ of work.",
     )
+
+
+def second_coil_work(context: Context, interval: float) -> float:
+    """Return the work of the coil on the armature from the second of two firings on, J."""
+    both, first = context.pulses([0.0, interval], interval + TAIL), context.pulses([0.0], interval)
+    return both.energy.coil_work - first.energy.coil_work
 
 
 def half_rise(waveform: Waveform) -> float:

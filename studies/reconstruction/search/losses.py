@@ -341,8 +341,8 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
                 free.append(
                     bool(between.any() and (x[between] > b).all()) or (left >= last and inside.size > 0)
                 )
-                depth = np.nanmax(x[times > left]) - xp if (times > left).any() else 0.0
-                strong.append(max(float(depth) / (geometry()["top"] - xp), 0.0) ** LOADING_EXPONENT)
+                depth = _deepest_distinct(x, times, drives[row].times) - xp
+                strong.append(max(depth / (geometry()["top"] - xp), 0.0) ** LOADING_EXPONENT)
             # From the fastest down, as long as all hang up.
             reach = len(free)
             while reach > 0 and free[reach - 1]:
@@ -353,6 +353,17 @@ def hung(chosen: Sequence[Candidate], scores: Sequence[Score]) -> None:
             worst = max(strong[reach:], default=math.nan)
             score.losses["weak_prints_when_hung_up"] = hinge(worst - top + 0.03, 0.6)
             score.measured |= {"hang_up": lowest, "weak": None if math.isnan(worst) else worst}
+
+
+def _deepest_distinct(x: npt.NDArray[np.float32], times: FloatArray, firings: FloatArray) -> float:
+    """Return how far distinct impacts after the first go, m; 0 where there are none."""
+    inside = x > geometry()["xp"]
+    starts = np.flatnonzero(inside[1:] & ~inside[:-1]) + 1
+    if len(starts) < 2:
+        return 0.0
+    fired = np.searchsorted(firings, times[starts], side="right")
+    distinct = np.diff(fired) <= 1
+    return float(np.fmax.reduceat(x, starts)[1:][distinct].max(initial=0.0))
 
 
 def _highest(drive: PulseTrain) -> float:
