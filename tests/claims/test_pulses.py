@@ -1,8 +1,12 @@
+import itertools
+
+import numpy as np
 import pytest
 
 from printhammer.claims import Context, claims, judge
-from printhammer.claims.bursts import hung_up, spreads
+from printhammer.claims.bursts import hung_up, later_impacts, spreads
 from printhammer.claims.integrators import REFERENCE_TOLERANCE
+from printhammer.claims.pulses import second_coil_work
 from printhammer.drive.trains import PulseTrain
 from printhammer.printing.dots.settling import touches
 
@@ -24,6 +28,33 @@ def test_the_second_dot_is_compared_with_the_first(context: Context) -> None:
     assert value["second_over_first_peak_force"] == pytest.approx(second.peak_force / first.peak_force)
     assert value["flight_time_gain_s"] == pytest.approx(first.flight_time - second.flight_time, abs=1e-12)
     assert value["second_excursion_complete"]
+
+
+@pytest.mark.parametrize("interval", [660e-6, 700e-6])
+def test_the_coil_work_of_the_second_pulse_is_that_of_its_force(context: Context, interval: float) -> None:
+    motion = context.pulses([0.0, interval], interval + 4e-3)
+    times = np.linspace(interval, motion.end, 200_001)
+    x, v = motion.at(times)
+    magnet = context.hammer.constants
+    field, bias = magnet["magnet.Am"].si, magnet["magnet.F0"].si
+    # Equation (3), with the current and without.
+    power = (motion.forces_at(times)["magnet"] - (bias - field**2 / np.sqrt(x))) * v
+    assert second_coil_work(context, interval) == pytest.approx(np.trapezoid(power, times), rel=1e-4)
+
+
+@pytest.mark.parametrize("rate", [500.0, 1000.0, 1800.0])
+def test_an_impact_is_distinct_if_no_other_firing_went_into_it(context: Context, rate: float) -> None:
+    motion = context.train(rate, 9)
+    struck = [contact.t_in for contact in motion.contacts if contact.surface == "pack"]
+    firings = motion.drive.times
+    between = [
+        int(((firings > before) & (firings <= after)).sum()) for before, after in itertools.pairwise(struck)
+    ]
+    assert [distinct for _, distinct in later_impacts(motion)] == [count <= 1 for count in between]
+    if rate == 500.0:
+        assert all(count <= 1 for count in between)
+    if rate == 1000.0:
+        assert max(between) > 1
 
 
 def test_the_first_dot_of_a_burst_is_that_of_a_single_pulse(context: Context) -> None:

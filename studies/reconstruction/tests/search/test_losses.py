@@ -151,6 +151,17 @@ def test_how_much_too_late_an_armature_rises() -> None:
     assert losses._late(np.zeros(200, np.float32), times[:200], 2e-4) == math.inf
 
 
+def test_impacts_that_several_pulses_make_are_not_looked_at() -> None:
+    times, front = np.arange(0.0, 1e-3, 4e-6), losses.geometry()["xp"]
+    x = np.full(len(times), front - 1e-5, np.float32)
+    for start, depth in ((1e-4, 8e-5), (3e-4, 3e-5), (7e-4, 6e-5)):
+        x[(times > start) & (times < start + 1e-4)] = front + depth
+    firings = np.array([0.0, 2e-4, 4e-4, 6e-4])
+    assert losses._deepest_distinct(x, times, firings) == pytest.approx(front + 3e-5)
+    assert losses._deepest_distinct(x, times, firings[:3]) == pytest.approx(front + 6e-5)
+    assert losses._deepest_distinct(x[: len(x) // 4], times, firings) == 0.0
+
+
 def test_losses_do_not_depend_on_the_candidates_beside() -> None:
     chosen = some_candidates()[:4]
     together = looked_at(chosen)
