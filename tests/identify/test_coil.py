@@ -67,6 +67,43 @@ def test_the_voltage_of_the_table_drives_the_coil(tmp_path: Path) -> None:
     assert fit["coil.inductance"].value == pytest.approx(8e-3, rel=1e-5)
 
 
+def case(path: Path, heading: str, rows: str) -> Path:
+    path.write_text("\n".join([heading, *rows.split()]) + "\n", "utf-8")
+    return path
+
+
+def on_a_rail(resistance: str, inductance: str, voltage: str) -> ph.Hammer:
+    coil = {"resistance": resistance, "inductance": inductance}
+    return driven(**coil).replace({"waveform.voltage": voltage, "waveform.width": "20 ms"})
+
+
+def test_a_constant_on_one_row_has_the_noise_of_the_others(tmp_path: Path) -> None:
+    """Made with 10 ohm, 0.2 mH and noise of 2 mA: di/dL of the row is 113 to 178 A/H, so 11 to 20 uH."""
+    rows = """0,-0.0001 120,2.3976 240,2.3949 360,2.3997 480,2.4020 600,2.4027 720,2.4013 840,2.4030
+        960,2.4006 1080,2.4011 1200,2.4004 1320,2.3979 1440,2.3983 1560,2.4008 1680,2.3988 1800,2.4025"""
+    path = case(tmp_path / "one.csv", "time [us],current [A]", rows)
+    fit = ph.fit("coil", path, hammer=on_a_rail("9 ohm", "0.3 mH", "24 V"), locked=0.0)
+    low, high = fit["coil.inductance"].interval
+    assert low < 0.2e-3 < high
+    assert 10e-6 < fit["coil.inductance"].standard_error < 23e-6
+    assert not fit.rejected
+
+
+def test_a_current_that_dips_rejects_the_law(tmp_path: Path) -> None:
+    """A plunger that lets go: a coil of R and L never loses current on a rail."""
+    current = """-0.6 97 91 80.1 68.7 65.2 72.7 84.9 94.1 98.4 99.7 100 100 100 100 100 100 100 100"""
+    rows = " ".join(f"{0.25 * k},{value}" for k, value in enumerate(current.split()))
+    path = case(tmp_path / "dip.csv", "time [ms],current [mA]", rows)
+    fit = ph.fit("coil", path, hammer=on_a_rail("100 ohm", "50 mH", "10 V"), locked=0.0)
+    assert fit.rejected
+    assert fit.p_value < 1e-3
+    assert fit["coil.resistance"].value == pytest.approx(100.0, rel=0.1)
+    # What the data do not determine is said, and has no error of 0.
+    assert fit["coil.inductance"].held
+    assert "coil.inductance" not in fit.keys
+    assert fit.outliers.sum() < 4
+
+
 @pytest.mark.parametrize(
     ("table", "options", "key"),
     [

@@ -11,8 +11,8 @@ from tests.identify import shots
 
 import printhammer as ph
 from printhammer.drive.segments import evaluate
-from printhammer.identify.least_squares import memory_factor, noise_of_record
 from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform
+from printhammer.identify.noise import memory_factor, noise_of_record
 from printhammer.identify.shots.motion import fit_motion
 
 HAMMER = ph.load(CRUDE)

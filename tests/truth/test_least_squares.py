@@ -5,9 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from printhammer.identify.least_squares import sandwich, variance_of
+from printhammer.identify.least_squares import Parameters, sandwich, solve
+from printhammer.identify.noise import variance_of
 from printhammer.identify.result import FittedConstant, student
-from printhammer.identify.static.assemble import runs_p_value
+from printhammer.identify.static.assemble import ratio_p_value, runs_p_value, stretch_p_value
+from printhammer.support.arrays import FloatArray
 
 
 def test_the_sandwich_of_a_mean() -> None:
@@ -31,6 +33,16 @@ def test_the_sandwich_of_two_groups_is_that_of_welch() -> None:
     # Bell and McCaffrey's freedom for equal variances of the noise, by the formula of Satterthwaite.
     parts = np.array([1 / 5, 1 / 40])
     assert freedoms[1] == pytest.approx(parts.sum() ** 2 / (parts**2 / [4, 39]).sum(), rel=1e-12)
+
+
+def test_the_sandwich_of_a_row_that_stands_alone() -> None:
+    """A row that alone determines a parameter has the noise of the others: s^2 (1 + 1 / n)."""
+    n = 15
+    data = np.random.default_rng(4).standard_normal(n)
+    rows = np.column_stack([np.ones(n + 1), np.append(np.zeros(n), 1.0)])
+    covariance, freedoms = sandwich(rows, np.append(data - data.mean(), 0.0))
+    assert covariance[1, 1] == pytest.approx(data.var(ddof=1) * (1 + 1 / n), rel=1e-12)
+    assert freedoms == pytest.approx([n - 1, n - 1], rel=1e-12)
 
 
 def test_the_sandwich_does_not_depend_on_the_scale_of_a_parameter() -> None:
@@ -80,3 +92,108 @@ def test_intervals_are_those_of_student() -> None:
     assert student(np.inf) == pytest.approx(1.95996, abs=1e-5)
     constant = FittedConstant.of("mass", 2.0, 0.1, 4, "kg")
     assert constant.interval == pytest.approx((2.0 - 0.2776, 2.0 + 0.2776), abs=1e-4)
+
+
+class Line:
+    """A law that is linear in its parameters, up to a function of them."""
+
+    def __init__(self, columns: FloatArray, *, product: bool = False) -> None:
+        self.columns, self.product = columns, product
+
+    def value(self, p: FloatArray) -> FloatArray:
+        return np.asarray(self.columns @ ([p[0] * p[1], *p[2:]] if self.product else p))
+
+    def jacobian(self, p: FloatArray) -> FloatArray:
+        if not self.product:
+            return self.columns
+        first = self.columns[:, :1]
+        return np.column_stack([first * p[1], first * p[0], self.columns[:, 1:]])
+
+    def spread(self, p: FloatArray) -> FloatArray:
+        return np.ones((len(self.columns), 1))
+
+
+def noisy_line(seed: int, slope: float) -> tuple[FloatArray, FloatArray]:
+    x = np.linspace(-1.0, 1.0, 40)
+    columns = np.column_stack([np.ones(40), x])
+    return columns, columns @ [2.0, slope] + 0.1 * np.random.default_rng(seed).standard_normal(40)
+
+
+def test_a_parameter_stays_at_the_bound_to_which_the_data_drive_it() -> None:
+    columns, data = noisy_line(5, -3.0)
+    space = Parameters.of(np.array([1.0, 1.0]), low=np.array([-np.inf, 0.0]))
+    solution = solve(Line(columns), data, space, robust=False)
+    assert solution.free.tolist() == [True, False]
+    # Without the slope the constant is the mean, with the error of a mean.
+    assert solution.p == pytest.approx([data.mean(), 0.0], abs=1e-6)
+    assert solution.standard_errors == pytest.approx([data.std(ddof=1) / np.sqrt(40), 0.0], rel=1e-6)
+
+
+def test_of_two_parameters_that_the_data_do_not_tell_apart_one_is_held() -> None:
+    columns, data = noisy_line(6, 1.5)
+    start = np.array([1.0, 3.0, 1.0])
+    solution = solve(Line(columns, product=True), data, start, robust=False)
+    held = np.flatnonzero(~solution.free)
+    assert held.size == 1
+    assert held[0] < 2
+    assert solution.p[held[0]] == start[held[0]]
+    expected = np.linalg.lstsq(columns, data, rcond=None)[0]
+    assert [solution.p[0] * solution.p[1], solution.p[2]] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_parameter_is_held_where_the_noise_hides_what_it_does() -> None:
+    columns, data = noisy_line(7, 0.0)
+    weak = Line(columns * [1.0, 1e-4])
+    solution = solve(weak, data, Parameters.of(np.array([1.0, 5.0]), size=0.0), robust=False)
+    assert solution.free.tolist() == [True, False]
+    assert solution.p[1] == 5.0
+    assert solve(weak, data, np.array([1.0, 5.0]), robust=False).free.all()
+
+
+def test_what_is_known_beforehand_counts_with_its_error() -> None:
+    """Mean and variance of a normal posterior of a mean, the noise estimated."""
+    columns, data = np.ones((4000, 1)), 0.02 + np.random.default_rng(8).standard_normal(4000)
+    known = 0.01
+    solution = solve(Line(columns), data, Parameters.of(np.zeros(1), deviation=known), robust=False)
+    variance = 1.0 / (4000 / data.var() + 1.0 / known**2)
+    assert solution.p[0] == pytest.approx(variance * data.sum() / data.var(), rel=1e-2)
+    assert solution.standard_errors[0] ** 2 == pytest.approx(variance, rel=0.03)
+
+
+def test_the_rows_that_hold_a_parameter_are_never_all_left_out() -> None:
+    """Five rows of forty hold the step; their readings lie far apart."""
+    rng = np.random.default_rng(9)
+    step = np.append(np.zeros(35), np.ones(5))
+    columns = np.column_stack([np.ones(40), step])
+    data = 1.0 + 0.01 * rng.standard_normal(40) + step * np.array([1.0] * 35 + [4.0, -3.0, 9.0, 1.0, -7.0])
+    solution = solve(Line(columns), data, np.array([1.0, 0.5]))
+    assert solution.used[35:].sum() > 1
+    assert solution.standard_errors[1] > 0.1
+    # A wrong reading among rows that others hold too is left out.
+    data[3] = 50.0
+    assert solve(Line(columns), data, np.array([1.0, 0.5])).outliers[3]
+
+
+def test_the_ratio_of_von_neumann_has_its_probabilities() -> None:
+    rng = np.random.default_rng(10)
+    p_values = np.array([ratio_p_value(rng.standard_normal(20)) for _ in range(4000)])
+    for level in (0.01, 0.05, 0.5):
+        assert np.mean(p_values < level) == pytest.approx(level, abs=4 * np.sqrt(level / 4000))
+    assert ratio_p_value(np.sin(np.linspace(0.0, 6.0, 20))) < 1e-4
+    assert np.isnan(ratio_p_value(np.ones(7)))
+
+
+def test_rows_left_out_that_follow_one_another() -> None:
+    """The bound holds, and a stretch of six is no accident."""
+    rng = np.random.default_rng(11)
+    fractions = [
+        stretch_p_value(np.where(rng.random(60) < 0.1, rng.choice([-1.0, 1.0], 60), 0.0)) < 0.05
+        for _ in range(2000)
+    ]
+    assert np.mean(fractions) < 0.05
+    signs = np.zeros(60)
+    assert np.isnan(stretch_p_value(signs))
+    signs[20:26] = 1.0
+    assert stretch_p_value(signs) < 1e-5
+    signs[20:26:2] = -1.0
+    assert np.isnan(stretch_p_value(signs))

@@ -26,6 +26,7 @@ from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError, located
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import quantity_of, unknown
+from printhammer.identify.least_squares import Parameters
 from printhammer.identify.lowpass import bandwidth_of, lowpass_lines, time_constant
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
@@ -104,6 +105,9 @@ _STEP: Final = 1e-4
 _REACH: Final = 1e3
 """Factor by which constants may go away from those that the fit begins with."""
 
+_TOLERANCE: Final = 1e-10
+"""Relative tolerance of the descents: derivatives by differences are no better."""
+
 _SPARE: Final = 4
 """Rows more than parameters, for the errors."""
 
@@ -161,12 +165,13 @@ def fit_coil(
     traces = [_read(path, hammer, place, bandwidth) for path in paths]
     hammer, start = _start(hammer, names, traces[0])
     units = [_unit(hammer, name) for name in names]
-    law = CurrentLaw(hammer, names, traces, start)
+    law = CurrentLaw(hammer, names, traces)
     data = _data(traces)
     enough(data, len(names) + _SPARE, "the constants of the coil and their errors")
     # What the hammer lacks is said here; on the way constants that make no circuit are only passed over.
     law.simulated(start)
-    solution = solved(data, law, start, robust=robust)
+    space = Parameters.of(start, low=start / _REACH, high=start * _REACH, size=0.0, tolerance=_TOLERANCE)
+    solution = solved(data, law, space, robust=robust)
     p_value, why = math.nan, ""
     if solution.residual_scale > _EXACT * float(np.abs(data.values).max()):
         p_value, why = judge(solution, {}, data.abscissa, data.series)
@@ -186,16 +191,14 @@ def fit_coil(
 class CurrentLaw:
     """Currents of all records, A, shape (m,); p are the values of the constants named, SI."""
 
-    def __init__(self, hammer: Hammer, names: list[str], traces: list[Trace], start: FloatArray) -> None:
+    def __init__(self, hammer: Hammer, names: list[str], traces: list[Trace]) -> None:
         self.hammer, self.names, self.traces = hammer, names, traces
-        self.limits = start / _REACH, start * _REACH
         self._values: dict[bytes, FloatArray] = {}
         self._slopes: dict[bytes, FloatArray] = {}
 
     def simulated(self, p: FloatArray) -> FloatArray:
         """Return the currents."""
-        values = np.clip(p, *self.limits).tolist()
-        hammer = self.hammer.replace(dict(zip(self.names, values, strict=True)))
+        hammer = self.hammer.replace(dict(zip(self.names, p.tolist(), strict=True)))
         return np.concatenate(
             [
                 probe_current(
@@ -220,7 +223,7 @@ class CurrentLaw:
         """Return the derivatives by the parameters, by central differences."""
 
         def made() -> FloatArray:
-            steps = _STEP * np.clip(p, *self.limits)
+            steps = _STEP * p
             columns = [
                 (self.value(p + step) - self.value(p - step)) / (2.0 * size)
                 for size, step in zip(steps, np.diag(steps), strict=True)

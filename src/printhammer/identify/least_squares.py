@@ -10,101 +10,44 @@ Methodology 28 (2002) 169; G. W. Imbens and M. Kolesar, Rev. Econ. Stat. 98 (201
 
 An error in the abscissa enters as a column of `spread` that is the squared slope of the law (effective
 variance: J. Orear, Am. J. Phys. 50 (1982) 912).
-
-What residuals and records say of their noise: its size, its outliers, its memory.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, Self
 
 import numpy as np
 
+from printhammer.identify.noise import robust_scale, variance_of
 from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray
 
-_MAD: Final = 1.482602218505602
-"""Standard deviation of a normal distribution over its median absolute deviation."""
-_SPIKE: Final = 10.0
-_FAR: Final = 4.5
-"""Residuals of more standard deviations are outliers: of 100 000 normal ones, less than one."""
-_LONGEST_MEMORY: Final = 8
-
-
-def robust_scale(values: FloatArray) -> float:
-    """Return the standard deviation of normal noise about 0 from its median absolute value."""
-    return _MAD * float(np.median(np.abs(values)))
-
-
-def noise_of_record(values: FloatArray) -> float:
-    """Return the standard deviation of the white noise in evenly spaced samples of something smoother.
-
-    From third differences, which leave no parabola; their median does not see outliers or contacts.
-    """
-    if len(values) < 8:
-        return 0.0
-    return robust_scale(np.diff(values, 3)) / float(np.sqrt(20.0))
-
-
-def running_median(values: FloatArray, width: int) -> FloatArray:
-    """Return the running median over an odd number of samples; at the ends that of the outermost ones."""
-    half = width // 2
-    windows = np.lib.stride_tricks.sliding_window_view(values, width)
-    first, last = np.median(values[:width]), np.median(values[-width:])
-    return np.concatenate([np.full(half, first), np.median(windows, axis=1), np.full(half, last)])
-
-
-def spikes_of(values: FloatArray, noise: float) -> BoolArray:
-    """Return which samples of a record stand out of their neighbours, more than noise and slope explain."""
-    middle = running_median(values, 5)
-    padded = np.pad(middle, 2, mode="edge")
-    return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
-
-
-def outliers_of(residuals: FloatArray, floor: float) -> BoolArray:
-    """Return which residuals of mostly good data are larger than normal noise, or the floor, has them."""
-    return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
-
-
-def memory_factor(residuals: FloatArray) -> float:
-    """Return by how much the variance of a slow average exceeds that of independent residuals.
-
-    An autoregressive process is fitted (Yule and Walker), its order by the Bayes criterion; the factor is its
-    spectrum at frequency 0 over its variance. 1 for white noise.
-    """
-    count = len(residuals)
-    centred = residuals - residuals.mean() if count else residuals
-    longest = min(_LONGEST_MEMORY, count // 20)
-    if longest < 1 or not centred.any():
-        return 1.0
-    r = np.array([float(centred[: count - k] @ centred[k:]) for k in range(longest + 1)]) / count
-    best, factor = count * np.log(r[0]), 1.0
-    error = r[0]
-    a = np.zeros(0)
-    for order in range(1, longest + 1):
-        # Levinson's recursion.
-        reflection = (r[order] - a @ r[order - 1 : 0 : -1]) / error if order > 1 else r[1] / error
-        a = np.append(a - reflection * a[::-1], reflection)
-        error *= 1.0 - reflection * reflection
-        if error <= 0.0:
-            break
-        criterion = count * np.log(error) + order * np.log(count)
-        if criterion < best:
-            best, factor = criterion, error / (1.0 - a.sum()) ** 2 / r[0]
-    return float(factor)
-
-
 _FALSE_OUTLIERS: Final = 0.01
 """How many rows of good data with normal noise are left out, on average, in one fit."""
-
-_CLIP: Final = 2.5
-"""Residuals count as no larger than this, in standard deviations, while the outliers are not known."""
 
 _EXACT: Final = 1e-11
 """Residuals below this part of the data are rounding, not noise."""
 
 _ROUNDS: Final = 30
+
+_ALONE: Final = 0.9
+"""Leverage above which a row alone determines a parameter."""
+
+_HOLDING: Final = 4.0
+"""Ratio of the variances of a parameter without rows and with them from which on they hold it; arbitrary."""
+
+_AT_BOUND: Final = 1e-6
+"""Distance from a bound, as a fraction of the parameter, below which a descent ended there."""
+
+_SINGULAR: Final = 1e-12
+"""Least singular value of a Jacobian with columns of unit length that determines all parameters."""
+
+_RESISTS: Final = 1.0
+"""Increase of the weighted sum of squares, one standard error, up to which a parameter is held elsewhere."""
+
+_DIFFERENCES: Final = 1e-9
+"""Error of derivatives by differences, as a fraction of the largest datum."""
 
 
 class Law(Protocol):
@@ -120,11 +63,48 @@ class Law(Protocol):
         """Return how much each component of the variance has in each row, shape (m, q), not negative."""
 
 
+class Parameters(Declared, eq=False):
+    """Where a fit begins, where it may go, and what is known beforehand; arrays of shape (n,)."""
+
+    start: FloatArray = part("initial guess, and the mean of what is known beforehand")
+    low: FloatArray = part("lower bounds; -inf for none")
+    high: FloatArray = part("upper bounds; inf for none")
+    deviation: FloatArray = part(
+        "standard deviation with which `start` is known beforehand; inf for not at all"
+    )
+    size: FloatArray | None = part(
+        "plausible change of a parameter, its own magnitude at least; a parameter is held where the data do"
+        " not show that change. None to hold only what the Jacobian does not determine at all",
+        default=None,
+    )
+    rest: FloatArray | None = part(
+        "where a parameter is held that the data do not determine; None for `start`", default=None
+    )
+    tolerance: float = part("relative tolerance of the descents", default=1e-15)
+
+    @classmethod
+    def of(
+        cls,
+        start: FloatArray,
+        *,
+        low: FloatArray | float = -math.inf,
+        high: FloatArray | float = math.inf,
+        deviation: FloatArray | float = math.inf,
+        size: FloatArray | float | None = None,
+        rest: FloatArray | None = None,
+        tolerance: float = 1e-15,
+    ) -> Self:
+        """Make parameters without bounds or knowledge but for what is named."""
+        low, high, deviation = (np.broadcast_to(each, start.shape).copy() for each in (low, high, deviation))
+        sizes = None if size is None else np.broadcast_to(size, start.shape).copy()
+        return cls(start, low, high, deviation, sizes, rest, tolerance)
+
+
 class Solution(Declared, eq=False):
     """Parameters and what the residuals say."""
 
     p: FloatArray = part("parameters, shape (n,)")
-    covariance: FloatArray = part("of the parameters, shape (n, n)")
+    covariance: FloatArray = part("of the parameters, shape (n, n); 0 for those held")
     fitted: FloatArray = part("the law, shape (m,)")
     residuals: FloatArray = part("the data less the law, shape (m,)")
     jacobian: FloatArray = part("at `p`, shape (m, n)")
@@ -137,6 +117,8 @@ class Solution(Declared, eq=False):
     residual_scale: float = part("root of the sum of squared residuals over the degrees of freedom")
     condition_number: float = part("of the weighted Jacobian with columns of unit length")
     exact: bool = part("whether the residuals are no more than rounding")
+    parameters: Parameters = part("where the fit began, and where it could go")
+    free: BoolArray = part("parameters that the data determine; the others are held. Shape (n,)")
 
     @property
     def used(self) -> BoolArray:
@@ -154,6 +136,11 @@ class Solution(Declared, eq=False):
         weights: FloatArray = self.variance.min() / self.variance
         return weights
 
+    @property
+    def rows(self) -> FloatArray:
+        """Weighted Jacobian of rows used and free parameters, and a row for each known beforehand."""
+        return _weighted(self.jacobian, self.variance, self.used, self.parameters, self.free)
+
 
 class NoSolutionError(ArithmeticError):
     """No parameters of a law come near the data; `row` is farthest from those that the fit began with."""
@@ -163,41 +150,122 @@ class NoSolutionError(ArithmeticError):
         self.row = row
 
 
-def solve(law: Law, data: FloatArray, start: FloatArray, *, robust: bool = True) -> Solution:
+def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust: bool = True) -> Solution:
     """Fit a law to data, shape (m,), more than it has parameters, from parameters near enough.
 
-    Rows that lie too far off are left out if the fit is to be robust.
+    Rows that lie too far off are left out if the fit is to be robust, but never all that hold a parameter. A
+    parameter that the data do not determine, or that runs to a bound, is held, and the others are fitted
+    again: the weakest direction of the scaled Jacobian (singular values) says which.
 
     Raises
     ------
     NoSolutionError
         The parameters run away, or the law has no finite value on the way.
     """
+    space = start if isinstance(start, Parameters) else Parameters.of(start)
+    free = np.ones(len(space.start), dtype=bool)
+    p = space.start
+    while True:
+        solution = _finite_solution(law, data, space, p, free, robust)
+        if solution is None:
+            with np.errstate(all="ignore"):
+                distances = np.abs(data - law.value(space.start))
+            raise NoSolutionError(int(np.argmax(np.where(np.isnan(distances), np.inf, distances))))
+        weakest = _undetermined(solution, data)
+        if weakest is None:
+            return solution
+        free = free.copy()
+        free[weakest] = False
+        p = _held_at(law, data, solution, free, weakest)
+
+
+def _finite_solution(
+    law: Law, data: FloatArray, space: Parameters, start: FloatArray, free: BoolArray, robust: bool
+) -> Solution | None:
     # A row very far off can drive the first fit, which counts it in full, away; a second try leaves that out.
     for plain_first in (True, False) if robust else (True,):
         with np.errstate(all="ignore"):
             try:
-                solution = _solve(law, data, start, robust, plain_first)
+                solution = _solve(law, data, space, start, free, robust, plain_first)
             except (ArithmeticError, ValueError):
                 # What SciPy and LAPACK raise where residuals or Jacobian are not finite.
                 continue
         if np.isfinite(solution.p).all() and np.isfinite(solution.covariance).all():
             return solution
+    return None
+
+
+def _at_bound(solution: Solution) -> BoolArray:
+    """Return which parameters ended at a bound, shape (n,)."""
+    space, p = solution.parameters, solution.p
+    room = np.minimum(p - space.low, space.high - p)
+    at_bound: BoolArray = room <= _AT_BOUND * np.maximum(np.abs(p), np.abs(space.start))
+    return at_bound
+
+
+def _undetermined(solution: Solution, data: FloatArray) -> int | None:
+    """Return the parameter to hold next; None where the data determine all that are free."""
+    space, free = solution.parameters, np.flatnonzero(solution.free)
+    bound = [k for k in free.tolist() if _at_bound(solution)[k]]
+    if bound:
+        return int(bound[0])
+    if len(free) < 2 and space.size is None:
+        return None
+    rows, limit = solution.rows, _SINGULAR
+    if space.size is None:
+        rows = rows / lengths_of(rows)
+    else:
+        # Derivatives of laws that are computed by differences are no better than this, of the largest datum.
+        noise = _DIFFERENCES * float(np.abs(data).max()) if solution.exact else 1.0
+        rows, limit = rows * np.maximum(space.size, np.abs(solution.p))[free], noise
+    _, singular, directions = np.linalg.svd(rows, full_matrices=False)
+    if singular[-1] >= limit:
+        return None
+    return int(free[np.argmax(np.abs(directions[-1]))])
+
+
+def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
+    """Return parameters with one held at rest, or where it is if it is at a bound or the data resist."""
+    p, space = solution.p.copy(), solution.parameters
+    if _at_bound(solution)[held]:
+        return p
+    p[held] = (space.start if space.rest is None else space.rest)[held]
+    used, root = solution.used, np.sqrt(solution.variance[solution.used])
     with np.errstate(all="ignore"):
-        distances = np.abs(data - law.value(start))
-    raise NoSolutionError(int(np.argmax(np.where(np.isnan(distances), np.inf, distances))))
+        try:
+            p = descend(law, data, solution.variance, used, space, p, free)
+            after = float(np.sum(((data - law.value(p))[used] / root) ** 2))
+        except (ArithmeticError, ValueError):
+            return solution.p
+    before = float(np.sum((solution.residuals[used] / root) ** 2))
+    allowed = (_DIFFERENCES * float(np.abs(data).max())) ** 2 * len(data) if solution.exact else _RESISTS
+    return p if after <= before + allowed else solution.p
 
 
-def _solve(law: Law, data: FloatArray, start: FloatArray, robust: bool, plain_first: bool) -> Solution:
-    m, n = len(data), len(start)
+def _solve(
+    law: Law,
+    data: FloatArray,
+    space: Parameters,
+    start: FloatArray,
+    free: BoolArray,
+    robust: bool,
+    plain_first: bool,
+) -> Solution:
+    m, n = len(data), int(free.sum())
     used = np.ones(m, dtype=bool)
-    p = _least_squares(law, data, np.ones(m), used, start) if plain_first else start
+    p = np.where(free, np.clip(start, space.low, space.high), start)
+    guess = np.ones(m)
+    if np.isfinite(space.deviation[free]).any():
+        # What is known beforehand counts by the noise of the data, of which nothing is known yet.
+        guess *= robust_scale(data - law.value(p)) ** 2 or 1.0
+    if plain_first:
+        p = descend(law, data, guess, used, space, p, free)
     if robust:
         for _ in range(3):
             scale = robust_scale(data - law.value(p))
             if scale <= _EXACT * np.abs(data).max():
                 break
-            p = _least_squares(law, data, np.full(m, scale * scale), used, p, loss="soft_l1")
+            p = descend(law, data, np.full(m, scale * scale), used, space, p, free, loss="soft_l1")
     exact = _is_exact(data, data - law.value(p))
     variance = np.ones(m)
     tried: set[bytes] = set()
@@ -209,7 +277,9 @@ def _solve(law: Law, data: FloatArray, start: FloatArray, robust: bool, plain_fi
         else:
             variance = variance_of(law.spread(p), residuals, used, n, clipped=robust and step == 0)
         if robust and not exact:
-            inside = _inside(law.jacobian(p), residuals, variance, used)
+            jacobian = law.jacobian(p)
+            inside = _inside(jacobian[:, free], residuals, variance, used)
+            inside = _keep_what_holds(_weighted(jacobian, variance, None, space, free), inside)
             if inside.tobytes() in tried:
                 # Where rows come and go by turns they stay out.
                 inside &= used
@@ -218,19 +288,53 @@ def _solve(law: Law, data: FloatArray, start: FloatArray, robust: bool, plain_fi
             inside = used
         if inside.sum() <= n:
             inside = used
-        after = _least_squares(law, data, variance, inside, p)
+        after = descend(law, data, variance, inside, space, p, free)
         same = bool(np.array_equal(inside, used))
         moved = bool(np.any(np.abs(after - p) > 1e-9 * np.abs(after)))
         p, used = after, inside
         if step > 0 and same and (exact or not moved):
             break
-    return _solution(law, data, p, variance, used, exact=exact)
+    return _solution(law, data, space, p, free, variance, used, exact=exact)
+
+
+def _keep_what_holds(rows: FloatArray, inside: BoolArray) -> BoolArray:
+    """Return the rows to use: where those left out hold a parameter, all that hold it are used.
+
+    A parameter is held by rows without which its variance is more than `_HOLDING` times as large. Shapes (m
+    and more, n), the weighted Jacobian, and (m,).
+    """
+    if inside.all():
+        return inside
+    scaled = rows / lengths_of(rows)
+    # What is known beforehand is no row that can be left out.
+    kept = np.concatenate([inside, np.ones(len(rows) - len(inside), dtype=bool)])
+    all_rows = np.linalg.pinv(scaled)
+    before, after = np.sum(all_rows**2, axis=1), np.sum(np.linalg.pinv(scaled[kept]) ** 2, axis=1)
+    if np.linalg.matrix_rank(scaled[kept]) < np.linalg.matrix_rank(scaled):
+        after = np.full_like(before, np.inf)
+    lost = after > _HOLDING * before
+    share = all_rows[:, : len(inside)] ** 2 / before[:, np.newaxis]
+    holding: BoolArray = inside | (share[lost] > 1.0 / len(inside)).any(axis=0)
+    return holding
+
+
+def _weighted(
+    jacobian: FloatArray, variance: FloatArray, used: BoolArray | None, space: Parameters, free: BoolArray
+) -> FloatArray:
+    """Return the weighted Jacobian of the free parameters, and a row for each that is known beforehand."""
+    rows = jacobian[:, free] / np.sqrt(variance)[:, None]
+    rows = rows if used is None else rows[used]
+    known = np.isfinite(space.deviation)
+    prior: FloatArray = np.diag(1.0 / space.deviation)[known][:, free]
+    return np.concatenate([rows, prior[prior.any(axis=1)]])
 
 
 def _solution(
     law: Law,
     data: FloatArray,
+    space: Parameters,
     p: FloatArray,
+    free: BoolArray,
     variance: FloatArray,
     used: BoolArray,
     *,
@@ -238,14 +342,16 @@ def _solution(
 ) -> Solution:
     fitted = law.value(p)
     residuals, jacobian = data - fitted, law.jacobian(p)
-    freedom = int(used.sum()) - len(p)
-    root = np.sqrt(variance[used])
-    rows, errors = jacobian[used] / root[:, None], residuals[used] / root
-    length = lengths_of(rows)
-    singular = np.linalg.svd(rows / length, compute_uv=False)
-    condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else math.inf
+    freedom = int(used.sum()) - int(free.sum())
+    rows = _weighted(jacobian, variance, used, space, free)
+    errors = residuals[used] / np.sqrt(variance[used])
+    singular = np.linalg.svd(rows / lengths_of(rows), compute_uv=False)
+    condition = 1.0
+    if singular.size:
+        condition = float(singular[0] / singular[-1]) if singular[-1] > 0.0 else math.inf
     scale = math.sqrt(float(np.sum(residuals[used] ** 2)) / max(freedom, 1))
-    covariance, freedoms = sandwich(rows, errors)
+    covariance, freedoms = np.zeros((len(p), len(p))), np.full(len(p), float(max(freedom, 1)))
+    covariance[np.ix_(free, free)], freedoms[free] = sandwich(rows, errors)
     return Solution(
         p,
         covariance,
@@ -259,33 +365,44 @@ def _solution(
         scale,
         condition,
         exact,
+        space,
+        free,
     )
 
 
 def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the covariance HC2 of a linear regression, shape (n, n), and its degrees of freedom, shape (n,).
 
-    Of the weighted Jacobian, shape (m, n), and the weighted residuals. The freedoms are for the Student's t
-    of each parameter, those of Bell and McCaffrey.
+    Of the weighted Jacobian, shape (m, n), and the weighted residuals; rows beyond the residuals are what is
+    known beforehand, with a variance of 1. The freedoms are for the Student's t of each parameter, those of
+    Bell and McCaffrey. A row that alone determines a parameter has no residual of its own: what its residual
+    leaves open of its variance is that of all rows together.
     """
-    m, n = rows.shape
+    n, m = rows.shape[1], len(errors)
     length = lengths_of(rows)
     inverse = np.linalg.pinv(rows / length) / length[:, None]
-    basis = _basis(rows)
-    own = np.sum(basis * basis, axis=1)
-    # A row that alone determines a parameter has no residual of its own; it counts like one with 0.9.
-    half = inverse / np.sqrt(np.maximum(1.0 - own, 0.1))
-    covariance: FloatArray = (half * errors) @ (half * errors).T
+    basis = _basis(rows)[:m]
+    own = np.minimum(np.sum(basis * basis, axis=1), 1.0)
+    left = float(np.sum(1.0 - own))
+    alone = own > _ALONE
+    divisor = np.where(alone, 1.0, 1.0 - own)
+    pooled = float(errors @ errors) / left if left > 0.0 else 0.0
+    variances = errors**2 / divisor + np.where(alone, own * pooled, 0.0)
+    half = inverse * np.sqrt(np.concatenate([variances, np.ones(len(rows) - m)]))
+    covariance: FloatArray = half @ half.T
     freedoms = np.full(n, float(max(m - n, 1)))
     if m <= n:
         return covariance, freedoms
     for k in range(n):
         # The estimated variance is the quadratic form (1 - H) D (1 - H) of the noise, H the projection on the
         # rows, D diagonal; its mean and spread give the freedom.
-        d = half[k] ** 2
-        trace = float(d @ (1.0 - own))
+        each = inverse[k, :m] ** 2
+        d = each / divisor + float(each[alone] @ own[alone]) / max(left, 1e-300)
         inner = basis.T @ (d[:, None] * basis)
-        freedoms[k] = trace**2 / (float(d**2 @ (1.0 - 2.0 * own)) + float(np.sum(inner * inner)))
+        spread = float(d**2 @ (1.0 - 2.0 * own)) + float(np.sum(inner * inner))
+        mean = float(d @ (1.0 - own)) + float(np.sum(inverse[k, m:] ** 2))
+        if spread > 0.0:
+            freedoms[k] = mean**2 / spread
     return covariance, freedoms
 
 
@@ -308,83 +425,55 @@ def lengths_of(rows: FloatArray) -> FloatArray:
     return lengths
 
 
-def _least_squares(
+def descend(
     law: Law,
     data: FloatArray,
     variance: FloatArray,
     used: BoolArray,
+    space: Parameters,
     start: FloatArray,
+    free: BoolArray,
     loss: Any = "linear",
 ) -> FloatArray:
+    """Return the parameters of the least weighted squares near `start`; those that are not free stay."""
     from scipy.optimize import least_squares
 
+    if not free.any():
+        return start
     root = np.sqrt(variance[used])
+    known = free & np.isfinite(space.deviation)
 
-    def residuals(p: FloatArray) -> FloatArray:
-        return (law.value(p)[used] - data[used]) / root
+    def full(values: FloatArray) -> FloatArray:
+        p = start.copy()
+        p[free] = values
+        return p
 
-    def jacobian(p: FloatArray) -> FloatArray:
-        return law.jacobian(p)[used] / root[:, None]
+    def residuals(values: FloatArray) -> FloatArray:
+        p = full(values)
+        prior = (p[known] - space.start[known]) / space.deviation[known]
+        return np.concatenate([(law.value(p)[used] - data[used]) / root, prior])
+
+    def jacobian(values: FloatArray) -> FloatArray:
+        return _weighted(law.jacobian(full(values)), variance, used, space, free)
 
     solution = least_squares(
         residuals,
-        start,
+        start[free],
         jac=jacobian,
+        bounds=(space.low[free], space.high[free]),
         method="trf",
         loss=loss,
         x_scale="jac",
-        ftol=1e-15,
-        xtol=1e-15,
-        gtol=1e-15,
+        ftol=space.tolerance,
+        xtol=space.tolerance,
+        gtol=space.tolerance,
         max_nfev=200,
     )
-    return np.asarray(solution.x, dtype=np.float64)
+    return full(np.asarray(solution.x, dtype=np.float64))
 
 
 def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
     return bool(np.sqrt(np.mean(residuals**2)) <= _EXACT * np.abs(data).max())
-
-
-def variance_of(
-    spread: FloatArray,
-    residuals: FloatArray,
-    used: BoolArray,
-    parameters: int,
-    *,
-    clipped: bool = False,
-) -> FloatArray:
-    """Return the variance of each row, shape (m,), by maximum likelihood of its components.
-
-    Each step multiplies every component by the root of the ratio of what the residuals ask for to what they
-    have; a component that is not needed goes to zero. Each component has its `spread`, shape (m, q), in each
-    row; only the rows used count, and the parameters of the law take up as many residuals. Where the outliers
-    are not known yet, large residuals are clipped.
-    """
-    from scipy.stats import chi2
-
-    g, r2 = spread[used], residuals[used] ** 2
-    size = g.mean(axis=0)
-    g = g[:, size > 0.0] / size[size > 0.0]
-    kept = spread[:, size > 0.0] / size[size > 0.0]
-    first = robust_scale(residuals[used]) ** 2 if clipped else float(r2.mean())
-    theta = np.full(g.shape[1], (first or float(r2.mean())) / g.shape[1])
-    limit = _CLIP * _CLIP
-    # Mean of a squared normal number that is cut at the limit.
-    mean = float(chi2.cdf(limit, 3) + limit * chi2.sf(limit, 1)) if clipped else 1.0
-    share = len(r2) / (len(r2) - parameters) if len(r2) > parameters else 1.0
-    for _ in range(500):
-        v = g @ theta
-        ratio = share * r2 / v
-        if clipped:
-            ratio = np.minimum(ratio, limit)
-        factor = np.sqrt((g.T @ (ratio / (mean * v))) / (g.T @ (1.0 / v)))
-        theta = theta * factor
-        if np.abs(np.where(theta > 1e-9 * theta.max(), factor, 1.0) - 1.0).max() < 1e-6:
-            break
-    # Weights that rest on a handful of residuals would follow their noise: no row counts 1e4 times another.
-    v = kept @ theta
-    variance: FloatArray = np.maximum(v, 1e-4 * v.max())
-    return variance
 
 
 def _inside(jacobian: FloatArray, residuals: FloatArray, variance: FloatArray, used: BoolArray) -> BoolArray:

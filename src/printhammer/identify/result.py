@@ -48,6 +48,9 @@ REPLACED: Final = {
 """Constants from which another one follows, and which go where that one is given itself, by its key."""
 
 
+HELD: Final = "held, the data do not determine it"
+"""Source of a constant that a fit held."""
+
 _SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}
 """Units that make handy numbers of what a hammer has."""
 
@@ -70,6 +73,11 @@ class FittedConstant(Declared):
     how: str = part(
         'how it was found if not by the fit to the files, such as "computed from radii and Young\'s moduli"',
         default="",
+    )
+    held: bool = part(
+        "whether the data do not determine it, so that it was held; the interval is where it could go, the"
+        " standard error infinite",
+        default=False,
     )
 
     @classmethod
@@ -98,6 +106,8 @@ class FittedConstant(Declared):
             for number in (self.value, self.standard_error, *self.interval)
         )
         digits = 6
+        if self.held:
+            return f"{value:.{digits}g}", "held", "not determined", "" if unit == "1" else unit
         if error > 1e-12 * abs(value):
             digits = 2 + math.floor(math.log10(max(abs(value), error))) - math.floor(math.log10(error))
         centre, least, most = (f"{number:.{digits}g}" for number in (value, low, high))
@@ -265,7 +275,7 @@ class Fit(Result):
             key: {
                 "value": constant.value,
                 "unit": constant.unit,
-                "status": "derived",
+                "status": "assumed" if constant.held else "derived",
                 "source": self._source(constant),
             }
             for key, constant in self.constants.items()
@@ -283,7 +293,7 @@ class Fit(Result):
         """Return the source of a constant, such as "fitted to magnet.csv, standard error 0.02 N"."""
         how = constant.how or f"fitted to {' and '.join(self.source)}"
         error = constant.standard_error
-        return f"{how}, standard error {error:.2g} {constant.unit}" if error else how
+        return f"{how}, standard error {error:.2g} {constant.unit}" if error and not constant.held else how
 
     def fragment(self) -> str:
         """Return the constants as TOML text for a hammer file, with comments on what they hold for."""
@@ -318,7 +328,13 @@ class Fit(Result):
         InputError
             The hammer has another law for the part, or takes as different what the fit took as known.
         """
-        constants = self.for_file
+        known = hammer.constants
+        # What was held as the hammer has it stays as it is there, with its source.
+        constants = {
+            key: table
+            for key, table in self.for_file.items()
+            if not (self[key].held and key in known and known[key].si == self[key].value)
+        }
         sections = {key.rpartition(".")[0] for key in constants} & set(self._laws)
         for section in sorted(sections):
             part = hammer.parts.get(section)
@@ -340,7 +356,7 @@ class Fit(Result):
 
     def _uncertainty(self, hammer: Hammer, set_anew: set[str]) -> dict[str, Any] | None:
         """Return how well a hammer with the constants is known: these, the others, and both together."""
-        own = [key for key, constant in self.constants.items() if constant.in_file]
+        own = [key for key, each in self.constants.items() if each.in_file and not each.held]
         before = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
         rest = before.without(set_anew)
         count = len(own)
@@ -367,6 +383,9 @@ class Fit(Result):
         lines = []
         for constant in self.constants.values():
             low, high = constant.interval
+            if constant.held:
+                lines.append(f"{constant.key} = {constant.value:.6g} {constant.unit}, {HELD}")
+                continue
             lines.append(
                 f"{constant.key} = {constant.value:.6g} {constant.unit}, standard error"
                 f" {constant.standard_error:.2g}, 95 % interval {low:.6g} to {high:.6g}"

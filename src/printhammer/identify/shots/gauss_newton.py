@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import memory_factor, outliers_of, spikes_of
+from printhammer.identify.noise import memory_factor, outliers_of, spikes_of
 from printhammer.identify.result import Profile, student
 from printhammer.identify.shots.approach import Approach, Prior, Priors, largest_gap
 from printhammer.identify.shots.shooting import Chain, Shooting

@@ -19,8 +19,8 @@ from printhammer.drive.segments import evaluate
 from printhammer.drive.waveforms.shapes import Sampled, Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.identify.least_squares import noise_of_record, outliers_of, robust_scale, running_median
 from printhammer.identify.lowpass import bandwidth_of, lowpass_waveform
+from printhammer.identify.noise import noise_of_record, outliers_of, robust_scale, running_median
 from printhammer.identify.tables import read_table
 from printhammer.results import Declared, part, scalar
 from printhammer.support.arrays import FloatArray, IntArray

@@ -7,14 +7,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import Law, NoSolutionError, Solution, lengths_of, sandwich, solve
-from printhammer.identify.result import Fit, FittedConstant, Profile, student
+from printhammer.identify.least_squares import (
+    Law,
+    NoSolutionError,
+    Parameters,
+    Solution,
+    descend,
+    lengths_of,
+    sandwich,
+    solve,
+)
+from printhammer.identify.result import HELD, Fit, FittedConstant, Profile, student
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray, IntArray
 
@@ -24,6 +34,7 @@ LEVEL: Final = 0.01
 _RUNS: Final = (
     "residuals of neighbours go together: the data bend another way than the law, or the sensor is slow"
 )
+_TOGETHER: Final = "the rows left out follow one another: there the data leave the law"
 
 _HARD_TO_TELL: Final = 30.0
 """Condition number from which on it is said which constants go together."""
@@ -32,11 +43,13 @@ _HARD_TO_TELL: Final = 30.0
 def judge(
     solution: Solution, terms: Mapping[str, FloatArray], abscissa: FloatArray, series: IntArray
 ) -> tuple[float, str]:
-    """Test a law against ones with one more term each, and its residuals for runs.
+    """Test a law against ones with one more term each, its residuals and the rows left out for runs.
 
     A term is added to the linearised, weighted fit, and Student's t tells whether it is needed, with errors
-    and degrees of freedom as those of the fit. The runs test looks at residuals in the order of the abscissa,
-    series by series. The least probability counts once for each test (Bonferroni).
+    and degrees of freedom as those of the fit. Two tests look at residuals in the order of the abscissa,
+    series by series: the runs of their signs, and von Neumann's ratio. A third one asks whether rows left out
+    follow one another more than single wrong readings do. The least probability counts once for each test
+    (Bonferroni).
 
     Terms are what the law lacks, in the unit of the data, by what their need would mean; they, abscissa and
     series have the shape (m,) of the data. Returned are the probability of so much against the law if it
@@ -47,7 +60,9 @@ def judge(
         return math.nan, ""
     p_values = {why: _need(solution, term) for why, term in terms.items()}
     order = np.lexsort((abscissa, series))
-    p_values[_RUNS] = runs_p_value(solution.residuals[order][solution.used[order]])
+    ordered = (solution.residuals / np.sqrt(solution.variance))[order][solution.used[order]]
+    p_values[_RUNS] = min(1.0, 2.0 * float(np.nanmin([1.0, runs_p_value(ordered), ratio_p_value(ordered)])))
+    p_values[_TOGETHER] = stretch_p_value((np.sign(solution.residuals) * solution.outliers)[order])
     known = {why: p for why, p in p_values.items() if not math.isnan(p)}
     if not known:
         return math.nan, ""
@@ -62,15 +77,15 @@ def _need(solution: Solution, term: FloatArray) -> float:
 
     root = np.sqrt(solution.variance[solution.used])
     errors = solution.residuals[solution.used] / root
-    rows = np.column_stack([solution.jacobian, term])[solution.used] / root[:, None]
+    rows = solution.rows
+    known = np.zeros(len(rows) - len(errors))
+    rows = np.column_stack([rows, np.concatenate([term[solution.used] / root, known])])
     rows = rows / lengths_of(rows)
     if np.linalg.matrix_rank(rows, tol=1e-9) < rows.shape[1]:
         return math.nan
-    need = np.linalg.lstsq(rows, errors, rcond=None)[0]
-    try:
-        covariance, freedoms = sandwich(rows, errors - rows @ need)
-    except ZeroDivisionError:
-        # A row alone determines the term.
+    need = np.linalg.lstsq(rows, np.concatenate([errors, known]), rcond=None)[0]
+    covariance, freedoms = sandwich(rows, errors - rows[: len(errors)] @ need)
+    if not covariance[-1, -1] > 0.0:
         return math.nan
     return 2.0 * float(t.sf(abs(need[-1]) / math.sqrt(covariance[-1, -1]), freedoms[-1]))
 
@@ -94,6 +109,38 @@ def runs_p_value(values: FloatArray) -> float:
     return float(2.0 * norm.sf(abs(runs - mean) / math.sqrt(variance)))
 
 
+def ratio_p_value(values: FloatArray) -> float:
+    """Return the probability that independent residuals of one size differ as little from their neighbours.
+
+    The mean squared difference of neighbours over the mean square is nearly normal with the mean 2 and the
+    variance 4 (n - 2) / (n^2 - 1) (J. von Neumann, Ann. Math. Statist. 12 (1941) 367); NaN for fewer than 8.
+    """
+    from scipy.stats import norm
+
+    n = len(values)
+    square = float(values @ values)
+    if n < 8 or not square > 0.0:
+        return math.nan
+    ratio = float(np.sum(np.diff(values) ** 2)) / square * n / (n - 1.0)
+    return float(norm.cdf((ratio - 2.0) / math.sqrt(4.0 * (n - 2.0) / (n * n - 1.0))))
+
+
+def stretch_p_value(signs: FloatArray) -> float:
+    """Bound the probability that rows which are wrong by chance follow one another as those left out do.
+
+    `signs` are those of the residuals, 0 for rows used. A stretch of k rows of one sign begins at any of n
+    places with the probability (1/2)^(k - 1) q^k, with q the fraction left out. NaN where no two follow.
+    """
+    longest = length = 0
+    for before, here in zip([0.0, *signs.tolist()], signs.tolist(), strict=False):
+        length = 0 if here == 0.0 else length + 1 if here == before else 1
+        longest = max(longest, length)
+    if longest < 2:
+        return math.nan
+    fraction = float(np.count_nonzero(signs)) / len(signs)
+    return min(1.0, len(signs) * fraction**longest * 0.5 ** (longest - 1))
+
+
 def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
     """Say which parameters the data hardly tell apart; nothing where the condition number is small.
 
@@ -102,9 +149,10 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
     """
     if solution.condition_number < _HARD_TO_TELL:
         return []
-    rows = solution.jacobian[solution.used] / np.sqrt(solution.variance[solution.used])[:, None]
-    weakest = np.linalg.svd(rows / lengths_of(rows))[2][-1]
-    parts = [name for name, part in zip(names, weakest, strict=True) if name and abs(part) > 0.3]
+    rows = solution.rows
+    weakest = np.linalg.svd(rows / lengths_of(rows), full_matrices=False)[2][-1]
+    free = [name for name, is_free in zip(names, solution.free, strict=True) if is_free]
+    parts = [name for name, part in zip(free, weakest, strict=True) if name and abs(part) > 0.3]
     if len(parts) < 2:
         return []
     listed = f"{', '.join(parts[:-1])} and {parts[-1]}"
@@ -116,6 +164,9 @@ _WEAK: Final = 0.1
 """Relative standard error from which on a constant gets a profile."""
 
 _GRID: Final = 25
+
+_COARSE: Final = 1e-8
+"""Relative tolerance of the descents of a profile."""
 
 
 class Data(Declared, eq=False):
@@ -131,7 +182,7 @@ class Data(Declared, eq=False):
     lines: IntArray = part("lines of the files, shape (m,)")
 
 
-def solved(data: Data, law: Law, start: FloatArray, *, robust: bool) -> Solution:
+def solved(data: Data, law: Law, start: FloatArray | Parameters, *, robust: bool) -> Solution:
     """Fit a law to data; see `printhammer.identify.least_squares.solve`.
 
     Raises
@@ -145,12 +196,12 @@ def solved(data: Data, law: Law, start: FloatArray, *, robust: bool) -> Solution
         files = " and ".join(str(path) for path in data.files)
         raise InputError(
             (
-                f"{files}: no constants of the law come near the data, line {data.lines[error.row]}"
-                " lies farthest off"
+                f"{files}: the law does not fit: no constants come near the data, line"
+                f" {data.lines[error.row]} lies farthest off"
             ),
             file=files,
             key=f"line {data.lines[error.row]}",
-            expected="rows in the order of the measurement, and none too far from the others",
+            expected="readings of a device that the law describes",
         ) from None
 
 
@@ -176,20 +227,28 @@ def assemble(
     Raises
     ------
     InputError
-        The 95 % interval of a constant that has to be positive reaches zero; says what is missing.
+        The 95 % interval of a constant that has to be positive reaches zero; says what is missing. Of a law
+        that the data reject, only that is said.
     """
-    kept = [k for k, (key, _unit, _in_file) in enumerate(parameters) if key]
+    kept = [k for k, (key, _unit, _in_file) in enumerate(parameters) if key and solution.free[k]]
     errors = solution.standard_errors
     constants, profiles = {}, {}
-    for k in kept:
-        key, unit, in_file = parameters[k]
+    for k, (key, unit, in_file) in enumerate(parameters):
+        if not key:
+            continue
         value, error = float(solution.p[k]), float(errors[k])
+        if not solution.free[k]:
+            ends = float(solution.parameters.low[k]), float(solution.parameters.high[k])
+            constants[key] = FittedConstant(key, value, math.inf, ends, unit, in_file, HELD, held=True)
+            continue
         freedom = float(solution.freedoms[k])
         constants[key] = FittedConstant.of(key, value, error, freedom, unit, in_file=in_file)
-        if in_file and error > _WEAK * abs(value) and not solution.exact:
+        if in_file and error > _WEAK * abs(value) and not (solution.exact or rejected):
             profiles[key] = profile(law, data.values, solution, k)
-    for key, remedy in remedies.items():
-        if key in constants and constants[key].interval[0] <= 0.0:
+    unseen = [key for key in remedies if key in constants and not constants[key].held]
+    unseen = [key for key in unseen if constants[key].interval[0] <= 0.0]
+    if not rejected:
+        for key in unseen[:1]:
             low, high = constants[key].interval
             raise InputError(
                 (
@@ -198,8 +257,14 @@ def assemble(
                 ),
                 file=data.files[0],
                 key=key,
-                expected=remedy,
+                expected=remedies[key],
             )
+    held = [
+        f"the data do not determine {key}: it is held at {each.value:.4g} {each.unit}"
+        for key, each in constants.items()
+        if each.held
+    ]
+    held += [f"{key} cannot be distinguished from zero" for key in unseen]
     weak = [
         f"{key} is weakly determined: its profile puts it between {shape.interval[0]:.4g} and"
         f" {shape.interval[1]:.4g} {constants[key].unit}"
@@ -210,7 +275,7 @@ def assemble(
         kind=data.kind,
         source=tuple(path.name for path in data.files),
         constants=constants,
-        keys=tuple(constants),
+        keys=tuple(key for key, each in constants.items() if not each.held),
         covariance=solution.covariance[np.ix_(kept, kept)],
         abscissa=data.abscissa,
         data=data.values,
@@ -226,7 +291,7 @@ def assemble(
         series_names=data.series_names,
         lines=data.lines,
         given=given,
-        indistinct=(*indistinct, *inseparable(solution, names)),
+        indistinct=(*indistinct, *held, *inseparable(solution, names)),
         profiles=profiles,
         rejected=rejected,
         p_value=p_value,
@@ -237,37 +302,24 @@ def assemble(
 def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profile:
     """Hold one parameter at values about the best one and fit the others again.
 
-    The values go up to four standard errors away; rows and weights are as in the fit.
+    The values go up to four standard errors away, within the bounds; rows and weights are as in the fit.
     """
-    from scipy.optimize import least_squares
-
-    used = solution.used
+    used, space = solution.used, replace(solution.parameters, tolerance=_COARSE)
     root = np.sqrt(solution.variance[used])
-    others = np.arange(len(solution.p)) != index
+    others = solution.free & (np.arange(len(solution.p)) != index)
     best, error = solution.p[index], solution.standard_errors[index]
     freedom = max(solution.degrees_of_freedom, 1)
     least = float(np.sum((solution.residuals[used] / root) ** 2))
-    values = best + error * np.linspace(-4.0, 4.0, _GRID)
+    values = np.clip(best + error * np.linspace(-4.0, 4.0, _GRID), space.low[index], space.high[index])
     increase = np.empty(_GRID)
-
-    def full(rest: FloatArray, value: float) -> FloatArray:
-        p = solution.p.copy()
-        p[others], p[index] = rest, value
-        return p
-
-    def residuals(rest: FloatArray, value: float) -> FloatArray:
-        return (law.value(full(rest, value)) - data)[used] / root
-
-    def jacobian(rest: FloatArray, value: float) -> FloatArray:
-        return law.jacobian(full(rest, value))[used][:, others] / root[:, None]
 
     middle = _GRID // 2
     for way in (range(middle, _GRID), range(middle, -1, -1)):
-        rest = solution.p[others]
+        p = solution.p.copy()
         for k in way:
-            if others.any():
-                rest = least_squares(residuals, rest, jac=jacobian, x_scale="jac", args=(values[k],)).x
-            total = float(np.sum(residuals(rest, float(values[k])) ** 2))
+            p[index] = values[k]
+            p = descend(law, data, solution.variance, used, space, p, others)
+            total = float(np.sum(((law.value(p) - data)[used] / root) ** 2))
             increase[k] = max(total - least, 0.0) * freedom / least
     level = student(float(solution.freedoms[index])) ** 2
     ends = (

@@ -19,7 +19,8 @@ from typing import Final
 import numpy as np
 
 from printhammer.errors import InputError
-from printhammer.identify.least_squares import NoSolutionError, Solution, robust_scale, solve
+from printhammer.identify.least_squares import NoSolutionError, Solution, solve
+from printhammer.identify.noise import robust_scale
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
 from printhammer.identify.tables import Readings, read_table

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from printhammer.errors import InputError
+from printhammer.identify.least_squares import Parameters
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, solved
 from printhammer.identify.tables import read_table
@@ -35,6 +36,9 @@ CONSTANTS: Final = {
 
 _REACH: Final = 1e3
 """Factor by which constants may go away from those that the fit begins with."""
+
+_ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
+"""Constants whose effect vanishes where they are large; of the others, where they are small."""
 
 _SPARE: Final = 4
 """Rows more than parameters, for the errors."""
@@ -107,8 +111,11 @@ def fit_solenoid(path: str | Path, *, turns: float, current: float | None = None
     enough(data, len(CONSTANTS) + _SPARE, "the constants of the magnetic circuit and their errors")
     law = CircuitLaw(gap, currents, turns)
     start = _start(law, gap, force, linkage, data.values)
-    law.limits = start / _REACH, start * _REACH
-    solution = solved(data, law, start, robust=robust)
+    least, most = start / _REACH, start * _REACH
+    # Without fringe, iron or an end of the leakage, where the data show none.
+    rest = np.where([name in _ABSENT_HIGH for name in CONSTANTS], most, least)
+    space = Parameters.of(start, low=least, high=most, size=0.0, rest=rest)
+    solution = solved(data, law, space, robust=robust)
     given = {"magnet.turns": f"{turns!r} 1"}
     if "current" not in table.values:
         given["current"] = f"{current!r} A"
@@ -127,13 +134,12 @@ class CircuitLaw:
 
     def __init__(self, gap: FloatArray, current: FloatArray, turns: float) -> None:
         self.turns = turns
-        self.limits: tuple[FloatArray | float, FloatArray | float] = (0.0, math.inf)
         self.widest = float(gap.max())
         self.rows = list(zip(gap.tolist(), current.tolist(), strict=True))
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the logarithms."""
-        constants = dict(zip(CONSTANTS, np.clip(p, *self.limits).tolist(), strict=True))
+        constants = dict(zip(CONSTANTS, p.tolist(), strict=True))
         constants["leakage_reach"] = max(constants["leakage_reach"], (1.0 + 1e-9) * self.widest)
         c = ReluctanceMagnet(turns=self.turns, closed_at=0.0, **constants).packed(0.0)
         forces = [magnet_force(c, -gap, current) for gap, current in self.rows]
@@ -143,7 +149,7 @@ class CircuitLaw:
 
     def jacobian(self, p: FloatArray) -> FloatArray:
         """Return the derivatives by the parameters, by central differences."""
-        steps = 1e-5 * np.clip(p, *self.limits)
+        steps = 1e-5 * p
         columns = [
             (self.value(p + step) - self.value(p - step)) / (2.0 * size)
             for size, step in zip(steps, np.diag(steps), strict=True)
