@@ -69,8 +69,7 @@ def test_a_plain_plunger_without_fringe_and_saturation(tmp_path: Path) -> None:
             close = max(1e-3 * value, 4.0 * constant.standard_error)
             assert abs(constant.value - value) < close < 0.2 * value
         held = [key for key, each in fit.constants.items() if each.held]
-        assert "magnet.leakage_reach" in held
-        assert len(held) >= 3
+        assert {"magnet.fringe_height", "magnet.core_reluctance"} <= set(held)
         assert 'status = "assumed"' in fit.fragment()
 
 
