@@ -70,6 +70,7 @@ FEEDBACK = 10
 FEW = f"feedback, {FEEDBACK} of them"
 ROOMS = (
     *MOTION,
+    "derivatives",
     "control/learning",
     "control/pulses",
     "control/table",

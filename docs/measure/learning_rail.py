@@ -37,6 +37,7 @@ RAIL = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistan
 CYCLE = slots_of(cycle_with_lead_in())
 ROOMS = (
     *MOTION,
+    "derivatives",
     "control/pulses",
     "control/learning",
     "control/impact_estimator",

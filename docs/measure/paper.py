@@ -38,6 +38,7 @@ PAPERS = {
 }
 ROOMS = (
     *MOTION,
+    "derivatives",
     *(
         "control/feedback",
         "control/learning",

@@ -35,6 +35,7 @@ BETWEEN = 2.5
 
 ROOMS = (
     *MOTION,
+    "derivatives",
     "control/pulses",
     "control/table",
     "printing/dots",

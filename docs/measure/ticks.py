@@ -30,6 +30,7 @@ SAFE = 850.0
 TICKS = (None, "1 us", "2 us", "5 us", "10 us", "20 us")
 ROOMS = (
     *MOTION,
+    "derivatives",
     "control/pulses",
     "control/table",
     "printing/dots",

@@ -23,7 +23,7 @@ from printhammer.printing.page.page import Page
 
 RATES = ("1 kHz", "1.3 kHz", "1.6 kHz")
 TEXT = "The quick brown fox\njumps over the lazy dog\n0123456789 !?"
-ROOMS = (*MOTION, "control/feedback", "control/pulses", "control/table", "printing")
+ROOMS = (*MOTION, "derivatives", "control/feedback", "control/pulses", "control/table", "printing")
 LINE = "Bounce and chaos 1983"
 
 

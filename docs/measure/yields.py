@@ -40,7 +40,14 @@ def main() -> None:
     columns.append(Column(name="rate", unit="Hz", format="g"))
     columns += [Column(name=name) for name in ("1 %", "2 %", "1 %, judged by the design")]
     settings = {"number": NUMBER, "spreads": SPREADS}
-    write("yields", columns, rows, settings, (*MOTION, "printing/dots", "printing/rates"), tuple(RATES))
+    write(
+        "yields",
+        columns,
+        rows,
+        settings,
+        (*MOTION, "derivatives", "printing/dots", "printing/rates"),
+        tuple(RATES),
+    )
 
 
 if __name__ == "__main__":

@@ -114,6 +114,7 @@ def test_report(table: CompensationTable) -> None:
     assert (report.good[1] > report.good[0]).all()
     assert report.passed[1, 0].all()
     assert not report.passed[0, 0].any()
+    assert (np.abs(report.multiplier[1]) < 1.0).all()
     chart = report.to_dataset()
     assert chart["driven"].values.tolist() == ["nominal", "travel +5 µm"]
     assert chart["arrival"].attrs["units"] == "s"

@@ -80,6 +80,7 @@ def test_a_rate_that_eight_dots_bear_and_a_row_does_not_is_not_safe() -> None:
     assert safe_rate(hammer, long=False, **grid).at_least
     found = safe_rate(hammer, **grid)
     assert found.rate == 835.0
+    assert (found.multiplier < -1.0).all()
     failure = found.failure
     assert failure is not None
     assert (failure.kind, failure.rate) == ("row", 840.0)

@@ -16,7 +16,7 @@ from printhammer.printing.dots.long_patterns import KINDS, long_patterns
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import Strategy, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
-from printhammer.printing.rates.safe_rate import from_rest
+from printhammer.printing.rates.safe_rate import from_rest, multipliers
 from printhammer.printing.rates.variability import Perturbation, perturbed
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.summary import (
@@ -72,6 +72,13 @@ class TableReport(Result, rows=_AXES):
     arrival: FloatArray = column("s", "largest deviation of the arrival", _AXES, more="of printed dots")
     lost: FloatArray = column("1", "lost dots", _AXES)
     extra: FloatArray = column("1", "extra contacts", _AXES)
+    multiplier: FloatArray = column(
+        "1",
+        "factor by which a small error in a row grows from dot to dot",
+        "strategy driven rate",
+        more="of rows with a dot in every slot or every second one the larger one; NaN where neither is a"
+        " periodic orbit",
+    )
     force_deviation: FloatArray = part(
         "of every dot of the cycle at the first rate, of the hammer that the table is made for, shape"
         " (strategies, dots)",
@@ -99,6 +106,7 @@ class TableReport(Result, rows=_AXES):
         rates = self.rates
         span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
         share, lost = 100.0 * self.good.mean(axis=(2, 3)), self.lost.sum(axis=(2, 3))
+        growth = np.fmax.reduce(np.abs(self.multiplier[1]), axis=1)
         columns = [
             Cells("hammer driven", self.hammers, left=True),
             Cells("open loop:\ngood dots", [f"{each:.2f} %" for each in share[0]]),
@@ -107,6 +115,7 @@ class TableReport(Result, rows=_AXES):
             Cells("lost", lost[1], "", ".0f"),
             Cells("worst force", [f"{100.0 * each:.1f} %" for each in self.force[1].max(axis=(1, 2))]),
             Cells("worst arrival", self.arrival[1].max(axis=(1, 2)), "s"),
+            Cells("multiplier\nof rows", growth, "", ".2f"),
         ]
         return Summary([Grid(columns, f"On patterns it was not tuned on, {span}")])
 
@@ -172,9 +181,12 @@ def judge_table(
     sets = _sets(seed)
     shape = len(strategies), len(driven), asked.size, len(SETS)
     good, force, arrival, lost, extra = (np.zeros(shape) for _ in range(5))
+    growth = np.full(shape[:3], np.nan)
     deviations: list[tuple[FloatArray, FloatArray]] = []
     done = 0
     for s, strategy in enumerate(strategies):
+        for r, rate in enumerate(asked.tolist()):
+            growth[s, :, r] = _growth(driven, rate, strategy, effort.quiet)
         for p, (name, (patterns, begin)) in enumerate(sets.items()):
             for r, rate in enumerate(asked.tolist()):
                 trial = attempt(
@@ -211,11 +223,20 @@ def judge_table(
         arrival=arrival,
         lost=lost,
         extra=extra,
+        multiplier=growth,
         force_deviation=np.array([force for force, _arrival in deviations]),
         arrival_deviation=np.array([late for _force, late in deviations]),
         seed=seed,
         tolerance=effort.tolerance,
     )
+
+
+def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
+    """Return the multipliers of rows of some hammers at a rate, Hz, (hammers,), of each the larger one."""
+    rates = [rate] * len(driven)
+    each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
+    largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)
+    return np.asarray(each[largest, np.arange(len(driven))])
 
 
 def _sets(seed: int) -> dict[str, tuple[Sequence[tuple[int, ...]], int | Sequence[int]]]:

@@ -18,6 +18,7 @@ from typing import Any, Final, Literal, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from printhammer.derivatives.rows import DOTS, row_multipliers
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
@@ -126,6 +127,12 @@ class SafeRate(Result):
         more="they are not where one of these does not pass",
         dtype=np.int8,
     )
+    multiplier: FloatArray = column(
+        "1",
+        "factor by which a small error in a row grows from dot to dot",
+        "rate",
+        more="negative where it alternates; NaN where the row is no periodic orbit, and for a closed loop",
+    )
     peak_drive: float = scalar(
         "A",
         "largest absolute value of the drives at the safe rate",
@@ -144,6 +151,7 @@ class SafeRate(Result):
         none, waveform = math.isnan(self.rate), self.hammer.waveform
         more = "at least " if self.at_least else ""
         first, last = float(self.rates[0]), float(self.rates[-1])
+        growth = self.multiplier[self.rates == self.rate]
         rows = [
             ("limits", self.limits.said),
             ("drive", self.strategy),
@@ -154,6 +162,7 @@ class SafeRate(Result):
                 else styled("best", f"{more}{self.rate:g} Hz"),
             ),
             ("peak", None if none else f"{self.peak_drive:.3f} {waveform.unit if waveform else ''}"),
+            ("row", _said_of_row(growth[0]) if np.isfinite(growth).any() else None),
             ("because", "the grid ends" if self.failure is None else self.failure.text),
             ("grid", f"{first:g} to {last:g} Hz, every {self.step:g} Hz"),
         ]
@@ -225,12 +234,15 @@ def safe_rate(
     patterns = from_rest(every=strategy is not open_loop)
     options: dict[str, Any] = {"limits": bounds, "effort": effort}
     rows: list[dict[str, Any]] = []
+    growth: list[FloatArray] = []
     failure: Failure | None = None
     safe = math.nan
     best: list[tuple[Trial, int]] = []
     for begin in range(0, len(grid), _AT_ONCE):
         cases = [Case(hammer, single, rate) for rate in grid[begin : begin + _AT_ONCE].tolist()]
         trial = attempt(cases, patterns, strategy, **options)
+        rates = [case.rate for case in cases]
+        growth.append(multipliers([hammer] * len(cases), rates, strategy, effort.quiet))
         good = np.flatnonzero(trial.passed)
         if stop and failure is None and not trial.passed.all():
             good = good[good < np.argmin(trial.passed)]
@@ -264,10 +276,17 @@ def safe_rate(
         peak_drive=max(
             (drive.peak for trial, case in best for drive in trial.drives[trial.rows(case)]), default=math.nan
         ),
+        multiplier=np.concatenate(growth)[: len(rows)],
         step=read_positive(step, "Hz", "step"),
         tolerance=effort.tolerance,
         **{name: np.array([row[name] for row in rows]) for name in rows[0]},
     )
+
+
+def _said_of_row(growth: float) -> str:
+    """Return the multiplier of a row, and what comes of it, in words."""
+    more = ": dots alternate, within limits" if growth < -1.0 else ""
+    return f"multiplier {growth:+.3f} from dot to dot{more}"
 
 
 def rate_grid(first: float | str, last: float | str, step: float | str) -> FloatArray:
@@ -305,6 +324,25 @@ def attempt_long(cases: Sequence[Case], strategy: Strategy = open_loop, **option
     patterns = long_patterns()
     begin = [pattern.judged_from for pattern in patterns]
     return attempt(cases, [pattern.slots for pattern in patterns], strategy, judged_from=begin, **options)
+
+
+def multipliers(
+    hammers: Sequence[Hammer],
+    rates: Sequence[float],
+    strategy: Strategy,
+    effort: Effort,
+    step: int = 1,
+) -> FloatArray:
+    """Compute the multipliers of rows with a dot in every `step`-th slot, (rows,).
+
+    Each row has a hammer and a rate, Hz; see `printhammer.derivatives.rows.row_multipliers`. NaN for a closed
+    loop, which corrects errors itself.
+    """
+    if hasattr(strategy, "along"):
+        return np.full(len(hammers), np.nan)
+    slots = tuple(range(0, step * DOTS, step))
+    drives = [strategy(hammer, [slots], rate)[0] for hammer, rate in zip(hammers, rates, strict=True)]
+    return row_multipliers(hammers, drives, effort)
 
 
 def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:

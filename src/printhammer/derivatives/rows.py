@@ -1,0 +1,181 @@
+"""Rows of dots: the periodic orbit of a row, and its multiplier from dot to dot.
+
+A drive that fires the same pulses for every dot of a row has a strobe map, from the state at one firing to
+that at the next. A row of equal dots is a fixed point of this map. The eigenvalues of the derivative there
+are its Floquet multipliers, by which a small error grows from dot to dot: beyond the unit circle a long row
+leaves the fixed point, however good its first dots are.
+
+Fixed points are found for many rows at once by Newton's method, with derivatives from central differences of
+neighbours that run side by side in one ensemble.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from printhammer.derivatives.states import components
+from printhammer.drive.trains import Drive
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.effort import Effort
+from printhammer.run.ensemble import Ensemble, Strobes
+from printhammer.run.start import initial_state
+from printhammer.support.arrays import BoolArray, FloatArray
+
+FIRING: Final = 12
+"""Index of the firing from which to the next one the map leads; the state in a row from rest is near it."""
+
+DOTS: Final = FIRING + 4
+"""Number of dots of a row that is long enough: nothing that the map meets depends on where the row ends."""
+
+_SPACING: Final = 1e-5
+_CLOSED: Final = 1e-6  # Distance from state to image at which an orbit is closed, relative likewise
+_LONGEST_STEP: Final = 0.1  # Longest Newton step, relative likewise
+_ITERATIONS: Final = 12  # Iteration limit
+
+
+def row_multipliers(
+    hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort, *, closed: bool = True
+) -> FloatArray:
+    """Compute the leading multiplier of each of several rows of dots, shape (rows,).
+
+    Parameters
+    ----------
+    hammers, drives : sequences
+        A hammer and a drive for each row. A drive has `DOTS` firings at least, from rest; from the firing
+        before `FIRING` on they are alike and as far apart from each other.
+    effort : Effort
+        Tolerance and threads.
+    closed : bool, optional
+        Whether to find the fixed point by Newton's method; otherwise the derivative is that at the state
+        that the row from rest reaches, which is near the fixed point if the dots before are good.
+
+    Returns
+    -------
+    array
+        The multiplier of largest absolute value: with its sign where it is real (negative: an error
+        alternates), else its absolute value. NaN where the row is no such orbit: a run that ends early,
+        Newton's method does not converge, or a pulse is fired while the armature leaves the pack.
+    """
+    if not hammers:
+        return np.zeros(0)
+    maps = _Maps(hammers, drives, effort)
+    z, jacobian = maps.start, np.full((len(hammers), 2, 2), np.nan)
+    open_ = np.flatnonzero(np.isfinite(z).all(axis=1))
+    for _ in range(_ITERATIONS if closed else 1):
+        if not open_.size:
+            break
+        image, jacobian[open_] = maps.images(open_, z[open_])
+        defect = image - z[open_]
+        size = np.abs(defect).max(axis=1)
+        jacobian[open_[np.isnan(size)]] = np.nan
+        left = size > _CLOSED
+        open_, defect = open_[left], defect[left]
+        step = (np.linalg.pinv(np.eye(2) - jacobian[open_]) @ defect[:, :, np.newaxis])[:, :, 0]
+        longest = np.abs(step).max(axis=1, keepdims=True)
+        z[open_] += step * np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, _CLOSED))
+    if closed:
+        jacobian[open_] = np.nan
+    return leading(jacobian)
+
+
+def leading(jacobians: FloatArray) -> FloatArray:
+    """Return the eigenvalues of largest absolute value, (rows,), of matrices (rows, 2, 2); NaN stays NaN.
+
+    A real one keeps its sign; of a pair of complex ones it is the absolute value.
+    """
+    known = np.asarray(np.isfinite(jacobians).all(axis=(1, 2)))
+    values = np.linalg.eigvals(np.where(known[:, None, None], jacobians, 0.0))
+    largest = values[np.arange(len(values)), np.abs(values).argmax(axis=1)]
+    signed = np.where(largest.imag == 0.0, largest.real, np.abs(largest))
+    return np.asarray(np.where(known, signed, np.nan), np.float64)
+
+
+class _Maps:
+    """The strobe maps of rows: states in units of the scales, shape (rows, 2), and their images."""
+
+    def __init__(self, hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort) -> None:
+        self.hammers, self.drives, self.effort = hammers, drives, effort
+        for drive in drives:
+            if len(drive.times) < DOTS:
+                raise InputError.of("drive", len(drive.times), f"a row of {DOTS} dots or more")
+        self.times = np.array([drive.times[FIRING - 1 : FIRING + 2] for drive in drives])
+        period = self.times[:, 2] - self.times[:, 1]
+        way = np.array([_way(hammer) for hammer in hammers])
+        self.scales = np.stack([way, way / period], axis=1)
+        strobes = self._run(None, np.zeros(len(hammers)), self.times[:, :2], hammers, drives)
+        states = np.stack([strobes.x, strobes.v], axis=2)
+        states[_with_memory(strobes)] = np.nan
+        # Where an error alternates, it is least halfway between two states.
+        self.start = np.asarray(states.mean(axis=1) / self.scales)
+        self.current = None if strobes.electric is None else strobes.electric[:, -1]
+
+    def images(self, rows: Any, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the images (n, 2) of states of some rows, and the derivatives (n, 2, 2)."""
+        steps = _SPACING * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+        count, places = len(steps), np.repeat(rows, len(steps))
+        states = ((z[:, np.newaxis] + steps) * self.scales[rows][:, np.newaxis]).reshape(-1, 2)
+        images = np.full((len(places), 2), np.nan)
+        able = np.array([_possible(self.hammers[k], state) for k, state in zip(places, states, strict=True)])
+        able = np.repeat(able.reshape(-1, count).all(axis=1), count)
+        if able.any():
+            own = places[able]
+            begun = states[able] if self.current is None else np.hstack([states[able], self.current[own]])
+            hammers, drives = [self.hammers[k] for k in own], [self.drives[k] for k in own]
+            strobes = self._run(begun, self.times[own, 1], self.times[own, 2:], hammers, drives)
+            ends = np.stack([strobes.x[:, 0], strobes.v[:, 0]], axis=1)
+            ends[_with_memory(strobes)[:, 0]] = np.nan
+            images[able] = ends / self.scales[own]
+            if strobes.electric is not None and self.current is not None:
+                # The current forgets its past sooner than the armature does: it follows from step to step.
+                middle = np.flatnonzero(able)[::count] // count
+                self.current[rows[middle]] = strobes.electric[::count, 0]
+        groups = np.asarray(images.reshape(-1, count, 2))
+        slopes = [(groups[:, k] - groups[:, k + 1]) / (2.0 * _SPACING) for k in (1, 3)]
+        return groups[:, 0], np.stack(slopes, axis=2)
+
+    def _run(
+        self,
+        states: FloatArray | None,
+        starts: FloatArray,
+        moments: FloatArray,
+        hammers: Sequence[Hammer],
+        drives: Sequence[Drive],
+    ) -> Strobes:
+        ensemble = Ensemble(
+            hammers,
+            list(drives),
+            moments[:, -1],
+            states=states,
+            starts=starts,
+            tolerance=self.effort.tolerance,
+        )
+        result = ensemble.run(strobes=list(moments), threads=self.effort.threads)
+        assert result.strobes is not None
+        return result.strobes
+
+
+def _way(hammer: Hammer) -> float:
+    """Return the way from rest to the pack, m."""
+    if hammer.front is None:
+        raise InputError(
+            f"{hammer.path}: the hammer has no pack", file=hammer.path, key="pack", expected="one"
+        )
+    return hammer.front - hammer.rest
+
+
+def _possible(hammer: Hammer, state: FloatArray) -> bool:
+    """Whether a run can begin with a displacement, m, and a velocity, m/s."""
+    try:
+        initial_state(hammer, state.tolist())
+    except InputError:
+        return False
+    return True
+
+
+def _with_memory(strobes: Strobes) -> BoolArray:
+    """Return where the pack remembers what belongs to the state, so that the plane does not hold it."""
+    return np.array([[components(mode) > 2 for mode in row] for row in strobes.branch.tolist()])
