@@ -14,7 +14,19 @@ from printhammer.cli.registry import GROUPS, VERBS
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/printhammer"
 
-ROOMS = ("cli", "derivatives", "drive", "hammer", "maps", "support")
+ROOMS = (
+    "claims",
+    "cli",
+    "derivatives",
+    "drive",
+    "hammer",
+    "maps",
+    "parts",
+    "report",
+    "results",
+    "support",
+    "sweep",
+)
 PAGES: tuple[str, ...] = ()
 PHRASES = (
     r"Returns? what\b",

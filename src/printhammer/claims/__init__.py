@@ -1,6 +1,6 @@
-"""The claims of the paper, checked: every statement of Hendriks (1983) that can be measured.
+"""Claims of the paper: each measurable statement of Hendriks (1983), checked.
 
-`claims.toml` puts each into numbers; one module for each family measures them; `judge_all` compares.
+`claims.toml` states the claims as numbers; one module per family measures them; `judge_all` compares.
 """
 
 from printhammer.claims import bursts, integrators, statics, strobes, verdicts

@@ -1,6 +1,6 @@
 """Claims about nine-pulse bursts against rate, Figs. 8 and 9.
 
-The claim about the frequency-time map, Figs. 8 and 9: how fast the response changes with rate.
+Also the claim about the frequency-time map: sensitivity of the response to the rate.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _SAMPLES: Final = 2001
 
 
 def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
-    """Return number of struck dots, spread of peak forces over their mean, spread of flight times, s."""
+    """Return the number of printed dots, the relative spread of peak forces, and that of flight times, s."""
     forces = [dot.peak_force for dot in motion.dots if dot.peak_force is not None]
     flights = [dot.flight_time for dot in motion.dots if dot.flight_time is not None]
     if len(forces) < 2:
@@ -39,7 +39,7 @@ def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
 
 @measures("independent_at_low_rate", "pack", "waveform")
 def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
-    """Spread of the dots of a slow burst."""
+    """Measure the spread of the dots of a slow burst."""
     rate, pulses = claim.settings["rate_Hz"], claim.settings["pulses"]
     struck, force, flight = spreads(context.train(rate, pulses))
     value = {"dots_struck": struck, "force_spread": force, "flight_time_spread_s": flight}
@@ -61,7 +61,8 @@ def rates_of(settings: Mapping[str, Any]) -> list[float]:
 def onsets(context: Context) -> dict[str, float]:
     """Return the lowest rates, Hz, at which flight times vary, forces vary, and a dot is lost.
 
-    By the names "flight_time", "force" and "lost"; what does not happen up to the first lost dot is missing.
+    The keys are "flight_time", "force" and "lost"; an event that does not occur up to the first lost dot is
+    absent.
     """
     settings = claims()["order_of_onset"].settings
     rates, pulses = rates_of(settings), settings["pulses"]
@@ -85,7 +86,7 @@ def onsets(context: Context) -> dict[str, float]:
 
 @measures("order_of_onset", *WHOLE)
 def order_of_onset(context: Context, _claim: Claim) -> Measured:
-    """Rates at which flight times vary, forces vary, and a dot is lost, for the first time."""
+    """Measure the lowest rates at which flight times vary, forces vary, and a dot is lost."""
     first = context.once("onsets", lambda: onsets(context))
     lost = first.get("lost")
     value: dict[str, Any] = {"first_lost_dot_at_Hz": lost}
@@ -105,7 +106,7 @@ def order_of_onset(context: Context, _claim: Claim) -> Measured:
 
 @measures("second_dot_lost", *WHOLE)
 def second_dot_lost(context: Context, claim: Claim) -> Measured:
-    """First interval of rates in which the peak after the second firing stays below the pack."""
+    """Measure the first interval of rates in which the peak after the second firing stays below the pack."""
     settings = claim.settings
     waveform, front, _ = context.waveform, context.front, context.dot
     begins = ends = None
@@ -136,14 +137,14 @@ def hung_up(motion: Motion) -> bool:
     left = _first_leaving(motion)
     if left is None:
         return False
-    # Every touch and leaving is the end of a step, so that none is missed between them.
+    # Every touch and release ends a step, so that none is missed in between.
     times = motion.step_times
     between = (times > left) & (times < motion.drive.times[-1])
     return not (motion.at(times)[0][between] <= motion.hammer.origin).any()
 
 
 def _first_leaving(motion: Motion) -> float | None:
-    """Return when the armature first leaves the pack, s; None if it never touches it."""
+    """Return the time at which the armature first leaves the pack, s; None without a contact."""
     times = motion.step_times
     inside = motion.at(times)[0] > (motion.hammer.front or 0.0)
     if not inside.any():
@@ -155,13 +156,13 @@ def _first_leaving(motion: Motion) -> float | None:
 
 def _exceeds(drive: Drive, limit: float) -> bool:
     """Whether the largest absolute value of a drive exceeds a limit."""
-    # No sample is above the peak, which takes long to find.
+    # The samples are a lower bound of the peak, which is slow to find.
     samples = np.abs(drive.value(np.linspace(0.0, drive.end, _SAMPLES)))
     return bool(samples.max() > limit) or drive.peak > limit
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Return the rate from which on all hang up, the motions, and the highest rate allowed, Hz."""
+    """Return the rate above which all bursts hang up, the motions, and the highest rate allowed, Hz."""
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
     waveform = context.waveform
@@ -182,7 +183,7 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
 
 @measures("hang_up_at_high_rate", *WHOLE)
 def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
-    """Lowest rate from which on the armature hangs up."""
+    """Measure the lowest rate above which the armature always hangs up."""
     lowest, _, highest = context.once("hang-up", lambda: hang_up_range(context))
     value = {"hang_up_rate_Hz": lowest, "highest_rate_Hz": highest}
     if lowest is None:
@@ -192,7 +193,7 @@ def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
 
 @measures("weak_prints_when_hung_up", *WHOLE)
 def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
-    """Largest force of a distinct impact after the first dot where the armature hangs up."""
+    """Measure the largest force of a distinct impact after the first dot, if the armature hangs up."""
     lowest, motions, highest = context.once("hang-up", lambda: hang_up_range(context))
     if lowest is None:
         raise NotMeasurableError("The armature does not hang up")
@@ -232,7 +233,7 @@ def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
 
 @measures("flight_time_spread", *WHOLE)
 def flight_time_spread(context: Context, claim: Claim) -> Measured:
-    """Spread of the flight times of bursts at the strange strobe times."""
+    """Measure the spread of the flight times of bursts at the strange strobe times."""
     settings, pulses = claim.settings, claim.settings["pulses"]
     _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
     by_panel: dict[str, Any] = {}
@@ -262,10 +263,10 @@ _SPACING: Final = 10e-6
 
 
 def sensitivity(context: Context, band: tuple[float, float], grid: float, step: float, pulses: int) -> float:
-    """Return the root-mean-square change of the displacement record per hertz, m/Hz, in a band of rates.
+    """Return the RMS change of the displacement record per hertz, m/Hz, in a band of rates.
 
-    Each of the slower rates, `grid` apart, is compared with that `step` above it, Hz, in bursts of some
-    pulses: at the same times, from the first firing to 1 ms after the last one at the slower rate.
+    Each rate of a grid is compared with the rate `step` above it, Hz, in bursts of `pulses` firings, at the
+    same times: from the first firing to 1 ms after the last one at the slower rate.
 
     Raises
     ------
@@ -285,13 +286,13 @@ def sensitivity(context: Context, band: tuple[float, float], grid: float, step: 
     result = context.ensemble(drives, ends, times=times)
     assert result.x is not None
     change = (result.x[1::2].astype(np.float64) - result.x[::2]) / step
-    # Beyond the end of a record there is nothing.
+    # A record has no values beyond its end.
     return float(np.sqrt(np.nanmean(change**2)))
 
 
 @measures("map_sensitivity", *WHOLE)
 def map_sensitivity(context: Context, claim: Claim) -> Measured:
-    """Change of the displacement record per hertz below, in and above the erratic band."""
+    """Measure the change of the displacement record per hertz below, in and above the erratic band."""
     settings = claim.settings
     first = context.once("onsets", lambda: onsets(context)).get("flight_time")
     hung, _, highest = context.once("hang-up", lambda: hang_up_range(context))
@@ -335,12 +336,12 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
 def erratic_pairs(
     struck: BoolArray, flight_time: FloatArray, settings: Mapping[str, Any]
 ) -> tuple[BoolArray, BoolArray]:
-    """Return between which neighbouring rates a late dot changes at once, and at which rates dots vary.
+    """Return the pairs of neighbouring rates at which a late dot changes, and the rates at which dots vary.
 
-    A dot changes if it is struck at one of the two rates only, or if its flight times, s, differ by more than
-    `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their flight
-    times differ by more than `flight_time_spread_s`. Both tables have a row for each rate; the shapes of what
-    is returned are (rates - 1,) and (rates,).
+    A dot changes if it is printed at only one of the two rates, or if its flight times, s, differ by more
+    than `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their
+    flight times differ by more than `flight_time_spread_s`. Both tables have a row for each rate; the results
+    have shapes (rates - 1,) and (rates,).
     """
     flights = np.where(struck, flight_time, np.nan)
     change = np.abs(np.diff(flights, axis=0)) > settings["flight_time_change_s"]
@@ -352,9 +353,9 @@ def erratic_pairs(
 def erratic_share(
     rates: FloatArray, erratic: BoolArray, varies: BoolArray, hang_up: float | None
 ) -> tuple[float | None, float | None]:
-    """Return the share of erratic pairs between the first rate at which dots vary and hang-up, and that rate.
+    """Return the fraction of erratic pairs between the first varying rate and hang-up, and that rate.
 
-    Rates are in Hz, the pairs those of `erratic_pairs`. None where dots vary nowhere, or not before hang-up.
+    Rates are in Hz, the pairs those of `erratic_pairs`. None if dots vary nowhere, or not before hang-up.
     """
     if not varies.any():
         return None, None
@@ -365,7 +366,7 @@ def erratic_share(
 
 @measures("chaotic_region", *WHOLE)
 def chaotic_region(context: Context, claim: Claim) -> Measured:
-    """Share of neighbouring rates between which a late dot changes at once, where dots vary."""
+    """Measure the fraction of neighbouring rates between which a late dot changes, where dots vary."""
     rates = rates_of(claim.settings)
     pulses = claim.settings["pulses"]
     dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])

@@ -1,4 +1,4 @@
-"""The runs that the claims share: each is computed once."""
+"""Runs shared by the claims, each computed once."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ _T = TypeVar("_T")
 
 
 class NotMeasurableError(PrinthammerError):
-    """A claim is about something that this hammer does not have or do."""
+    """The claim concerns a part or an event that this hammer does not have."""
 
 
 class Context:
-    """A hammer and its motions, as the claims need them.
+    """Hammer with the motions that the claims need.
 
     Parameters
     ----------
     hammer : Hammer
         The hammer.
     tolerance : float
-        Of the default integrator.
+        Tolerance of the default integrator.
     scheme : str
         Integrator of the runs, as for `printhammer.simulate`.
     """
@@ -58,7 +58,7 @@ class Context:
         Raises
         ------
         NotMeasurableError
-            The hammer does not have it.
+            The hammer lacks the part or constant.
         """
         part = getattr(self.hammer, name)
         if part is None:
@@ -83,7 +83,7 @@ class Context:
         return float(self.need("pack").front)
 
     def once(self, name: str, search: Callable[[], _T]) -> _T:
-        """Return what a search finds, the second time from the shelf."""
+        """Return the result of a search, cached by name."""
         if name not in self._kept:
             self._kept[name] = search()
         kept: _T = self._kept[name]
@@ -98,17 +98,17 @@ class Context:
         state: tuple[float, float] | None = None,
         **options: Any,
     ) -> Motion:
-        """Run the hammer, or another one, under a drive; from the shelf if that was run before."""
+        """Run the hammer, or another one, under a drive; repeated runs come from the cache."""
         which = self.hammer if hammer is None else hammer
         options = {"tolerance": self.tolerance, "scheme": self.scheme, **options}
         key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))
         if key not in self._motions:
-            # The grid is not looked at; what is, is computed where it is asked for.
+            # The output grid is not used; values are computed on demand.
             self._motions[key] = simulate(which, drive, duration=duration, state=state, points=2, **options)
         return self._motions[key]
 
     def run(self, drive: Drive, duration: float, **options: Any) -> Motion:
-        """Run as `attempt` does.
+        """Run like `attempt`, but require the run to complete.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class Context:
         return result
 
     def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
-        """Return what the firings of many drives do, each until `tail`, s, after its last firing."""
+        """Return the dots of many drives, each run until `tail`, s, after its last firing."""
         result = self.ensemble(drives, [float(drive.times[-1]) + tail for drive in drives], dots=True)
         assert result.dots is not None
         return result.dots
@@ -152,13 +152,13 @@ class Context:
         return self.run(drive, float(drive.times[-1]) + tail)
 
     def strobe_train(self, period: float, points: int) -> Motion:
-        """Run a train of a period, s, from rest, up to the firing that makes the last strobe point."""
+        """Run a train of a period, s, from rest, up to the firing of the last strobe point."""
         drive = PulseTrain(self.waveform, period=period, pulses=points)
         return self.run(drive, float(drive.times[-1]))
 
     @cached_property
     def single(self) -> Motion:
-        """The single-pulse cycle, from rest to rest."""
+        """Single-pulse cycle, from rest to rest."""
         return self.pulses([0.0], CYCLE)
 
     @cached_property
@@ -171,7 +171,7 @@ class Context:
 
     @cached_property
     def idle(self) -> Motion:
-        """The hammer at rest, before anything is fired."""
+        """Motion of the hammer at rest, before any firing."""
         return self.pulses([_IDLE], 0.5 * _IDLE)
 
     @property
@@ -189,7 +189,7 @@ class Context:
 
     @property
     def stroke(self) -> float:
-        """Single-pulse peak less backstop, m."""
+        """Single-pulse peak minus backstop position, m."""
         stroke = self.peak - self.position
         if stroke <= 0.0:
             raise NotMeasurableError("The armature stays in the backstop after a single pulse")
@@ -197,7 +197,7 @@ class Context:
 
     @property
     def dot(self) -> Dot:
-        """The dot of the single pulse."""
+        """Dot of the single pulse."""
         dot = self.single.dots[0]
         if not dot.struck:
             raise NotMeasurableError("The armature does not reach the pack after a single pulse")

@@ -1,4 +1,4 @@
-"""What the paper claims, as `claims.toml` beside this file puts it into numbers."""
+"""Claims of the paper, stated as numbers in `claims.toml` beside this file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PRINTED_DIGITS: Final = 1e-9
 
 
 class Claim(Declared):
-    """One checkable statement of the paper."""
+    """Checkable statement of the paper."""
 
     name: str = part("name")
     kind: Kind = part('"stated", "typical" or "shape"')

@@ -1,6 +1,6 @@
-"""How a claim is judged: a function measures, the band of `claims.toml` decides.
+"""Judging of claims: a function measures, the band of `claims.toml` decides.
 
-Numbers read off a motion or a set of points: largest values, rank correlation.
+`largest`, `falling`, `rank_correlation` and `spread` are the measures shared by the claims.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
 WHOLE: Final = ("backstop", "pack", "waveform")
-"""What most claims are about."""
+"""Parts that most claims require."""
 
 Verdict = Literal["holds", "fails", "not yet"]
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What a claim's function measures."""
+    """Measured values of a claim."""
 
     value: Mapping[str, Any]
-    """Measured values by name, SI, the unit at the end of the name; None where there is no such thing."""
+    """Measured values by name, SI, with the unit at the end of the name; None for a missing value."""
     detail: str
-    """One sentence about them."""
+    """Description of the values in one sentence."""
 
 
 class JudgedClaim(Declared):
-    """A claim, judged."""
+    """Claim with its measured values and verdict."""
 
     claim: Claim = part("what was judged")
     value: Mapping[str, Any] | None = part(
@@ -49,12 +49,12 @@ class JudgedClaim(Declared):
 
     @property
     def missed(self) -> list[str]:
-        """Names of the values that are not within their bands."""
+        """Names of the values outside their bands."""
         return self.claim.missed(self.value) if self.value is not None else []
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Numbers of statements that hold and that the claim makes; each text of a list is one statement."""
+        """Number of statements that hold, and that the claim makes; each text of a list is a statement."""
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:
@@ -67,7 +67,7 @@ class JudgedClaim(Declared):
         return sum(found == wanted for found, wanted in pairs), sum(map(len, lists.values()))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what goes to `claims.json`."""
+        """Return the entry of `claims.json`."""
         claim = self.claim
         return {
             "name": claim.name,
@@ -88,14 +88,14 @@ def _is_texts(band: Any) -> bool:
 
 
 Judge = Callable[[Context, Claim], Measured]
-"""Measures what a claim is about."""
+"""Function that measures a claim."""
 
 JUDGES: Final[dict[str, tuple[tuple[str, ...], Judge]]] = {}
-"""Name of a claim to the parts of a hammer that it is about, and the function that measures."""
+"""Required parts and measuring function of each claim, by name."""
 
 
 def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
-    """Register the function that measures a claim, which cannot hold for a hammer without what it needs."""
+    """Register the measuring function of a claim; `needs` are the parts without which it cannot hold."""
 
     def register(function: Judge) -> Judge:
         if name in JUDGES or name not in claims():
@@ -107,7 +107,7 @@ def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
 
 
 PENDING: Final[dict[str, str]] = {}
-"""Claims that nothing can judge yet, and what it takes."""
+"""Claims that cannot be judged yet, with the missing capability."""
 
 
 def judge_all(
@@ -167,7 +167,7 @@ _ZOOMS: Final = 6
 
 
 def largest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float:
-    """Return the largest value of a function of time, on grids ever closer about the largest."""
+    """Return the largest value of a function of time, on successively refined grids."""
     best = -np.inf
     for _ in range(_ZOOMS if end > start else 1):
         grid = np.linspace(start, end, _POINTS)
@@ -179,12 +179,12 @@ def largest(function: Callable[[FloatArray], FloatArray], start: float, end: flo
 
 
 def falling(values: Sequence[float]) -> bool:
-    """Whether each value is below the one before."""
+    """Whether the values decrease strictly."""
     return all(after < before for before, after in itertools.pairwise(values))
 
 
 def rank_correlation(first: Sequence[float], second: Sequence[float]) -> float | None:
-    """Return Spearman's rank correlation, ties at their mean rank; None where it is not defined."""
+    """Return Spearman's rank correlation, with mean ranks for ties; None if it is undefined."""
     if len(first) < 2 or len(set(first)) < 2 or len(set(second)) < 2:
         return None
     a, b = _ranks(first), _ranks(second)
@@ -199,5 +199,5 @@ def _ranks(values: Sequence[float]) -> FloatArray:
 
 
 def spread(values: Sequence[float]) -> float:
-    """Largest less smallest."""
+    """Return the largest value minus the smallest."""
     return max(values) - min(values)

@@ -1,4 +1,4 @@
-"""Claims about the state at the moment of firing, Fig. 11."""
+"""Claims about the state at the instant of firing, Fig. 11."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def strobe_points(context: Context, period: float, points: int) -> FloatArray:
 
 
 def scaled(points: FloatArray) -> FloatArray:
-    """Return states in half-widths of the window of Fig. 11."""
+    """Return states in units of the half-widths of the window of Fig. 11."""
     _, half = window()
     return points / half
 
 
 def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
-    """Return the strobe points of the panels of Fig. 11 by strobe time, all or those called strange."""
+    """Return the strobe points of the panels of Fig. 11 by strobe time: all, or the strange ones only."""
     count = claims()["poincare_window"].settings["points"]
     return {
         panel_name(period): strobe_points(context, period, count)
@@ -50,7 +50,7 @@ def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
 
 @measures("poincare_window", *WHOLE)
 def poincare_window(context: Context, claim: Claim) -> Measured:
-    """Share of the strobe points of each panel inside the window; the others."""
+    """Measure the fraction of strobe points of each panel inside the window, and list the others."""
     centre, half = window()
     shares: dict[str, float] = {}
     outside: dict[str, Any] = {}
@@ -74,7 +74,7 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
 
 @measures("behind_the_backstop", *WHOLE)
 def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
-    """Depth of the deepest strobe point behind the backstop, over the panels called strange."""
+    """Measure the depth of the deepest strobe point behind the backstop, over the strange panels."""
     depths = {name: context.position - float(points[:, 0].min()) for name, points in panels(context).items()}
     deepest = max(depths, key=lambda name: depths[name])
     value = {"depth_m": depths[deepest], "depths_m": depths}
@@ -85,7 +85,7 @@ def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
 
 @measures("low_rate_fixed_point", *WHOLE)
 def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
-    """How far the last points of slow trains are from each other."""
+    """Measure the distance between the last points of slow trains."""
     settings = claim.settings
     last = settings["last_points"]
     apart = {}
@@ -103,13 +103,13 @@ def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
 
 @measures("cloud_grows", *WHOLE)
 def cloud_grows(context: Context, _claim: Claim) -> Measured:
-    """95th percentile of the distance of strobe points from rest against rate."""
+    """Measure the 95th percentile of the distance of strobe points from rest, against rate."""
     rest = scaled(np.array([context.rest, 0.0]))
     radii = {
         name: float(np.percentile(np.linalg.norm(scaled(points) - rest, axis=1), 95.0))
         for name, points in panels(context).items()
     }
-    # The panels come in the order of rising rate.
+    # The panels are in order of increasing rate.
     correlation = rank_correlation(range(len(radii)), list(radii.values()))
     value = {"rank_correlation": correlation, "scaled_radii": radii}
     first, *_, last = radii.items()
@@ -121,7 +121,7 @@ def cloud_grows(context: Context, _claim: Claim) -> Measured:
 
 @measures("successive_points_apart", *WHOLE)
 def successive_points_apart(context: Context, claim: Claim) -> Measured:
-    """Distance of successive points in parts of that of any two."""
+    """Measure the distance of successive points, as a fraction of that of arbitrary pairs."""
     ratios: dict[str, float | None] = {}
     for name, states in panels(context).items():
         points = scaled(states)
@@ -136,7 +136,7 @@ def successive_points_apart(context: Context, claim: Claim) -> Measured:
 
 @measures("points_on_single_pulse_orbit", *WHOLE)
 def points_on_single_pulse_orbit(context: Context, claim: Claim) -> Measured:
-    """Distance of strobe points to the single-pulse orbit, over that of points anywhere in the window."""
+    """Measure the distance of strobe points to the single-pulse orbit, relative to random points."""
     from scipy.spatial import cKDTree
 
     motion, start = context.single, context.returns[0].t_in

@@ -1,4 +1,4 @@
-"""Claims about what kind of motion a train leads to: Fig. 11 and its caption, and the way into chaos."""
+"""Claims about the type of motion of a train: Fig. 11 and its caption, and the route to chaos."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ _CHANGED: Final[dict[str, Callable[[int], int]]] = {
     "constants up and down by turns": lambda number: 1 - 2 * (number % 2),
     "constants down and up by turns": lambda number: 2 * (number % 2) - 1,
 }
-"""How all constants of a hammer are changed at once: sign of the change by the number of the constant."""
+"""Simultaneous changes of all constants of a hammer: sign of the change by the index of the constant."""
 
 _APERIODIC: Final = "no period"
 _PANELS: Final = "panels of Fig. 11"
 
 
 def printed_verdicts() -> dict[float, str]:
-    """Return the verdicts that the paper prints on the panels of Fig. 11, by strobe time, s."""
+    """Return the verdicts printed on the panels of Fig. 11, by strobe time, s."""
     claim = claims()["poincare"]
     return dict(zip(claim.settings["strobe_times_s"], claim.band["verdicts"], strict=True))
 
 
 def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -> Hammer:
-    """Return a hammer with every constant changed by a part of it, up or down."""
-    # In the unit of the file, which tells a current from a force.
+    """Return a hammer with every constant changed by a fraction, up or down."""
+    # Keep the unit of the file, which distinguishes a current from a force.
     return hammer.replace(
         {
             key: replace(constant, value=constant.value * (1.0 + part * sign(number)))
@@ -51,12 +51,12 @@ def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -
 
 
 def panel_name(period: float) -> str:
-    """Return how a panel is called in a report."""
+    """Return the name of a panel in a report."""
     return f"{period * 1e3:.2f} ms"
 
 
 def panel_strobes(context: Context) -> list[Strobe]:
-    """Return the first points of the trains of Fig. 11, judged; those of the claim if it has been judged."""
+    """Return the classified first points of the trains of Fig. 11; cached from the claim."""
     points = claims()["poincare_window"].settings["points"]
     return context.once(
         _PANELS,
@@ -65,7 +65,7 @@ def panel_strobes(context: Context) -> list[Strobe]:
 
 
 def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]:
-    """Return the verdicts on trains by how they were computed, each in the order of the periods, s."""
+    """Return the verdicts on trains by variant of the computation, in the order of the periods, s."""
     hammers = [context.hammer, *(changed(context.hammer, sign) for sign in _CHANGED.values())]
     every = strobes(
         [hammer for hammer in hammers for _ in periods],
@@ -74,7 +74,7 @@ def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]
         tolerance=context.tolerance,
     )
     fine = strobes(context.hammer, periods, tolerance=_TIGHTER * context.tolerance)
-    # For the figure, which shows the same trains.
+    # The figure shows the same trains.
     context.once(_PANELS, lambda: every[: len(periods)])
     by_variant = {}
     for number, name in enumerate((_PLAIN, *_CHANGED)):
@@ -89,7 +89,7 @@ def _verdicts(judged: list[Strobe]) -> list[Verdict]:
 
 @measures("poincare", *WHOLE)
 def poincare(context: Context, claim: Claim) -> Measured:
-    """Verdicts on the panels of Fig. 11, and whether they stay if tolerance and constants are changed."""
+    """Compare the verdicts on the panels of Fig. 11, and test whether they survive small changes."""
     periods = list(claim.settings["strobe_times_s"])
     printed = list(claim.band["verdicts"])
     by_variant = variants(context, periods)
@@ -101,7 +101,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
     shown = []
     for verdicts in zip(*by_variant.values(), strict=True):
         kinds = list(dict.fromkeys(verdict.name for verdict in verdicts))
-        # A verdict that differs between the variants counts as none: it never equals what is printed.
+        # A verdict that differs between the variants counts as undecided and never equals the printed one.
         shown.append(" or ".join(kinds))
     right = [name for name, kind, band in zip(names, shown, printed, strict=True) if kind == band]
     wrong = [
@@ -132,7 +132,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Successive strobe times of one verdict: first and last one, s, of a falling scan, and their number."""
+    """Run of successive strobe times with one verdict: first and last, s, of a descending scan, and count."""
 
     name: str
     longest: float
@@ -150,7 +150,7 @@ def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
 
 
 def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
-    """Return the first of each three stretches in a row whose periods are 2, 4 and 8."""
+    """Return the first of each three consecutive stretches with periods 2, 4 and 8."""
     return [
         three[0]
         for three in zip(scanned, scanned[1:], scanned[2:], strict=False)
@@ -160,12 +160,12 @@ def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
 
 @measures("no_period_doubling_cascade", *WHOLE)
 def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
-    """Doublings of the period before chaos as the strobe time falls, and periodic windows inside it."""
+    """Count period doublings before chaos as the strobe time falls, and periodic windows inside chaos."""
     settings = claim.settings
     first, last, step = (
         settings[name] for name in ("first_strobe_time_s", "last_strobe_time_s", "strobe_time_step_s")
     )
-    # Rounded, so that strobe times are the numbers that one would write.
+    # Rounded to the numbers that one would write.
     periods = [round(first - step * k, 12) for k in range(round((first - last) / step) + 1)]
     judged = scan(context.hammer, periods, tolerance=context.tolerance, exponents=False)
     names = [_APERIODIC if verdict.period is None else verdict.name for verdict in judged]
@@ -206,9 +206,9 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
 
 
 def _first_strange(context: Context, periods: Sequence[float], names: Sequence[str], way: int) -> int | None:
-    """Return the place of the first strange train from one end of a scan; None if there is none.
+    """Return the index of the first strange train from one end of a scan, or None.
 
-    Exponents take much longer than all else, and only those at the ends of the strange range decide.
+    Lyapunov exponents are expensive, and only those at the ends of the strange range matter.
     """
     for place in range(len(names))[::way]:
         if names[place] == _APERIODIC:
@@ -219,7 +219,7 @@ def _first_strange(context: Context, periods: Sequence[float], names: Sequence[s
 
 
 def _window(stretch: Stretch, step: float) -> dict[str, Any]:
-    """Return a stretch as the report shows it; its width to the step of the scan, s."""
+    """Return a stretch for the report; its width includes one step of the scan, s."""
     return {
         "verdict": stretch.name,
         "from_s": stretch.longest,

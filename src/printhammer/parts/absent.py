@@ -1,6 +1,6 @@
-"""The part that is not there: no force, no energy, no memory.
+"""Absent part: no force, no energy, no memory.
 
-These functions also stand in for whatever a part's module does not define.
+These functions also replace those that the module of a part omits.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_memory(c: Any, peak: float) -> float:
-    """Return what a pack without memory remembers of a local maximum, 0."""
+    """Return the memory of a pack without memory, 0."""
     return 0.0
 
 
@@ -97,5 +97,5 @@ def backstop_switch(c: Any, w: float, v: float) -> float:
 
 
 def backstop_rebound(c: Any, v_in: float) -> float:
-    """Return the rebound speed of a perfect rigid surface, -v_in in m/s."""
+    """Return the rebound velocity of a perfectly elastic surface, -v_in in m/s."""
     return -v_in

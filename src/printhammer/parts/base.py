@@ -1,8 +1,8 @@
-"""What every part is: a frozen set of SI constants, a law, and a place in the registry.
+"""Base classes of parts: a frozen set of SI constants, a law, and an entry in the registry.
 
 A part is one file. It holds the law as plain scalar functions of the module (see `printhammer.parts`), and a
-`Part` subclass with the constants, marked with `register`. The kernel compiles the functions and hands them
-the floats of `packed` as one float64 array `c`.
+`Part` subclass with the constants, decorated with `register`. The kernel compiles the functions and passes
+them the floats of `packed` as one float64 array `c`.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ ROLES: tuple[str, ...] = ("magnet", "coil", "spring", "pack", "backstop", "dampi
 
 
 class Part(BaseModel):
-    """A replaceable part of a hammer: constants in SI, and the module that holds its law.
+    """Replaceable part of a hammer: constants in SI, and the module with its law.
 
     Its `role` is one of `ROLES`, `law` the name of the law in hammer files.
 
     Raises
     ------
     InputError
-        A constant is missing, unknown, not a finite number or out of its bounds, or a function of the law
-        takes other arguments than the kernel hands it.
+        A constant is missing, unknown, not a finite number or out of bounds, or a function of the law does
+        not take the arguments that the kernel passes.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -46,18 +46,18 @@ class Part(BaseModel):
                 raise invalid(error, type(self), f"{self.role}.") from None
             check_functions(type(self))
 
-        # Lets model_validate keep its context (the folder of the file), which a custom __init__ would lose.
+        # A custom __init__ would lose the context of model_validate (the folder of the file).
         __init__.__pydantic_base_init__ = True
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the numbers, SI, that the law functions read from `c`, in the order that the module states.
+        """Return the constants, SI, that the law functions read from `c`, in the order stated by the module.
 
         The origin is the position of the backstop, b of equation (4), or 0 without a backstop; m.
         """
         raise NotImplementedError
 
     def content(self) -> Mapping[str, Any]:
-        """Return the numbers, read from a file, that belong to the identity of the part."""
+        """Return the numbers read from a file that belong to the identity of the part."""
         return {}
 
     @property
@@ -73,12 +73,12 @@ class MagnetPart(Part):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Displacements for which the law holds, `(x_min, x_max)` in m."""
+        """Range of displacements of the law, `(x_min, x_max)` in m."""
         return (-math.inf, math.inf)
 
     @property
     def has_linkage(self) -> bool:
-        """Whether the law links a flux, so that a voltage can drive the coil."""
+        """Whether the law defines a flux linkage, so that a voltage can drive the coil."""
         return hasattr(sys.modules[self.module], "magnet_linkage")
 
 
@@ -120,7 +120,7 @@ class BackstopPart(Part):
 
 
 class DampingPart(Part):
-    """Damping of the armature wherever it is: `damping_force(c, v)`, differentiable in the velocity."""
+    """Damping of the armature at every displacement: `damping_force(c, v)`, smooth in the velocity."""
 
     role: ClassVar[str] = "damping"
 
@@ -131,7 +131,7 @@ _P = TypeVar("_P", bound=type[Part])
 
 
 def register(part: _P) -> _P:
-    """Enter a part class, with role and law, in the registry, as a class decorator.
+    """Register a part class under its role and law; a class decorator.
 
     Raises
     ------

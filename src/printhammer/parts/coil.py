@@ -62,10 +62,10 @@ class Winding(CoilPart):
 
     @property
     def warm_resistance(self) -> float:
-        """Resistance at the temperature of the winding, ohm; 0 where none is stated."""
+        """Resistance at the temperature of the winding, ohm; 0 if none is stated."""
         return (self.resistance or 0.0) * (1.0 + COPPER * (self.temperature - REFERENCE))
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the constants as the module states, the resistance at the temperature of the winding."""
+        """Return the packed constants, with the resistance at the temperature of the winding."""
         turn, leakage = self.turn_resistance or 0.0, self.leakage or 0.0
         return (self.warm_resistance, self.inductance, turn, leakage, float(self.back_emf))

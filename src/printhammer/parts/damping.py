@@ -1,11 +1,11 @@
-"""Viscous damping of the armature wherever it is: in flight, in the pack and in the backstop.
+"""Viscous damping of the armature at every displacement: in flight, in the pack and in the backstop.
 
     Fv = -c v
 
 Source: the textbook oscillator; S. W. Shaw and P. J. Holmes, J. Sound Vib. 90 (1983) 129, have it in the
-impact oscillator. Hendriks (1983) has no damping in flight.
-Validity: slow motion in a fluid, bearings with an oil film, eddy currents in a uniform field. Weakness: air
-at high speed resists with the square of the speed, dry bearings with a constant force.
+impact oscillator. Hendriks (1983) has no damping in flight. Validity: slow motion in a fluid, bearings with
+an oil film, eddy currents in a uniform field. Weakness: air at high speed resists with the square of the
+speed, dry bearings with a constant force.
 
 Packed constants: c = [coefficient].
 """

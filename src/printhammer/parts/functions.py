@@ -1,4 +1,4 @@
-"""Which functions a law has, and with which arguments: those of the absent part, by the name of the role."""
+"""Signatures of the law functions: those of the absent part, by the prefix of the role."""
 
 from __future__ import annotations
 
@@ -19,19 +19,20 @@ _FORCES: Final = {
     "backstop": ("backstop_elastic", "backstop_rebound"),
     "damping": ("damping_force",),
 }
-"""Of each role functions of which a law has one at least."""
+"""Functions of each role, of which a complete law defines at least one."""
 
 
 @cache
 def check_functions(part: Any, *, complete: bool = False) -> None:
-    """Make sure that the law functions of a class of parts take the arguments that the kernel hands them.
+    """Check that the law functions of a part class take the arguments that the kernel passes.
 
-    Those that the module leaves out come from the absent part; where it has to be `complete`, it has a force.
+    Functions that the module omits come from the absent part; a `complete` law has at least one force.
 
     Raises
     ------
     InputError
-        A function takes other arguments, or is none, or there is no force; names the module.
+        A function has other arguments or is not callable, or a force is missing; the message names the
+        module.
     """
     module = sys.modules.get(part.__module__)
     where = getattr(module, "__file__", None) or part.__module__

@@ -1,7 +1,7 @@
-"""Parts from elsewhere: a Python file, or an installed package with entry points "printhammer.parts".
+"""Registration of further parts: from a Python file, or from entry points "printhammer.parts".
 
-A file is imported under its own name, with its folder on the path of Python, so that processes that are begun
-later find it too.
+A file is imported under its own name, and its folder is added to the Python path, so that worker processes
+find the module as well.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ GROUP: Final = "printhammer.parts"
 
 
 def load_parts(path: str | Path) -> list[type[Part]]:
-    """Import a Python file that registers parts, and return these.
+    """Import a Python file that registers parts; return the parts.
 
     Raises
     ------
     InputError
-        There is no such file, another module has its name, it cannot be imported, it registers no part, or a
-        law lacks a function or has one with other arguments.
+        The file does not exist, its name is taken by another module, it cannot be imported, it registers no
+        part, or a law lacks a function or has one with other arguments.
     """
     source = Path(path).resolve()
     name = source.stem
@@ -52,7 +52,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
         )
     try:
         import_module(name)
-    # Whatever the file raises.
+    # The file may raise any exception.
     except Exception as error:
         raise InputError(f"{path}: cannot be imported, {_sentence(error)}", file=path) from error
     parts = [part for part in PARTS.values() if part.__module__ == name]
@@ -67,7 +67,7 @@ def load_parts(path: str | Path) -> list[type[Part]]:
 
 @cache
 def load_installed() -> None:
-    """Import what installed packages name as their parts, once."""
+    """Import the parts of installed packages, once per process."""
     for entry in entry_points(group=GROUP):
         try:
             entry.load()

@@ -1,4 +1,4 @@
-"""The report: figures and claims of the paper for one hammer, as one page, pictures and `claims.json`."""
+"""Report: figures and claims of the paper for one hammer, as a page, pictures and `claims.json`."""
 
 from printhammer.report.build import write_report
 from printhammer.report.contents import Report

@@ -1,6 +1,6 @@
-"""From a hammer to the files of its report.
+"""Writing of a report for a hammer.
 
-A report appears whole: it is made in a hidden folder and moved to its place at the end.
+A report appears atomically: it is written to a hidden folder, which is moved to its place at the end.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _PICTURE: Final = re.compile(r"figure\d\d\.(svg|pdf|png)")
 
 
 def check_place(out: str | Path) -> None:
-    """Make sure that a report writes over nothing in a folder but an earlier report, which it replaces."""
+    """Check that a folder contains nothing but an earlier report, which a new report replaces."""
     folder = Path(out)
     pictures = folder / PICTURES
     drawn = sorted(pictures.iterdir()) if pictures.is_dir() else []
@@ -50,7 +50,7 @@ def check_place(out: str | Path) -> None:
 
 
 def _is_report(folder: Path) -> bool:
-    """Tell whether a folder holds a report, even one that was not published to its end."""
+    """Whether a folder holds a report, even an incompletely published one."""
     try:
         claims = json.loads((folder / CLAIMS).read_bytes())
     except (OSError, ValueError):
@@ -66,15 +66,15 @@ def _is_picture(path: Path) -> bool:
 
 @contextmanager
 def staged(out: str | Path) -> Iterator[Path]:
-    """Give a folder to write a report into; what is there at the end is moved to its place.
+    """Provide a folder to write a report into; its contents are moved to `out` at the end.
 
-    Whatever ends the block early leaves the files of an earlier report as they were. While files are moved
-    there is no page; it comes last, so that a page stands for a report that is complete.
+    If the block ends early, an earlier report stays intact. The page is moved last, so that a page implies a
+    complete report.
 
     Parameters
     ----------
     out : path
-        Folder of the report; made where it is missing.
+        Folder of the report; created if missing.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def _publish(draft: Path, folder: Path) -> None:
     pictures = folder / PICTURES
     pictures.mkdir(exist_ok=True)
     (folder / PAGE).unlink(missing_ok=True)
-    # Pictures of an earlier report that this one does not have would pass for its own.
+    # Remove pictures of an earlier report, which readers could take for new ones.
     for path in pictures.iterdir():
         if _is_picture(path) and path.relative_to(folder) not in made:
             path.unlink()
@@ -132,11 +132,11 @@ def write_report(
     hammer : Hammer
         The hammer.
     out : path
-        Folder for `index.html`, `claims.json` and `figures/`; made where it is missing.
+        Folder for `index.html`, `claims.json` and `figures/`; created if missing.
     progress : callable, optional
-        Called before each step with the number of steps done, of all, and a phrase for the next.
+        Called before each step with the number of steps done, the total, and a phrase for the next step.
     claims, figures : iterable, optional
-        Names and numbers of those to report; by default all.
+        Names of claims and numbers of figures to report; by default all.
     reconstruction : Results, optional
         Results of the reconstruction; by default those that ship with the package.
     pdf : bool, optional
@@ -145,13 +145,13 @@ def write_report(
     Returns
     -------
     Report
-        What was found, and the files.
+        The judged claims, the figures, and the files.
 
     Raises
     ------
     InputError
-        The folder cannot be written to, a result of the reconstruction cannot be read, or what a PDF needs
-        is not installed. What was there stays.
+        The folder cannot be written to, a result of the reconstruction cannot be read, or the packages for a
+        PDF are missing. An existing report is kept.
     """
     from printhammer.report.page import page
     from printhammer.report.pdf import check_typesetter, write_pdf
@@ -214,7 +214,7 @@ def _draw(
     folder: Path,
     written: list[Path],
 ) -> Drawing | None:
-    """Draw a figure into a folder; None where there is no function for it."""
+    """Draw a figure into a folder; return None if the figure has no function."""
     from printhammer.figures import FIGURES, save
 
     if number not in FIGURES:
@@ -225,7 +225,7 @@ def _draw(
     options: dict[str, Any] = {}
     try:
         if number == _BUZZ:
-            # The train of Fig. 7 has been sought already.
+            # The claim has already searched for the train of Fig. 7.
             options["search"] = buzz_search(context)
         elif number == _POINCARE:
             options["printed"] = printed_verdicts()
@@ -244,7 +244,7 @@ def _draw(
 
 
 def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
-    """Return versions and settings; those of a single motion where there is one."""
+    """Return versions and settings, including those of a representative single motion."""
     import platform
 
     import matplotlib as mpl

@@ -1,8 +1,8 @@
-"""What a report is made of: claims judged, figures drawn, what the reconstruction found.
+"""Contents of a report: judged claims, drawn figures, results of the reconstruction.
 
-Which figures of the paper a claim is about, and the way to them.
+`cited_figures` and `linked_source` find the figures that a claim cites.
 
-By how much a claim fails.
+`misses` states by how much a claim fails.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Drawing(Declared):
-    """One figure of the paper, drawn."""
+    """Figure of the paper, drawn for a hammer."""
 
     number: int = part("number in the paper")
     title: str = part("what it is")
@@ -38,7 +38,7 @@ class Drawing(Declared):
 
 
 class Report(Declared):
-    """What `write_report` judged, drew and wrote."""
+    """Result of `write_report`: claims, figures and files."""
 
     hammer: Hammer = part("the hammer")
     results: list[JudgedClaim] = part("the claims, judged")
@@ -49,47 +49,47 @@ class Report(Declared):
     files: list[Path] = part("what was written", default_factory=list)
 
     def count(self, verdict: str) -> int:
-        """Return how many claims have a verdict."""
+        """Return the number of claims with a verdict."""
         return sum(result.verdict == verdict for result in self.results)
 
     @property
     def statements(self) -> tuple[int, int]:
-        """How many statements of the paper hold, and how many there are: each panel of Fig. 11 is one."""
+        """Number of statements of the paper that hold, and in total; each panel of Fig. 11 is a statement."""
         pairs = [result.statements for result in self.results]
         return sum(held for held, _ in pairs), sum(made for _, made in pairs)
 
     @property
     def reconstructed(self) -> bool:
-        """Whether the hammer is the one that the reconstruction is about."""
+        """Whether the hammer is the reconstructed one."""
         return self.search is not None
 
     @property
     def search(self) -> Search | None:
-        """The search for the constants of this hammer."""
+        """Search for the constants of this hammer, if any."""
         search = self.reconstruction.search
         return search if search is not None and search.shipped == self.hammer.fingerprint else None
 
     @property
     def family(self) -> Family | None:
-        """The hammers that do as well as this one."""
+        """Family of hammers that satisfy the claims equally well, if any."""
         return self.reconstruction.family if self.reconstructed else None
 
 
 CITATION: Final = re.compile(r"Figs?\. (?:[\d, and]*\d)")
-"""Where a source names figures."""
+"""Pattern of a reference to figures in a source."""
 
 SECTIONS: Final = {"Poincaré plots": 11}
-"""Sections of the paper that are about one figure."""
+"""Sections of the paper that are about a single figure."""
 
 
 def cited_figures(source: str) -> set[int]:
-    """Return the numbers of the figures that a source of a claim names or is about."""
+    """Return the numbers of the figures that the source of a claim cites or is about."""
     named = {int(number) for number in re.findall(r"\d+", " ".join(CITATION.findall(source)))}
     return named | ({SECTIONS[source]} if source in SECTIONS else set())
 
 
 def linked_source(source: str, drawn: set[int]) -> Any:
-    """Return a source as HTML, the numbers of drawn figures linked."""
+    """Return a source as HTML, with links to the drawn figures."""
     from markupsafe import Markup, escape
 
     def link(match: re.Match[str]) -> str:
@@ -105,7 +105,7 @@ def linked_source(source: str, drawn: set[int]) -> Any:
 
 
 class Miss(Declared):
-    """A measured value outside its band, as text."""
+    """Measured value outside its band, as text."""
 
     words: str = part("what was measured")
     value: str = part("what it is")
@@ -114,7 +114,7 @@ class Miss(Declared):
 
 
 def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
-    """Return what of measured values is not within the band of a claim; nothing where there are none."""
+    """Return the measured values outside the band of a claim; empty if none were measured."""
     missed: list[Miss] = []
     if value is None:
         return missed
@@ -122,7 +122,7 @@ def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
         words, unit = split_name(name)
         measured, band = value.get(name), claim.band[name]
         if isinstance(band, list) and isinstance(band[0], str):
-            # One by one they are told elsewhere.
+            # Lists of words are reported item by item elsewhere.
             missed.append(Miss(words, agreement(measured, band), "", ""))
         else:
             shown = value_text(measured, unit), band_text(band, unit)
@@ -131,21 +131,21 @@ def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
 
 
 def agreement(value: Any, band: list[str]) -> str:
-    """Return how many words of a list are those that are wanted."""
+    """Return the number of words in a list that agree with the band, as text."""
     words = value if isinstance(value, (list, tuple)) else []
     same = sum(one == other for one, other in zip(words, band, strict=False))
     return f"{same} of {len(band)} as printed"
 
 
 def distance(value: Any, band: Any, unit: str) -> str:
-    """Return how far a value is from its band, as text; empty where that is no number.
+    """Format the distance of a value from its band; empty if the band is not numeric.
 
     Parameters
     ----------
     value
         A measured value outside the band, SI.
     band
-        What it must be, as `printhammer.claims.Claim.band` has it.
+        Band, in the form of `printhammer.claims.Claim.band`.
     unit : str
         SI unit; empty for a pure number.
     """
@@ -164,7 +164,7 @@ def distance(value: Any, band: Any, unit: str) -> str:
 
 
 def _limit(value: float, band: Any) -> float | None:
-    """Return the end of a band that a value outside it misses."""
+    """Return the end of the band that the value violates."""
     if isinstance(band, dict):
         for side, limit in band.items():
             if not (math.isnan(value) or SIDES[side](value, limit)):

@@ -1,4 +1,4 @@
-"""The page of a report: one HTML file that needs nothing else."""
+"""HTML page of a report: one self-contained file."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def page(report: Report) -> str:
 
 
 def view(report: Report) -> dict[str, Any]:
-    """Return what the page and its printed form show of a report, as texts and places on tracks."""
+    """Return the data that page and PDF show of a report, as texts and positions on tracks."""
     drawn = {drawing.number for drawing in report.drawings}
     constants = report.hammer.constants.values()
     by_kind = {kind: dict.fromkeys(VERDICTS, 0) for kind in KINDS}
@@ -98,7 +98,7 @@ def _parts(hammer: Hammer) -> list[dict[str, Any]]:
 
 
 def _judged_lines(result: JudgedClaim) -> list[dict[str, Any]]:
-    """Return the measured values of a claim that are banded, as text."""
+    """Return the measured values of a claim that have bands, as text."""
     value, missed = result.value or {}, set(result.missed)
     lines = []
     for name, wanted in result.claim.band.items():
@@ -111,7 +111,7 @@ def _judged_lines(result: JudgedClaim) -> list[dict[str, Any]]:
 
 
 def _claim(result: JudgedClaim, report: Report, drawn: set[int]) -> dict[str, Any]:
-    """Return a claim with its values as text: those that are banded, and the others."""
+    """Return a claim with its values as text, those with bands separate from the others."""
     value, band = result.value or {}, result.claim.band
     rest = {name: entry for name, entry in value.items() if name not in band}
     plain = {

@@ -1,6 +1,6 @@
-"""The report as a PDF, for print and for the shelf: the views of the page, typeset by Typst.
+"""Report as a PDF, typeset by Typst from the same data as the page.
 
-The template is `templates/report.typ`; it is given everything as JSON, so that no text can become markup.
+The template `templates/report.typ` receives all data as JSON, so that no text is interpreted as markup.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ _SHOWN = (
 
 
 def check_typesetter() -> None:
-    """Check that a PDF can be made here."""
+    """Check that Typst is installed."""
     if find_spec("typst") is None:
         raise missing_extra("a PDF of the report needs typst", "pdf")
 
 
 def write_pdf(report: Report, path: Path) -> None:
-    """Write a report as a PDF beside its folder of figures; the same report gives the same bytes."""
+    """Write a report as a PDF beside its folder of figures; equal reports yield equal bytes."""
     check_typesetter()
     import matplotlib as mpl
     import typst
 
     template = files("printhammer").joinpath("report", "templates", "report.typ").read_bytes()
-    # Fonts come with Typst and Matplotlib, so that those of a machine cannot change a line.
+    # Use the fonts of Typst and Matplotlib only, so that the machine does not affect the layout.
     fonts = typst.Fonts(include_system_fonts=False, font_paths=[f"{mpl.get_data_path()}/fonts/ttf"])
     data = json.dumps(_typeset(_contents(report)), default=_plain)
     compiler = typst.Compiler(template, root=str(path.parent), font_paths=fonts, sys_inputs={"data": data})
@@ -60,7 +60,7 @@ def write_pdf(report: Report, path: Path) -> None:
 
 
 def _contents(report: Report) -> dict[str, Any]:
-    """Return what the template shows."""
+    """Return the data of the template."""
     hammer, shown = report.hammer, view(report)
     shown = {key: shown[key] for key in _SHOWN}
     if shown["search"] is not None:
@@ -89,7 +89,7 @@ def _contents(report: Report) -> dict[str, Any]:
 
 
 def _plain(entry: Any) -> Any:
-    """Return an object of a view as JSON has it."""
+    """Convert an object of a view to plain JSON data."""
     if isinstance(entry, JudgedClaim):
         claim = {
             name: getattr(entry.claim, name) for name in ("name", "kind", "source", "says", "reading", "note")
@@ -104,7 +104,7 @@ def _plain(entry: Any) -> Any:
 
 
 def _typeset(data: Any) -> Any:
-    """Return data with the signs that a page can show in all texts."""
+    """Return data with typographic characters in all texts."""
     if isinstance(data, dict):
         return {key: _typeset(value) for key, value in data.items()}
     if isinstance(data, list | tuple):

@@ -1,4 +1,4 @@
-"""Measured values and bands as text for readers: SI with a handy prefix, inch-pound beside."""
+"""Measured values and bands as text: SI with a convenient prefix, and inch-pound units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SUFFIXES: Final = {
     "_A": "A",
 }
 
-# SI unit to the unit shown and its sign, and the same in inch-pound where the paper would use it.
+# Unit shown, with its symbol, for each SI unit, and the inch-pound unit that the paper would use.
 _SHOWN: Final = {
     "m": ("um", "µm", "in", "in"),
     "s": ("us", "µs", "", ""),
@@ -31,7 +31,7 @@ _SHOWN: Final = {
 }
 
 _TINY: Final = 1e-6
-"""Number shown below which the inch-pound value is left out."""
+"""Displayed number below which the inch-pound value is omitted; arbitrary."""
 
 _WORDS: Final = {
     "above": "> {}",
@@ -55,7 +55,7 @@ def words_of(name: str) -> str:
 
 
 def value_text(value: Any, unit: str, *, other: bool = True) -> str:
-    """Return a measured value as text, with the inch-pound value beside."""
+    """Format a measured value, with the inch-pound value in parentheses."""
     if value is None:
         return "none"
     if isinstance(value, bool):
@@ -70,7 +70,7 @@ def value_text(value: Any, unit: str, *, other: bool = True) -> str:
 
 
 def band_text(band: Any, unit: str) -> str:
-    """Return what a value must be, as text."""
+    """Format a band: the required value."""
     if isinstance(band, dict):
         return " and ".join(_WORDS[side].format(_limit(limit, unit)) for side, limit in band.items())
     if isinstance(band, list) and band and isinstance(band[0], str):
@@ -87,17 +87,17 @@ def _limit(value: float, unit: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return a sentence of ours with the signs that a page can show."""
+    """Return a sentence with typographic characters."""
     text = re.sub(r"(?<=\d) u([ms])\b", "\N{NO-BREAK SPACE}µ\\1", text)
     return text.replace(">=", "≥").replace("<=", "≤").replace(" -> ", " → ")
 
 
 def percent(part: float) -> str:
-    """Return a part of the whole as text, such as "3.1 %"; never 100 % or 0 % unless it is all or none."""
+    """Format a fraction in percent, such as "3.1 %"; 100 % and 0 % are reserved for all and none."""
     if part in (0.0, 1.0):
         return f"{part:.0%}".replace("%", "\N{NO-BREAK SPACE}%")
     shown = 100.0 * part
-    # The digits that tell it from all or none.
+    # Enough digits to distinguish the fraction from all or none.
     text = f"{shown:.2g}" if shown < 10.0 else f"{shown:.{max(0, math.ceil(-math.log10(100.0 - shown)))}f}"
     # Without an exponent.
     return f"{Decimal(text):f}\N{NO-BREAK SPACE}%"
@@ -113,5 +113,5 @@ def _both(value: float, unit: str, digits: str, *, other: bool = True) -> str:
 
 
 def _number(value: float, digits: str) -> str:
-    """Return a number as text, its exponent short, with a true minus sign."""
+    """Format a number with a short exponent and a true minus sign."""
     return re.sub(r"e(-?)\+?0*(\d)", r"e\1\2", f"{value:{digits}}").replace("-", "−")

@@ -1,7 +1,4 @@
-"""What the templates of a report show: results of search and family as text and places on tracks.
-
-What a report shows of the family of hammers.
-"""
+"""Data for the templates of a report: results of search and family, as text and positions on tracks."""
 
 from __future__ import annotations
 
@@ -19,11 +16,11 @@ from printhammer.report.reconstruction.results import BestFor, Family, FamilyMem
 from printhammer.report.reconstruction.shares import Share
 
 SAME: Final = 1e-9
-"""Relative difference up to which two constants are the same."""
+"""Relative difference up to which two constants count as equal; above rounding errors of unit conversion."""
 
 
 def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
-    """Return a share as text and as places on a track, in percent; on a logarithmic one from a floor up."""
+    """Relative difference up to which two constants count as equal; larger than errors of unit conversion."""
     low, high = share.interval
 
     def place(part: float) -> float:
@@ -42,13 +39,13 @@ def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
 
 
 def rates_view(report: Report) -> dict[str, Any] | None:
-    """Return the base rates, the rarest first, on a logarithmic axis; None where there are none."""
+    """Return the base rates, the rarest first, on a logarithmic axis; None without base rates."""
     rates = report.reconstruction.base_rates
     if rates is None:
         return None
     shares = [(result, rates.share(result.claim.name)) for result in report.results]
     known = [(result, share) for result, share in shares if share is not None]
-    # A rate of none is drawn at the left end.
+    # A rate of zero is drawn at the left end.
     positive = [share.rate or share.interval[1] for _, share in known]
     decades = max(1, math.ceil(-math.log10(min(positive)) - 1e-12)) if positive else 1
     floor = 10.0**-decades
@@ -65,7 +62,7 @@ def rates_view(report: Report) -> dict[str, Any] | None:
 
 
 def panels_view(report: Report) -> list[dict[str, Any]]:
-    """Return the panels of Fig. 11: what is printed, what was found, and how often it is so by chance."""
+    """Return the panels of Fig. 11: printed verdict, computed verdict, and frequency by chance."""
     verdicts: list[str] = []
     for result in report.results:
         if result.claim.name == "poincare" and result.value is not None:
@@ -90,7 +87,7 @@ def panels_view(report: Report) -> list[dict[str, Any]]:
 
 
 def schemes_view(report: Report) -> dict[str, Any] | None:
-    """Return what the integrators of 1983 do to verdicts; None where that is about another hammer."""
+    """Return the effect of the integrators of 1983; None if the data belong to another hammer."""
     found = report.reconstruction.schemes
     if found is None or found.shipped != report.hammer.fingerprint:
         return None
@@ -125,7 +122,7 @@ def schemes_view(report: Report) -> dict[str, Any] | None:
 
 
 def predictions_view(report: Report) -> dict[str, Any] | None:
-    """Return what the search on the stated claims alone predicts; None where there is nothing."""
+    """Return the predictions of the search on the stated claims alone; None without data."""
     predictions = report.reconstruction.predictions
     if predictions is None or not report.reconstructed:
         return None
@@ -150,7 +147,7 @@ def predictions_view(report: Report) -> dict[str, Any] | None:
 
 
 def failing_view(report: Report) -> list[dict[str, Any]]:
-    """Return the claims that fail: by how much, why, and the best hammer for each that the search met."""
+    """Return the failing claims: distance from the band, reason, and the best hammer met for each."""
     search = report.search
     rows = []
     for result in report.results:
@@ -195,7 +192,7 @@ def _best_view(best: BestFor, claim: Claim, hammer: Hammer) -> dict[str, Any]:
 
 
 def timings_view(report: Report) -> dict[str, Any]:
-    """Return what took how long: figures and claims, the slowest first."""
+    """Return the computation times of figures and claims, the slowest first."""
     entries: list[tuple[str, str, float]] = [
         (f"Figure {drawing.number}", f"figure-{drawing.number}", drawing.seconds)
         for drawing in report.drawings
@@ -214,11 +211,11 @@ def timings_view(report: Report) -> dict[str, Any]:
 
 
 _ROOM: Final = 4.0
-"""Free part of a track at each end, in percent."""
+"""Margin of a track at each end, in percent; arbitrary."""
 
 
 def family_view(report: Report) -> dict[str, Any] | None:
-    """Return conclusions, claims, members and constants of the family; None where there is none."""
+    """Return conclusions, claims, members and constants of the family; None without a family."""
     family = report.family
     if family is None:
         return None
@@ -239,7 +236,7 @@ def _conclusions(family: Family) -> list[dict[str, Any]]:
     for name, conclusion in family.conclusions.items():
         words, unit = split_name(name)
         values = [member.conclusions.get(name) for member in family.hammers]
-        # Members have no value of a statement; its range is that of margins, which mean nothing to a reader.
+        # Statements have no value per member; their range is that of margins, of no interest to readers.
         is_statement = not any(name in member.conclusions for member in family.hammers)
         ends = ("", "") if is_statement else (conclusion.low, conclusion.high)
         low, high = (value_text(end, unit, other=False) for end in ends)
@@ -252,7 +249,7 @@ def _conclusions(family: Family) -> list[dict[str, Any]]:
 
 
 def _dots(values: Iterable[float], ends: tuple[float, float] | None = None) -> list[str]:
-    """Return places on a track, in percent, linear between the least and the largest value."""
+    """Return positions on a track, in percent, linear between the smallest and the largest value."""
     values = list(values)
     low, high = ends or (min(values, default=0.0), max(values, default=0.0))
     span = high - low
@@ -260,7 +257,7 @@ def _dots(values: Iterable[float], ends: tuple[float, float] | None = None) -> l
 
 
 def _member(member: FamilyMember, names: list[str]) -> dict[str, Any]:
-    """Return one hammer with its verdicts and what follows for it."""
+    """Return a hammer with its verdicts and consequences."""
     kinds = {name: claim.kind for name, claim in every_claim().items()}
     verdicts = list(member.verdicts.values())
     stated = [verdict for name, verdict in member.verdicts.items() if kinds[name] == "stated"]
@@ -300,7 +297,7 @@ def _spread(family: Family, hammer: Hammer) -> dict[str, Any]:
 
 
 def _claims(family: Family) -> dict[str, Any]:
-    """Return which claims hold for all hammers, for some, and for none."""
+    """Return the claims that hold for all hammers, for some, and for none."""
     counts = {}
     for name in every_claim():
         verdicts = [member.verdicts[name] for member in family.hammers if name in member.verdicts]

@@ -1,4 +1,4 @@
-"""Results: declared once, and from that Dataset, table, files, docstring, HTML repr and picture."""
+"""Results: declared once; Dataset, table, files, docstring, HTML repr and picture follow."""
 
 from printhammer.results.declare import Column, Declared, column, coordinate, derived, part, scalar
 from printhammer.results.files import ENDINGS, Reopened, reopen, save_dataset

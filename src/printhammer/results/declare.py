@@ -1,10 +1,11 @@
-"""How a result says, once and beside each field, what the field means, its unit and its dimensions.
+"""Declarations of result fields: meaning, unit and dimensions, beside each field.
 
 `column`, `coordinate`, `scalar` and `part` declare the fields of a `printhammer.results.Result`, and
-`derived` a property that belongs to its table. Dataset, table, files, the Attributes section of the docstring
-and the HTML repr follow from them. For values that belong together and are no result, see `Declared`.
+`derived` adds a property to its table. Dataset, table, files, the Attributes section of the docstring and the
+HTML repr follow from the declarations. `Declared` is the base of classes with declared fields that are not
+results.
 
-What a notebook shows of results and their parts: short tables, HTML.
+The functions on HTML format results and their fields for notebooks.
 """
 
 from __future__ import annotations
@@ -30,25 +31,25 @@ from typing import (
 import numpy as np
 
 MOST_ROWS: Final = 40
-"""Rows shown of a table; of more, the first and the last."""
+"""Largest number of rows shown of a table; longer tables show the first and last rows. Arbitrary."""
 
 _MOST_LETTERS: Final = 80
 
 
 def html_table(rows: Sequence[Sequence[str]], heads: Sequence[str] = ()) -> str:
-    """Return a table; cells are cut to 80 letters."""
+    """Return an HTML table; cells are truncated to 80 characters."""
     head = f"<thead><tr>{''.join(f'<th>{escape(name)}</th>' for name in heads)}</tr></thead>" if heads else ""
     cells = ("".join(f"<td>{escape(_cut(cell))}</td>" for cell in row) for row in rows)
     return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
 def titled(title: str, *parts: str) -> str:
-    """Return parts of HTML below a title in bold."""
+    """Return HTML blocks below a bold title."""
     return f"<div><b>{escape(title)}</b>{''.join(parts)}</div>"
 
 
 def cell(value: Any) -> str:
-    """Return a value as a cell: numbers to six digits, arrays by their shape, None as a dash."""
+    """Format a value as a cell: numbers to six digits, arrays by shape, None as a dash."""
     if value is None:
         return "-"
     if isinstance(value, np.ndarray):
@@ -59,12 +60,12 @@ def cell(value: Any) -> str:
 
 
 def extent(values: Any) -> str:
-    """Return the shape of an array, such as "3 × 512"."""
+    """Format the shape of an array, such as "3 × 512"."""
     return " × ".join(map(str, np.shape(values)))
 
 
 def span(values: Any) -> str:
-    """Return least and largest of numbers; empty where there are none."""
+    """Format the smallest and largest of numbers; empty without numbers."""
     array = np.asarray(values)
     if array.dtype.kind not in "fiu":
         return ""
@@ -73,7 +74,7 @@ def span(values: Any) -> str:
 
 
 def shortened(rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[Sequence[str]]:
-    """Return at most `most` rows: of more, the first and the last, and between them how many are left out."""
+    """Return at most `most` rows: the first and last ones, with the number of omitted rows between."""
     hidden, half = len(rows) - most, most // 2
     if hidden <= 0:
         return list(rows)
@@ -93,7 +94,7 @@ _F = TypeVar("_F", bound="Callable[..., Any]")
 
 @dataclass(frozen=True)
 class Column:
-    """What a result says about one of its fields.
+    """Declaration of a field of a result.
 
     Attributes
     ----------
@@ -104,14 +105,14 @@ class Column:
     dims : tuple of str
         Dimensions; none for a scalar.
     kind : str
-        "column" and "coordinate" are arrays of the Dataset, "scalar" is one of its attributes, "part" is
-        none of it.
+        "column" and "coordinate" are arrays of the Dataset, "scalar" is an attribute, "part" is not in the
+        Dataset.
     more : str
-        What else the docstring says.
+        Further text of the docstring.
     name : str
         Name in the Dataset.
     dtype : object
-        Type of the numbers in the Dataset; None for that of the values.
+        Type of the numbers in the Dataset; None keeps the type of the values.
     codes : sequence of str
         Names of the numbers 0, 1, 2 and so on; the table holds the names.
     head : str
@@ -143,12 +144,12 @@ class Column:
         }
 
     def heading(self, name: str) -> str:
-        """Heading in the table of the variable of some name, such as "x [m]"."""
+        """Return the heading in the table of a variable, such as "x [m]"."""
         return heading(self.head or name, self.unit)
 
     @property
     def sentence(self) -> str:
-        """The text of the docstring."""
+        """Return the text of the docstring."""
         unit = f", {self.unit}" if self.unit not in ("", "1") else ""
         more = f"; {self.more}" if self.more else ""
         return f"{self.meaning[:1].upper()}{self.meaning[1:]}{unit}{more}."
@@ -160,7 +161,7 @@ def heading(name: str, unit: str) -> str:
 
 
 class More(TypedDict, total=False):
-    """What a declaration may say beyond unit, meaning and dimensions, as `Column` has it."""
+    """Optional properties of a declaration, as described for `Column`."""
 
     more: str
     name: str
@@ -180,10 +181,10 @@ def column(unit: str, meaning: str, dims: str, *, default: Any = MISSING, **more
     dims : str
         Names of the dimensions, with spaces between them.
     default : object, optional
-        Value of the field where none is given.
+        Default value of the field.
     **more
-        `more`, what the docstring says beyond meaning and unit; `name` and `head`, name in the Dataset and
-        heading in the table, where they are not that of the field; `dtype`, `codes`, `attrs`; see `Column`.
+        `more`, further text of the docstring; `name` and `head`, name in the Dataset and heading in the
+        table, if different from the name of the field; `dtype`, `codes`, `attrs`; see `Column`.
     """
     note = Column(unit, meaning, tuple(dims.split()), "column", **more)
     return field(default=default, repr=False, metadata={_KEY: note})
@@ -198,15 +199,15 @@ def coordinate(unit: str, meaning: str, dims: str, *, default: Any = MISSING, **
 def scalar(unit: str, meaning: str, *, more: str = "", name: str = "", **default: Any) -> Any:
     """Declare a number, text or short list that is an attribute of the Dataset; arguments as for `column`.
 
-    A default, or a `default_factory`, is that of `dataclasses.field`.
+    `default` and `default_factory` are passed to `dataclasses.field`.
     """
     return field(**default, metadata={_KEY: Column(unit, meaning, (), "scalar", more, name)})
 
 
 def part(meaning: str, *, more: str = "", repr: bool = True, **default: Any) -> Any:
-    """Declare a field that is no part of the Dataset, such as the hammer; provenance may speak of it.
+    """Declare a field outside the Dataset, such as the hammer; it may contribute to the provenance.
 
-    A default, or a `default_factory`, is that of `dataclasses.field`.
+    `default` and `default_factory` are passed to `dataclasses.field`.
     """
     return field(**default, repr=repr, metadata={_KEY: Column("", meaning, (), "part", more)})
 
@@ -214,7 +215,7 @@ def part(meaning: str, *, more: str = "", repr: bool = True, **default: Any) -> 
 def derived(
     unit: str, meaning: str, dims: str = "", *, kind: Kind | None = None, **more: Unpack[More]
 ) -> Callable[[_F], _F]:
-    """Make a property part of the Dataset: to stand below `@property` or `@cached_property`.
+    """Declare a property as a variable of the Dataset; placed below `@property` or `@cached_property`.
 
     Arguments as for `column`; without dimensions it is an attribute of the Dataset.
     """
@@ -229,7 +230,7 @@ def derived(
 
 
 def columns_of(result: type[Any]) -> dict[str, Column]:
-    """List what a class declares, attribute to `Column`: fields in their order, then derived properties."""
+    """Return the declarations of a class by attribute: fields in order, then derived properties."""
     declared: dict[str, Column] = {}
     if is_dataclass(result):
         declared = {entry.name: entry.metadata[_KEY] for entry in fields(result) if _KEY in entry.metadata}
@@ -242,9 +243,9 @@ def columns_of(result: type[Any]) -> dict[str, Column]:
 
 
 def with_attributes(doc: str, result: type[Any], columns: Mapping[str, Column]) -> str:
-    """Return a docstring with the Attributes section that follows from the declared fields.
+    """Return a docstring with the Attributes section generated from the declared fields.
 
-    The section goes before Notes, References and the like. Properties have docstrings of their own.
+    The section is placed before Notes, References and similar sections. Properties keep their own docstrings.
     """
     doc = cleandoc(doc)
     types = {entry.name: getattr(entry.type, "__name__", entry.type) for entry in fields(result)}
@@ -262,7 +263,7 @@ def with_attributes(doc: str, result: type[Any], columns: Mapping[str, Column]) 
 
 
 def _type_text(annotation: str, dims: tuple[str, ...]) -> str:
-    """Return an annotation as numpydoc writes it, such as "int array, shape (firing,)"."""
+    """Format an annotation in numpydoc style, such as "int array, shape (firing,)"."""
     if not dims or not ("Array" in annotation or "ndarray" in annotation):
         return annotation.replace(" | ", " or ")
     sort = "int " if "int" in annotation.lower() else "bool " if "bool" in annotation.lower() else ""
@@ -272,10 +273,10 @@ def _type_text(annotation: str, dims: tuple[str, ...]) -> str:
 
 @dataclass_transform(frozen_default=True, field_specifiers=(column, coordinate, scalar, part))
 class Declared:
-    """Values that belong together; a class that derives from it is a frozen dataclass without a Dataset.
+    """Base of classes with declared fields but without a Dataset; subclasses are frozen dataclasses.
 
-    Its fields say what they mean as those of a result do, and the Attributes of its docstring follow.
-    With `eq=False` its instances are compared by identity, as those that hold arrays must be.
+    The fields declare their meanings as those of a result do, and the Attributes section of the docstring
+    follows. With `eq=False` instances are compared by identity, as required for fields that are arrays.
     """
 
     if TYPE_CHECKING:
@@ -287,7 +288,7 @@ class Declared:
         cls.__doc__ = with_attributes(cls.__doc__ or "", cls, columns_of(cls))
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: the values that the text shows, with units and meanings."""
+        """Return the HTML repr: values with units and meanings."""
         notes = columns_of(type(self))
         rows = [
             (
@@ -301,10 +302,10 @@ class Declared:
         return titled(type(self).__name__, html_table(rows))
 
     def __dir__(self) -> list[str]:
-        """Return what completion shows: public names of fields, properties and methods."""
+        """Return the names for completion: public fields, properties and methods."""
         return public_names(super().__dir__())
 
 
 def public_names(names: Iterable[str]) -> list[str]:
-    """Return the names for those who use an object: neither private ones nor constants of its class."""
+    """Return the names for users of an object: neither private names nor constants of its class."""
     return sorted(name for name in names if not name.startswith("_") and not name.isupper())

@@ -1,4 +1,4 @@
-"""Results on disk: written by the ending of the name, whole or not at all, and opened again.
+"""Results on disk: atomic writing by file ending, and reopening.
 
 | ending | holds |
 |---|---|
@@ -50,7 +50,7 @@ _MOST_INT: Final = 2**31
 
 
 class Reopened(Declared):
-    """A result from a file."""
+    """Result read from a file."""
 
     path: Path = part("the file")
     dataset: xr.Dataset = part("the arrays; of a table (.csv, .parquet) its columns over `row`", repr=False)
@@ -60,12 +60,12 @@ class Reopened(Declared):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Title, numbers that hold for the whole result, and provenance."""
+        """Title, numbers of the whole result, and provenance."""
         return {str(key): value for key, value in self.dataset.attrs.items()}
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the result comes from."""
+        """Provenance of the result."""
         return {key: value for key, value in self.attributes.items() if key in KEYS}
 
 
@@ -75,13 +75,13 @@ def save(
     dataframe: Callable[[], pd.DataFrame],
     endings: Sequence[str] = ENDINGS,
 ) -> None:
-    """Write a result, as a Dataset or as a table by the ending of the name; whole or not at all.
+    """Write a result atomically, as a Dataset or as a table, depending on the file ending.
 
     Raises
     ------
     InputError
-        The name ends in none of `endings`, the file cannot be written, or a package is missing that the
-        format needs; what was there stays.
+        The name ends in none of `endings`, the file cannot be written, or a package that the format needs is
+        missing; an existing file is kept.
     """
     target = Path(path)
     kind = target.suffix.lower()
@@ -102,23 +102,23 @@ def save(
 
 
 def save_dataset(dataset: xr.Dataset, path: str | Path, endings: Sequence[str] = ENDINGS) -> None:
-    """Write a Dataset, whole or not at all; see `save`."""
+    """Write a Dataset atomically; see `save`."""
     save(path, lambda: dataset, lambda: frame_of(dataset), endings)
 
 
 def reopen(path: str | Path) -> Reopened:
-    """Open a result that was saved.
+    """Open a saved result.
 
     Parameters
     ----------
     path : path
-        A file that `Result.save` wrote. A CSV file without the lines ``# key: value`` opens as
-        well, and has no provenance.
+        File written by `Result.save`. A CSV file without lines ``# key: value`` is accepted as well, and has
+        no provenance.
 
     Raises
     ------
     InputError
-        The name ends in none of `ENDINGS`, the file cannot be read, or holds something else.
+        The name ends in none of `ENDINGS`, the file cannot be read, or does not hold a result.
     """
     import pandas as pd
 
@@ -141,14 +141,14 @@ def reopen(path: str | Path) -> Reopened:
 
 
 def need_for(path: str | Path, kind: str = "") -> None:
-    """Make sure that the optional package is there that a file needs; `kind` instead of its ending."""
+    """Check that the optional package for a file format is installed; `kind` overrides the ending."""
     package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
         raise missing_extra(f"{path}: {what} {package}", extra)
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON and every other format hold it: numbers, texts, lists and dicts of Python."""
+    """Convert a value to plain numbers, texts, lists and dicts of Python, which every format can hold."""
     if isinstance(value, dict):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, np.ndarray | list | tuple):
@@ -159,7 +159,7 @@ def plain(value: Any) -> Any:
 
 
 def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[str, Any]) -> xr.Dataset:
-    """Return a Dataset of columns and coordinates with their values, by name."""
+    """Build a Dataset from columns and coordinates with their values, by name."""
     import xarray as xr
 
     data: dict[str, Any] = {}
@@ -172,7 +172,7 @@ def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[st
 
 
 def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -> pd.DataFrame:
-    """Return the arrays of a Dataset over the dimensions of the first one as a table, units in the heads."""
+    """Convert the arrays of a Dataset over the dimensions of the first one to a table."""
     first = next(iter(dataset.data_vars.values()), None)
     dims = () if first is None else tuple(map(str, first.dims))
     columns = {}
@@ -187,16 +187,16 @@ def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -
 def frame(
     columns: Mapping[str, tuple[tuple[str, ...], Any]], dims: tuple[str, ...], attributes: dict[str, Any]
 ) -> pd.DataFrame:
-    """Return a table with a row for each place along some dimensions.
+    """Build a table with one row for each index along given dimensions.
 
     Parameters
     ----------
     columns : mapping
-        Dimensions, a part of `dims`, and values, by heading.
+        Dimensions, a subset of `dims`, and values, by heading.
     dims : tuple of str
         The dimensions; the last varies fastest.
     attributes : dict
-        For the `attrs` of the table.
+        Attributes for the `attrs` of the table.
     """
     import pandas as pd
 
@@ -216,23 +216,23 @@ def frame(
 
 
 def csv_text(table: pd.DataFrame) -> str:
-    """Return a table as CSV with all digits, its `attrs` as lines ``# key: value`` above the heading."""
+    """Format a table as CSV with all digits, preceded by its `attrs` as lines ``# key: value``."""
     head = "".join(f"# {key}: {_text(value)}\n" for key, value in table.attrs.items())
     return head + str(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
 
 
 def write_csv(table: pd.DataFrame, path: str | Path) -> None:
-    """Write a table as CSV, see `csv_text`."""
+    """Write a table as CSV; see `csv_text`."""
     write_file(path, csv_text(table))
 
 
 def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
-    """Write a table as Parquet, its `attrs` with it.
+    """Write a table as Parquet, including its `attrs`.
 
     Raises
     ------
     InputError
-        The file cannot be written, or pyarrow is not installed; what was there stays.
+        The file cannot be written, or pyarrow is not installed; an existing file is kept.
     """
     need_for(path, ".parquet")
     content = BytesIO()
@@ -241,14 +241,14 @@ def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
 
 
 def _text(value: Any) -> str:
-    """Return text as it is where that can be told from numbers and lists, everything else as JSON."""
+    """Encode an attribute as text: verbatim if it is not mistaken for a number or list, else as JSON."""
     if isinstance(value, str) and _decoded(value) == value == value.strip() and value.isprintable():
         return value
     return json.dumps(_strict(value), ensure_ascii=False)
 
 
 def _decoded(value: str, starts: str = '[{"-0123456789n') -> Any:
-    """Return what an attribute was before it had to be text."""
+    """Decode an attribute encoded by `_text`."""
     if value[:1] and value[0] in starts:
         with suppress(ValueError):
             decoded = json.loads(value)
@@ -259,16 +259,16 @@ def _decoded(value: str, starts: str = '[{"-0123456789n') -> Any:
 def _netcdf(dataset: xr.Dataset) -> bytes:
     kept = dataset.copy()
     kept.attrs = _flat(dataset.attrs)
-    # SciPy writes the classic format, which everything reads.
+    # SciPy writes the classic format, which every reader supports.
     return bytes(kept.to_netcdf(None, engine="scipy", format="NETCDF3_64BIT"))
 
 
 def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return attributes as arrays, numbers and texts; whatever else there is as JSON."""
+    """Return attributes as arrays, numbers and texts; other values as JSON."""
     flat = {}
     for key, value in attributes.items():
         kept = plain(value)
-        # An array of one number would come back as a number.
+        # An array of one number would be read back as a number.
         entries = kept if isinstance(kept, list) and len(kept) > 1 else [kept]
         numbers = all(
             isinstance(entry, float) or (isinstance(entry, int) and abs(entry) < _MOST_INT)
@@ -285,7 +285,7 @@ def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
     try:
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
         with catch_warnings():
-            # Metadata in one place spare readers a warning; each array has its own as well.
+            # Consolidated metadata avoid a warning in readers; each array has its own as well.
             simplefilter("ignore")
             dataset.assign_attrs(_flat(dataset.attrs)).to_zarr(
                 draft / target.name, mode="w", zarr_format=3, consolidated=True
@@ -319,14 +319,14 @@ def _json(dataset: xr.Dataset) -> str:
         }
         for name, values in dataset.variables.items()
     }
-    # A line for each attribute and each array.
+    # One line for each attribute and each array.
     head = "".join(f"  {text(str(key))}: {text(plain(value))},\n" for key, value in dataset.attrs.items())
     body = ",\n".join(f"    {text(name)}: {text(entry)}" for name, entry in columns.items())
     return f"{{\n{head}  {text(_COLUMNS)}: {{\n{body}\n  }}\n}}\n"
 
 
 def _strict(value: Any) -> Any:
-    """Return what strict JSON holds: null for nan, and texts for infinite numbers."""
+    """Convert a value to strict JSON: null for NaN, and text for infinite numbers."""
     if isinstance(value, dict):
         return {key: _strict(entry) for key, entry in value.items()}
     if isinstance(value, list):
@@ -386,7 +386,7 @@ def _read_csv(source: Path) -> pd.DataFrame:
 
 
 def _typed(cells: list[str]) -> Any:
-    """Return a column as numbers, to the last bit, or as truth values, or as text."""
+    """Convert a column of cells to exact numbers, Booleans or text."""
     if set(cells) <= {"True", "False"}:
         return np.array([cell == "True" for cell in cells])
     for kind in (int, float):

@@ -1,4 +1,4 @@
-"""Where a result comes from: one set of keys, made in one place.
+"""Provenance of results: one set of keys, composed in one place.
 
 | key | |
 |---|---|
@@ -27,7 +27,7 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
 
 VERSIONS: Final = ("printhammer", "numpy", "numba", "scipy")
-"""Keys that every result has."""
+"""Version keys, present in every result."""
 
 KEYS: Final = (
     "hammer",
@@ -42,7 +42,7 @@ KEYS: Final = (
     "status",
     *VERSIONS,
 )
-"""All keys of provenance, in order."""
+"""All provenance keys, in order."""
 
 
 def provenance(
@@ -56,9 +56,9 @@ def provenance(
     tolerance: float | None = None,
     status: str | None = None,
 ) -> dict[str, Any]:
-    """Return where a result comes from; a drive tells of its waveform and overlap as well."""
+    """Return the provenance of a result; a drive supplies waveform and overlap as well."""
     if drive is not None:
-        # A sequence has many waveforms, and none that speaks for all.
+        # A sequence has several waveforms, none of which represents the drive.
         waveform = drive.waveform if waveform is None and drive.uniform else waveform
         overlap = drive.overlap if overlap is None else overlap
     known = {
@@ -78,7 +78,7 @@ def provenance(
 
 
 def versions() -> dict[str, str]:
-    """Return the versions on which the bits of a result depend."""
+    """Return the versions that affect the bits of a result."""
     from printhammer import __version__
 
     return {"printhammer": __version__, **{name: _installed(name) for name in VERSIONS[1:]}}
@@ -86,5 +86,5 @@ def versions() -> dict[str, str]:
 
 @cache
 def _installed(name: str) -> str:
-    """Return the version of a package, which is read from a file."""
+    """Return the installed version of a package."""
     return version(name)

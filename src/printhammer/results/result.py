@@ -1,4 +1,4 @@
-"""Result: what every result of a computation can do, from what its class says of its fields.
+"""Base class of results, with Dataset, table, files and repr derived from the declared fields.
 
 >>> class Drop(Result, rows="fall"):
 ...     '''Falls of a stone.'''
@@ -12,7 +12,7 @@ makes a frozen dataclass whose Dataset, table, files, docstring and HTML repr fo
 whose picture `printhammer.figures.plots` knows by the name of the class. Units that depend on the instance,
 and arrays that are no fields, come from a class's own `entries`; further attributes from its `notes`.
 
-Many results of one class as one: their arrays stacked along a new dimension.
+`stacked` combines results of one class along a new dimension.
 """
 
 from __future__ import annotations
@@ -51,19 +51,19 @@ if TYPE_CHECKING:
     Entries = dict[str, tuple[Column, Any]]
 
 RESULTS: dict[str, type[Result]] = {}
-"""All classes of results that were imported, by name."""
+"""Imported result classes, by name."""
 
 
 @dataclass_transform(
     frozen_default=True, eq_default=False, field_specifiers=(column, coordinate, scalar, part)
 )
 class Result:
-    """A result of a computation; a class that derives from it is a frozen dataclass.
+    """Result of a computation; subclasses are frozen dataclasses.
 
-    The class statement may say more: `rows`, the dimensions of the table with spaces between them, the last
-    varying fastest (by default those of the first column); `endings`, those of the files that `save` writes
-    (by default all of `printhammer.results.ENDINGS`); and ``fields=False`` for a class with a constructor of
-    its own, all of whose columns are derived properties.
+    The class statement accepts `rows`, the dimensions of the table separated by spaces, the last varying
+    fastest (by default those of the first column); `endings`, the file endings that `save` accepts (by
+    default `printhammer.results.ENDINGS`); and ``fields=False`` for a class with its own constructor, whose
+    columns are all derived properties.
     """
 
     ENDINGS: ClassVar[tuple[str, ...]] = files.ENDINGS
@@ -90,14 +90,15 @@ class Result:
 
     @property
     def title(self) -> str:
-        """One line that says what the result is."""
+        """Title of the result, one line."""
         return type(self).__name__
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the result comes from: fingerprints, versions, tolerance; see `results.provenance`.
+        """Provenance: fingerprints, versions, tolerance; see `results.provenance`.
 
-        From the attributes `hammer`, `drive`, `regime` and so on, where the result has them.
+        It is composed from the attributes `hammer`, `drive`, `regime` and so on, as far as the result has
+        them.
         """
         regime = getattr(self, "regime", None)
         known: dict[str, Any] = {}
@@ -106,7 +107,7 @@ class Result:
             known["waveform"] = regime.fired
         for name in ("hammer", "drive", "waveform", "overlap", "period", "scheme", "tolerance", "status"):
             value = getattr(self, name, None)
-            # Of many runs, such as those of a chart, each has its own.
+            # A chart of many runs has a status for each.
             if value is not None and np.ndim(value) == 0:
                 known[name] = value
         return provenance(**known)
@@ -114,7 +115,7 @@ class Result:
     def entries(self) -> Entries:
         """Return the columns and coordinates with their values, by their names in the Dataset.
 
-        A class overrides it where units depend on the instance, or arrays are no fields.
+        A class overrides the method if units depend on the instance, or arrays are not fields.
         """
         return {
             note.name: (note, getattr(self, name))
@@ -123,12 +124,12 @@ class Result:
         }
 
     def notes(self) -> Mapping[str, Any]:
-        """Return what the attributes of the Dataset say beyond title, scalars and provenance."""
+        """Return further attributes of the Dataset, besides title, scalars and provenance."""
         return {}
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of the Dataset: title, scalars, notes and provenance; what is None is left out."""
+        """Attributes of the Dataset: title, scalars, notes and provenance, without None values."""
         scalars = {
             note.name: getattr(self, name) for name, note in self.COLUMNS.items() if note.kind == "scalar"
         }
@@ -146,11 +147,11 @@ class Result:
         }
 
     def to_dataset(self) -> xr.Dataset:
-        """Return the result as a Dataset, with units and meanings, and provenance in its attributes."""
+        """Return the result as a Dataset with units, meanings and provenance."""
         return files.dataset_of(self.entries(), self.attributes)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the result as a table, columns such as "x [m]", codes by name; provenance in `attrs`."""
+        """Return the result as a table: columns such as "x [m]", codes by name, provenance in `attrs`."""
         entries = sorted(self.entries().items(), key=lambda entry: entry[1][0].kind != "coordinate")
         dims = self.ROWS or next(note.dims for _name, (note, _values) in entries if note.kind == "column")
         columns = {
@@ -161,32 +162,31 @@ class Result:
         return files.frame(columns, dims, files.plain(self.attributes))
 
     def save(self, path: str | Path) -> None:
-        """Write the result, by the ending of the name; whole or not at all.
+        """Write the result atomically, in a format chosen by the file ending.
 
-        `printhammer.results.reopen` opens it again; see `printhammer.results.files` for what each format
-        holds.
+        `printhammer.results.reopen` reads it; `printhammer.results.files` describes the formats.
 
         Raises
         ------
         InputError
-            The name ends in none of `ENDINGS`, the file cannot be written, or a package is missing that the
-            format needs; what was there stays.
+            The name ends in none of `ENDINGS`, the file cannot be written, or a package that the format needs
+            is missing; an existing file is kept.
         """
         files.save(path, self.to_dataset, self.to_dataframe, self.ENDINGS)
 
     def plot(self, **options: Any) -> Any:
         """Draw the result; returns a matplotlib figure.
 
-        Options are those of the function that `printhammer.figures.plots` names for the class; `picture` is
-        the name of a second picture.
+        Options are those of the plot function that `printhammer.figures.plots` registers for the class;
+        `picture` names an alternative picture.
         """
-        # By name, so that physics does not depend on pictures.
+        # Look up the figure by name, so that physics does not depend on pictures.
         return import_module("printhammer.figures.plots").plot(self, **options)
 
     def summary(self) -> Summary:
-        """Return what the result says in short, by default of each declared column its range and meaning.
+        """Summarise the result; by default the range and meaning of each declared column.
 
-        The terminal, `print` and the notebook show it. A class overrides it where it has more to say.
+        The terminal, `print` and the notebook show the summary. Classes override the method.
         """
         rows = []
         for name, note in self.COLUMNS.items():
@@ -208,7 +208,7 @@ class Result:
         return f"{self.title}\n{self.summary().text()}"
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: title and summary, columns and attributes to unfold."""
+        """Return the HTML repr: title, summary, and collapsible lists of columns and attributes."""
         columns = [
             (note.heading(name), extent(values), ", ".join(note.dims), span(values), note.meaning)
             for name, (note, values) in self.entries().items()
@@ -223,12 +223,12 @@ class Result:
         )
 
     def __dir__(self) -> list[str]:
-        """Return what completion shows: public names of fields, properties and methods."""
+        """Return the names for completion: public fields, properties and methods."""
         return public_names(super().__dir__())
 
 
 def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
-    """Return codes by name, "" for those without one."""
+    """Return the names of codes, "" for codes without a name."""
     if not note.codes:
         return values
     names = np.array([*note.codes, ""])
@@ -236,21 +236,21 @@ def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, A
 
 
 def stacked(results: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
-    """Return the arrays of results, stacked; ragged ones are filled up with NaN, -1 or no text.
+    """Stack the arrays of results; ragged arrays are padded with NaN, -1 or empty text.
 
     Parameters
     ----------
     results : sequence of Result
-        The results, all of one class; possibly none.
+        Results of one class; may be empty.
     dim : str
         Name of the new dimension, the first one of every array.
     kind : type
-        The class, which alone says what arrays there are where there are no results.
+        Class of the results, which declares the arrays if `results` is empty.
 
     Returns
     -------
     dict
-        As `Result.entries` returns it; of a coordinate the longest is kept as it is.
+        Entries in the form of `Result.entries`; of each coordinate the longest one.
     """
     declared = (note for note in kind.COLUMNS.values() if note.kind in ("column", "coordinate"))
     none: Entries = {note.name: (note, np.zeros((0,) * len(note.dims))) for note in declared}

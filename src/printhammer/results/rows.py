@@ -20,15 +20,15 @@ _T = TypeVar("_T", bound=Declared)
 
 
 class Rows(tuple[_T, ...]):
-    """A tuple of declared values of one kind, such as dots, that shows itself as a table.
+    """Tuple of declared values of one kind, such as dots, with a table repr.
 
-    A name instead of a number gives a column: ``motion.dots["flight_time"]`` is an array, NaN for None.
+    Indexing by name yields a column: ``motion.dots["flight_time"]`` is an array, with NaN for None.
     """
 
     kind: type[_T]
 
     def __new__(cls, rows: Iterable[_T], kind: type[_T]) -> Self:
-        """Take the rows, and the class of all of them."""
+        """Create the tuple from rows and their common class."""
         made = super().__new__(cls, rows)
         made.kind = kind
         return made
@@ -43,7 +43,7 @@ class Rows(tuple[_T, ...]):
     @overload
     def __getitem__(self, index: str) -> npt.NDArray[Any]: ...
     def __getitem__(self, index: SupportsIndex | slice | str) -> _T | Rows[_T] | npt.NDArray[Any]:
-        """Return a row by its number, rows by a slice, or a column by its name.
+        """Return a row by index, rows by slice, or a column by name.
 
         Raises
         ------
@@ -72,7 +72,7 @@ class Rows(tuple[_T, ...]):
         return table.rename(columns=self._heads)
 
     def save(self, path: Path) -> None:
-        """Write the table as Parquet where the name ends so, else as CSV; errors as for `write_file`."""
+        """Write the table as Parquet for that ending, else as CSV; errors as for `write_file`."""
         (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(self.to_dataframe(), path)
 
     def _cells(self) -> list[list[str]]:
@@ -87,5 +87,5 @@ class Rows(tuple[_T, ...]):
         )
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
+        """Return the HTML repr."""
         return html_table(shortened(self._cells()), list(self._heads.values()))

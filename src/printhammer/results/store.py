@@ -1,9 +1,9 @@
-"""Results on disk: a Zarr v3 group that grows block by block and survives a kill at any moment.
+"""Store of sweep results: a Zarr v3 group that grows block by block and survives a kill at any moment.
 
-All arrays are laid out before the first result. A block of members is one chunk of every array, so nothing
-is ever read and written back. Each file is written whole beside its place, brought to the disk, and moved
-there; the chunk of the array `MARK` comes last, so a block is done if and only if that file is there. The
-lock of a store ends with the process that holds it.
+All arrays are laid out before the first result. A block of members is one chunk of every array, so that
+stored data are never rewritten. Each file is written to a temporary name, flushed to disk, and renamed; the
+chunk of the array `MARK` is written last, so that a block is done if and only if that file exists. The lock
+of a store ends with the process that holds it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MARK: Final = "status"
-"""The array whose chunk tells that a block is done."""
+"""Array whose chunk marks a block as done."""
 
 _ROOT: Final = "zarr.json"
 _FLUSHES: Final = 8
@@ -35,7 +35,7 @@ _DRAFT: Final = f"{MARK}/.draft"
 
 
 class Variable(Declared):
-    """One array of a store."""
+    """Array of a store."""
 
     name: str = part("its name")
     dims: tuple[str, ...] = part("names of its dimensions; those of the members come first")
@@ -49,7 +49,7 @@ class Variable(Declared):
 
 
 class Layout(Declared):
-    """What a store holds."""
+    """Layout of a store."""
 
     chunks: tuple[int, ...] = part("members of a block along each of their dimensions")
     variables: tuple[Variable, ...] = part("results and coordinates, `MARK` among the results")
@@ -58,22 +58,22 @@ class Layout(Declared):
 
 
 class Store:
-    """A store that this process has locked and writes to; closes at the end of a `with`.
+    """Store locked and written by this process; a context manager.
 
     Parameters
     ----------
     path : path
-        Folder of the store; made if it is not there.
+        Folder of the store; created if missing.
     layout : Layout
-        What it holds.
+        Layout of the store.
     now : str
-        Time stamp of its making.
+        Creation time stamp.
 
     Raises
     ------
     InputError
-        The folder holds something else, or results of another identity; another process is at work on it; it
-        cannot be written; zarr is not installed. What was there stays.
+        The folder holds something else, or results of another identity; another process holds the lock; the
+        folder cannot be written; zarr is not installed. Existing data are kept.
     """
 
     def __init__(self, path: str | Path, layout: Layout, now: str) -> None:
@@ -96,16 +96,16 @@ class Store:
             raise
 
     def done(self, index: Sequence[int]) -> bool:
-        """Tell whether the block at an index of the chunk grid is done."""
+        """Whether the block at an index of the chunk grid is done."""
         return (self.path / _chunk(MARK, index)).exists()
 
     def write(self, index: Sequence[int], results: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Write all results of a block, whole and for good.
+        """Write all results of a block, atomically and durably.
 
         Parameters
         ----------
         index : sequence of int
-            Its place in the chunk grid of the members.
+            Index of the block in the chunk grid of the members.
         results : mapping
             Arrays by name, of the shape of the block.
         """
@@ -126,7 +126,7 @@ class Store:
             raise self._refusal(error) from None
 
     def finish(self, now: str) -> None:
-        """Stamp a complete store; a stamp that is there stays."""
+        """Add the completion time stamp to a complete store, unless it has one."""
         root = _root(self.path)
         if root["attributes"].get("finished"):
             return
@@ -137,7 +137,7 @@ class Store:
             raise self._refusal(error) from None
 
     def close(self) -> None:
-        """Give the lock back."""
+        """Release the lock."""
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
@@ -162,7 +162,7 @@ class Store:
         self._handle = _locked(self.path, self.path)
 
     def _create(self, now: str) -> None:
-        """Lay the store out beside its place and move it there whole."""
+        """Create the layout in a temporary folder and rename it."""
         draft = self.path.with_name(f".{self.path.name}.part")
         draft.mkdir(exist_ok=True)
         self._handle = _locked(draft, self.path)
@@ -184,7 +184,7 @@ class Store:
         _flush([self.path.parent])
 
     def _put(self, files: Mapping[str, bytes]) -> None:
-        """Write files, each whole or not at all, and bring them to the disk."""
+        """Write files atomically and flush them to disk."""
         draft = self.path / _DRAFT
         touched: set[Path] = set()
         try:
@@ -207,7 +207,7 @@ class Store:
 
 
 def open_store(path: str | Path) -> xr.Dataset:
-    """Open a store, complete or not; values are read when they are used."""
+    """Open a store, complete or not; values are read on access."""
     _require_zarr()
     import xarray as xr
 
@@ -225,9 +225,9 @@ def _require_zarr() -> None:
 
 
 def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the files of a Zarr group in memory, and its arrays by name, as a layout has them.
+    """Return the files of an in-memory Zarr group with a layout, and its arrays by name.
 
-    What is written to an array appears among the files as the bytes to put on disk.
+    Values written to an array appear among the files as the bytes to store on disk.
     """
     _require_zarr()
     import zarr
@@ -247,14 +247,14 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
         by_name[variable.name] = array = group.create_array(
             variable.name,
             shape=variable.shape,
-            # A chunk has at least one element, also along a dimension of length 0.
+            # A chunk has at least one element, even along a dimension of length 0.
             chunks=tuple(max(1, length) for length in chunks),
             dtype=variable.dtype,
             fill_value=variable.fill,
             compressors=ZstdCodec(level=3, checksum=True),
             attributes=dict(variable.attrs),
             dimension_names=variable.dims,
-            # A chunk of nothing but fill values is written too: its file tells that it was.
+            # Write chunks of fill values, too: their files mark blocks as done.
             config={"write_empty_chunks": True},
         )
         if variable.values is not None:
@@ -288,11 +288,11 @@ def _chunk(name: str, index: Sequence[int]) -> str:
 
 
 def _locked(folder: Path, named: Path) -> int:
-    """Lock a folder against other processes; return the handle that holds the lock."""
+    """Lock a folder against other processes; return the file handle that holds the lock."""
     try:
         import fcntl
     except ImportError:
-        # A system without such locks.
+        # The system does not support such locks.
         return -1
     handle = os.open(folder, os.O_RDONLY)
     try:
@@ -307,7 +307,7 @@ def _locked(folder: Path, named: Path) -> int:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Make a folder and those above it; return the folders whose names are new or may be."""
+    """Create a folder and its parents; return the folders whose directory entries may be new."""
     if folder.is_dir():
         return [folder]
     above = _make(folder.parent)
@@ -316,7 +316,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Collection[Path]) -> None:
-    """Bring files and the names in folders to the disk; many at once take hardly longer than one."""
+    """Flush files and directory entries to disk; many at once take hardly longer than one."""
     with ThreadPoolExecutor(min(_FLUSHES, len(paths))) as pool:
         list(pool.map(_flush_one, paths))
 

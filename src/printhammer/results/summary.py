@@ -1,4 +1,4 @@
-"""Summary: what a result says in short, in sentences, facts and small tables; quantities stay in SI.
+"""Summaries of results: sentences, facts and small tables, with quantities in SI.
 
 The terminal, ``print(result)`` and the notebook render the same summary. Its texts hold marks instead of
 finished numbers and colours: `quantity` marks a number with its SI unit, which is converted into the unit
@@ -23,7 +23,7 @@ Style = Literal["good", "poor", "bad", "strong", "best", "dim", "cyan", "magenta
 FactRow = tuple[str, str | None]
 
 NONE: Final = "–"
-"""Text of a quantity that is not known."""
+"""Text of a missing quantity."""
 
 SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "s": {"si": ("us", ".1f"), "inch": ("us", ".1f")},
@@ -33,7 +33,7 @@ SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "J": {"si": ("mJ", ".4f"), "inch": ("in lbf", ".5f")},
     "A": {"si": ("A", ".3f"), "inch": ("A", ".3f")},
 }
-"""Unit shown and format in either system, by SI unit."""
+"""Unit shown and number format in either unit system, by SI unit."""
 _SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
 
 _QUANTITY: Final = re.compile("⟦([^ ⟧]*) ([^⟧!]*)(!?)⟧")
@@ -41,54 +41,54 @@ _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
 
 def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
-    """Mark a quantity in SI, of a unit in `SHOWN`, shown without its unit if `bare`; a dash for None."""
+    """Mark a quantity in SI, with a unit in `SHOWN`; `bare` hides the unit; None yields a dash."""
     return NONE if value is None else f"⟦{float(value)!r} {unit}{'!' * bare}⟧"
 
 
 def interval(values: npt.NDArray[Any], unit: str) -> str | None:
-    """Mark the least and the largest of quantities in SI; None if there are none."""
+    """Mark the range of quantities in SI; None for an empty array."""
     return f"{quantity(values.min(), unit)} to {quantity(values.max(), unit)}" if values.size else None
 
 
 def styled(style: Style, said: object) -> str:
-    """Mark words to be shown in a style."""
+    """Mark words with a style."""
     return f"⟪{style} {said}⟫"
 
 
 def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
-    """Mark words as good, or as in another style where something is not good."""
+    """Mark words as good, or with another style if `good` is false."""
     return styled("good" if good else otherwise, said)
 
 
 def repeated(name: str, sentences: Iterable[str]) -> list[FactRow]:
-    """Return facts of which only the first is named."""
+    """Return facts of which only the first has a name."""
     return [("" if row else name, sentence) for row, sentence in enumerate(sentences)]
 
 
 def multiplier(value: complex) -> str:
-    """Return a Floquet multiplier as text; without an imaginary part where it has none."""
+    """Format a Floquet multiplier, without an imaginary part if it is real."""
     real = f"{value.real:+.4g}"
     return real if value.imag == 0.0 else f"{real}{value.imag:+.4g}i"
 
 
 def sign(unit: str, system: System) -> str:
-    """Return the sign of the unit in which quantities of an SI unit are shown."""
+    """Return the symbol of the unit in which quantities of an SI unit are shown."""
     name = SHOWN[unit][system][0]
     return _SIGNS.get(name, name)
 
 
 def shown(value: float, unit: str, system: System) -> str:
-    """Return a quantity in SI as text without unit."""
+    """Format a quantity in SI, without its unit."""
     from printhammer.units import from_si
 
     name, digits = SHOWN[unit][system]
     text = format(from_si(value, unit, name), digits)
-    # No minus before what is rounded to zero.
+    # Avoid a minus sign in front of a number rounded to zero.
     return text if any(digit in text for digit in "123456789") else text.removeprefix("-")
 
 
 def rendered(text: str, system: System = "si", style: Callable[[str, str], str] | None = None) -> str:
-    """Replace the marks of a text; `style` shows a styled text, by default as it is."""
+    """Replace the marks of a text; `style` renders styled words, by default verbatim."""
     with_units = _QUANTITY.sub(
         lambda mark: (
             shown(float(mark[1]), mark[2], system) + ("" if mark[3] else f" {sign(mark[2], system)}")
@@ -100,10 +100,10 @@ def rendered(text: str, system: System = "si", style: Callable[[str, str], str] 
 
 @dataclass(frozen=True)
 class Cells:
-    """A column of a table.
+    """Column of a table.
 
-    Numbers of a unit in `SHOWN` without a format are SI and shown in the unit system that is asked for;
-    others are shown as they are, with `unit` in the heading. None and NaN are shown as a dash.
+    Numbers with a unit in `SHOWN` and without a format are SI and are converted to the unit system of the
+    reader; others are shown unchanged, with `unit` in the heading. None and NaN are shown as a dash.
     """
 
     heading: str
@@ -111,7 +111,7 @@ class Cells:
     unit: str = ""
     format: str = ""
     left: bool = False
-    """Whether the cells stand to the left."""
+    """Whether the cells are left-aligned."""
 
     @property
     def _converted(self) -> bool:
@@ -122,7 +122,7 @@ class Cells:
         return sign(self.unit, system) if self._converted else self.unit
 
     def texts(self, system: System) -> list[str]:
-        """Return the texts of the cells, with their marks of style."""
+        """Return the texts of the cells, including style marks."""
         values = self.values.tolist() if isinstance(self.values, np.ndarray) else self.values
         return [self._text(value, system) for value in values]
 
@@ -136,7 +136,7 @@ class Cells:
 
 @dataclass(frozen=True)
 class Grid:
-    """A small table; of more than `most` rows the first and the last are shown."""
+    """Small table; beyond `most` rows only the first and last ones are shown."""
 
     columns: Sequence[Cells]
     title: str = ""
@@ -150,19 +150,19 @@ class Grid:
 
 @dataclass(frozen=True)
 class Facts:
-    """Names and what there is to say of them, a row each; a fact that is None is left out."""
+    """List of names and values, one per row; a fact with value None is omitted."""
 
     rows: Sequence[FactRow]
     title: str = ""
 
     @property
     def known(self) -> list[tuple[str, str]]:
-        """The facts that are not None."""
+        """Facts whose value is not None."""
         return [(name, said) for name, said in self.rows if said is not None]
 
 
 class Summary(tuple[str | Facts | Grid, ...]):
-    """Parts of a summary, in the order of reading: sentences, facts and tables."""
+    """Summary: sentences, facts and tables, in reading order."""
 
     __slots__ = ()
 
@@ -183,7 +183,7 @@ class Summary(tuple[str | Facts | Grid, ...]):
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows."""
+        """Return the HTML repr."""
         return "".join(_html(each) for each in self if each)
 
 
@@ -193,7 +193,7 @@ def _plain_head(column: Cells, system: System) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
-    """Return rows as lines, each column to its side."""
+    """Format rows as lines with aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join(

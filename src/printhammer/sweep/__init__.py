@@ -1,4 +1,4 @@
-"""Sweeps over hammers and drives: a spec, its members, their work in blocks, and a store that survives."""
+"""Sweeps over hammers and drives: spec, members, blocks of work, and a resumable store."""
 
 from printhammer.sweep.api import sweep
 

@@ -1,4 +1,4 @@
-"""Sweeps: the one entry, from a spec to a store."""
+"""Entry point of sweeps, from a spec to a store."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from printhammer.sweep.work import Results
 
 Progress = Callable[[float, int, int], None]
-"""Takes the members done so far, those of them that were in the store before, and all."""
+"""Progress callback: members done so far, members done before this run, total members."""
 
 
 def sweep(
@@ -32,36 +32,36 @@ def sweep(
     dask: Any = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Run many hammers under many drives and keep the results in a store.
+    """Run many hammers under many drives and store the results.
 
-    The results are written block by block. Whatever ends the process, the same call goes on where it ended,
-    and the complete store is the same to the bit as that of an uninterrupted sweep, its time stamps apart; so
-    it is for any number of threads and for dask.
+    The results are written block by block. After an interruption of any kind, the same call resumes the
+    sweep, and the complete store is identical, time stamps apart, to that of an uninterrupted sweep; the
+    number of threads and the use of dask do not matter either.
 
     Parameters
     ----------
     spec : path or mapping
-        A spec file, or what one says; see the guide on sweeps.
+        Spec file, or its contents as a mapping; see the guide on sweeps.
     out : path
-        Folder of the store (Zarr v3), made, continued, or found complete.
+        Folder of the store (Zarr v3), new, to be resumed, or complete.
     threads : int, optional
         Threads on this machine; by default as many as there are cores.
     dask : str or distributed.Client, optional
-        Do the work on a dask cluster instead: the address of its scheduler, or a client of it.
+        Address of the scheduler of a dask cluster, or a client, to run there instead.
     progress : callable, optional
-        Called now and then with the members done, how many of them were done before, and all members.
+        Called from time to time with the number of members done, done before this run, and in total.
 
     Returns
     -------
     xarray.Dataset
-        The store, opened; values are read when they are used. The dimensions are the axes of a grid, or
-        `member` for a Latin hypercube. A member that failed is a row with a status.
+        The opened store; values are read on access. The dimensions are the axes of a grid, or `member` for a
+        Latin hypercube. A member that failed is a row with a status.
 
     Raises
     ------
     InputError
-        The spec is not one; the store holds other results, is being written to by another process or cannot
-        be written; nobody answers at the address.
+        The spec is invalid; the store holds other results, is locked by another process or cannot be written;
+        no scheduler answers at the address.
     """
     thread_count(threads)
     need_for(out, ".zarr")

@@ -1,4 +1,4 @@
-"""Axes: what a key changes, its unit and meaning, and its values."""
+"""Axes of a sweep: the constant that varies, its unit and meaning, and its values."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ DRIVE: Final[dict[str, Quantity]] = {
     "bursts": Quantity("1", "nb", "number of bursts", ge=1.0),
     **FORCE,
 }
-"""What of a drive an axis may change, beside its firing times."""
+"""Quantities of a drive that an axis may vary, besides its firing times."""
 
 COUNTS: Final = ("pulses", "bursts")
 
@@ -59,7 +59,7 @@ class Axis(Declared, eq=False):
 
     @property
     def counts(self) -> bool:
-        """Whether its values are whole numbers."""
+        """Whether the values are integers."""
         return self.target == "drive" and self.field in COUNTS
 
 
@@ -71,15 +71,15 @@ def read_axis(
     grid: bool,
     named: Mapping[str, object] = MappingProxyType({}),
 ) -> Axis:
-    """Read an axis.
+    """Parse an axis.
 
-    `own_waveform` is the waveform table of the drive, if it has one, `named` those of a sequence by their
-    names; unless the axes form a grid, a range is asked for.
+    `own_waveform` is the waveform table of the drive, if any; `named` are the waveforms of a sequence, by
+    name. A grid takes values or a range, a Latin hypercube a range only.
 
     Raises
     ------
     InputError
-        The key names nothing, a value is none or out of bounds, a range is empty.
+        The key is unknown, a value is invalid or out of bounds, a range is empty.
     """
     target, field, note = _resolved(table.key, where, hammer, own_waveform, named)
     here = f"{where} ({table.key})"
@@ -138,7 +138,7 @@ def _resolved(
 
 
 def _constant_of(waveform: object, name: str) -> Quantity | None:
-    """Return what is known of a constant of a waveform table of the drive."""
+    """Return the declaration of a constant of a waveform table of the drive, or None."""
     shape = waveform.get("shape") if isinstance(waveform, Mapping) else None
     if not isinstance(waveform, Mapping) or not isinstance(shape, str) or shape not in kinds_of("waveform"):
         return None
@@ -146,7 +146,7 @@ def _constant_of(waveform: object, name: str) -> Quantity | None:
     if note is None:
         return None
     for unit in note.also:
-        # What its value in the table is written in.
+        # Keep the unit in which the table states the value.
         with suppress(InputError):
             read_quantity(waveform.get(name), unit, "")
             return in_unit_of_drive(note, unit)

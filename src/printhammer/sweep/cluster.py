@@ -1,4 +1,4 @@
-"""Sweeps on a dask cluster: each block a task; what kills its worker is found and recorded."""
+"""Sweeps on a dask cluster: one task per block; a member that kills its worker is isolated and recorded."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from printhammer.sweep.plan import Plan
 from printhammer.sweep.work import Index, Results, run_chunk
 
 ANSWER: Final = 5.0
-"""Seconds in which a scheduler must answer."""
+"""Time limit for the answer of a scheduler, s; arbitrary."""
 
 NO_WORKERS: Final = 60.0
-"""Seconds without any worker after which a sweep gives up."""
+"""Time without any worker after which a sweep stops, s; arbitrary."""
 
 _INTERVAL: Final = 0.5
 _COUNT_EVERY: Final = 2.0
@@ -37,7 +37,7 @@ _PARTS: Final = 8
 
 
 class _GoneError(Exception):
-    """The scheduler does not know a task any more."""
+    """The scheduler has lost a task."""
 
 
 def run_dask(
@@ -47,12 +47,12 @@ def run_dask(
     tell: Callable[[float], None],
     client: Any,
 ) -> None:
-    """Do blocks of work on a cluster, and write each, here, when it is done.
+    """Compute blocks on a cluster, and write each in this process when it is done.
 
-    A task whose worker is killed is done again elsewhere by the scheduler. A task that the scheduler gives up
-    because it has cost several workers is put aside until all others are done, then done alone on the
-    cluster, in ever smaller parts; a member that still kills its worker is recorded as lost. The arguments
-    are those of `run_local`, and a `distributed.Client` of the scheduler.
+    The scheduler repeats a task whose worker is killed. A task that it abandons because it cost several
+    workers is postponed until all others are done, then computed alone on the cluster, in ever smaller
+    pieces; a member that still kills its worker is recorded as lost. The arguments are those of `run_local`,
+    and a `distributed.Client` of the scheduler.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def run_dask(
 
 
 class _Tasks:
-    """The tasks of one sweep on a cluster."""
+    """Tasks of one sweep on a cluster."""
 
     def __init__(self, client: Any, plan: Plan) -> None:
         self._client = client
@@ -85,7 +85,7 @@ class _Tasks:
     def side_by_side(
         self, todo: Sequence[Index], write: Callable[[Index, Results], None], tell: Callable[[float], None]
     ) -> list[Index]:
-        """Do blocks side by side; return those that cost several workers."""
+        """Compute blocks concurrently; return the blocks that cost several workers."""
         left = deque(todo)
         suspects: list[Index] = []
         while left or self._futures:
@@ -102,7 +102,7 @@ class _Tasks:
         return suspects
 
     def alone(self, rows: FloatArray) -> Results:
-        """Do some members with nothing beside them, in smaller parts where that kills the worker."""
+        """Compute members without concurrent tasks, in smaller pieces if they kill the worker."""
         import numpy as np
 
         self._submit(rows, ())
@@ -118,7 +118,7 @@ class _Tasks:
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def cancel(self) -> None:
-        """Give up all tasks that are still under way."""
+        """Cancel all unfinished tasks."""
         if self._futures and self._client.status == "running":
             self._client.cancel(list(self._futures), force=True)
 
@@ -134,7 +134,7 @@ class _Tasks:
         future.add_done_callback(self._done.put)
 
     def _next(self) -> tuple[Index, Results | None] | None:
-        """Wait a while for a task; return its block and its results, None for these if it cost workers."""
+        """Wait for a task; return its block and results, with results None if it cost several workers."""
         try:
             future = self._done.get(timeout=_INTERVAL)
         except Empty:
@@ -143,23 +143,23 @@ class _Tasks:
         self._idle = 0.0
         index = self._futures.pop(future)
         if future.status == "lost":
-            # Its worker was killed before it handed the results over: the scheduler has it done again.
+            # The worker was killed before it returned the results; the scheduler repeats the task.
             self._await(future, index)
             return None
         return index, self._result(future)
 
     def _result(self, future: Any) -> Results | None:
-        """Return the results of a task that is done; None if it cost several workers."""
+        """Return the results of a finished task; None if it cost several workers."""
         if future.status == "error":
             error = future.exception()
         else:
             try:
                 answer: Results | str = future.result()
             except (FutureCancelled, TaskCancelled, OSError):
-                # What goes wrong in the work itself comes as text.
+                # The task returns its own errors as text.
                 raise _GoneError from None
             except Exception as late:  # noqa: BLE001 - told as a sentence
-                # The worker was killed before it handed its results over, and what came after it as well.
+                # The worker was killed before it returned the results, and so were its successors.
                 error = late
             else:
                 if isinstance(answer, str):
@@ -170,19 +170,19 @@ class _Tasks:
         raise InputError(_unable(error)) from error
 
     def _threads(self) -> int:
-        """Count the threads of the workers; asked for every few seconds only."""
+        """Return the number of threads of the workers, refreshed every few seconds."""
         now = time.monotonic()
         if now - self._counted >= _COUNT_EVERY:
             self._counted = now
             try:
                 self._count = sum(self._client.nthreads().values())
             except OSError:
-                # The scheduler is going; what that means for the tasks comes with their futures.
+                # The scheduler is closing; the futures report the consequence for the tasks.
                 self._count = 0
         return self._count
 
     def _watch(self) -> None:
-        """Give up where the scheduler is gone, or no worker has come for a while."""
+        """Raise InputError if the scheduler is gone, or no worker has been present for a while."""
         if self._client.status not in _ALIVE:
             raise _GoneError
         self._idle = 0.0 if self._threads() else self._idle + _INTERVAL
@@ -193,7 +193,7 @@ class _Tasks:
 
 
 def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]) -> Results | str:
-    """Do the work of a block on a worker of the same versions; return what is wrong as a sentence."""
+    """Compute a block on a worker with the same versions; return the results, or an error sentence."""
     for name, version in versions().items():
         if version != wanted[name]:
             return f"a worker of the cluster has {name} {version}, expected {wanted[name]}"
@@ -213,9 +213,9 @@ def _unable(error: BaseException) -> str:
 
 @contextmanager
 def client_of(dask: Any) -> Iterator[Any]:
-    """Give a client of a cluster, by the address of its scheduler; one made here is closed, and logs nothing.
+    """Open a client of a cluster by the address of its scheduler, without log output; close it at the end.
 
-    A `distributed.Client` is given back as it is.
+    An existing `distributed.Client` is passed through.
     """
     try:
         distributed: Any = import_module("distributed")
@@ -241,7 +241,7 @@ def client_of(dask: Any) -> Iterator[Any]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the loggers of dask still: what is wrong is told in one sentence of our own."""
+    """Silence the loggers of dask; errors are reported as one sentence of our own."""
     loggers = [
         logging.getLogger(name) for name in logging.root.manager.loggerDict if name.startswith("distributed")
     ]
@@ -256,6 +256,6 @@ def _quiet() -> Iterator[None]:
 
 
 async def _knock(distributed: Any, address: str) -> None:
-    """Fail early where nobody answers; a client that does not get through is slow to give up."""
+    """Fail early if no scheduler answers; a client without connection gives up slowly."""
     comm = await distributed.comm.connect(address, timeout=ANSWER)
     await comm.close()

@@ -1,4 +1,4 @@
-"""Members: from a row of axis values to a hammer, a drive, an initial state and an end."""
+"""Members of a sweep: from a row of axis values to hammer, drive, initial state and end."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.sweep.axes import COUNTS, Axis
 
 KINDS: Final = ("train", "times", "burst", "sequence", "sine")
-"""Tables of a drive file that say when it fires."""
+"""Tables of a drive file that define the firing times."""
 
 _OF_DRIVE: Final = ("waveform", "drive", "at")
-"""Targets of the axes that change the drive."""
+"""Targets of axes that change the drive."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """One run of a sweep: hammer, drive, end [s], displacement [m] and velocity [m/s] at the start."""
+    """Run of a sweep: hammer, drive, end [s], displacement [m] and velocity [m/s] at the start."""
 
     hammer: Hammer
     drive: Drive
@@ -42,7 +42,7 @@ class Member:
 
 
 class Members(NamedTuple):
-    """Several runs: as in `Member`, one entry for each; `states` are of shape (members, 2)."""
+    """Several runs: the fields of `Member`, one entry for each; `states` has shape (members, 2)."""
 
     hammers: list[Hammer]
     drives: Sequence[Drive]
@@ -51,7 +51,7 @@ class Members(NamedTuple):
 
 
 class Base(Declared):
-    """What all members have in common; complete, so that another machine can make them."""
+    """Common settings of all members, complete enough to build the members on another machine."""
 
     hammer: Hammer = part("the hammer, before the axes change it")
     drive: Mapping[str, Any] = part("tables of the drive file; its waveform only where an axis changes it")
@@ -68,18 +68,18 @@ class Base(Declared):
 
     @property
     def kind(self) -> str:
-        """The table of the drive that says when it fires."""
+        """Table of the drive that defines the firing times."""
         return next((name for name in KINDS if name in self.drive), "")
 
 
 @dataclass
 class Maker:
-    """Makes members of rows of axis values; equal hammers and drives are made once.
+    """Builder of members from rows of axis values; equal hammers and drives are built once.
 
     Raises
     ------
     InputError
-        From `member`: the values make no hammer, no drive, or a hammer that does not rest.
+        From `member`: the values yield no valid hammer or drive, or a hammer without a rest state.
     """
 
     base: Base
@@ -97,7 +97,7 @@ class Maker:
         return Member(hammer, drive, end, self._state(row, hammer))
 
     def members(self, rows: FloatArray) -> tuple[IntArray, Members]:
-        """Return which rows of values make members, and these."""
+        """Return the indices of the rows that yield valid members, and these members."""
         which: list[int] = []
         hammers: list[Hammer] = []
         states: list[tuple[float, float]] = []
@@ -123,7 +123,7 @@ class Maker:
         return chosen, Members(hammers, drives, ends, np.array(states).reshape(-1, 2))
 
     def _trains(self, rows: FloatArray) -> PulseTrains | None:
-        """Return the drives of all rows as arrays, if they are even trains whose rate alone differs."""
+        """Return the drives of all rows as a batch, if they are even trains that differ in rate only."""
         base, changed = self.base, [axis for axis in self.base.axes if axis.target in _OF_DRIVE]
         if base.kind != "train" or [axis.field for axis in changed] != [RATE] or "waveform" in base.drive:
             return None
@@ -137,7 +137,7 @@ class Maker:
             overlap, start = first.overlap, float(first.times[0])
             return PulseTrains.at_rates(fired, rates, len(first.times), overlap, start)
         except InputError:
-            # One by one, those that can be made are.
+            # Fall back to rows one by one, to keep the valid ones.
             return None
 
     def _state(self, row: Sequence[float], hammer: Hammer) -> tuple[float, float]:
@@ -191,14 +191,14 @@ class Maker:
 
     @cached_property
     def _tables(self) -> dict[str, Any]:
-        """The tables of the drive file, before the axes change them."""
+        """Tables of the drive file, before the axes change them."""
         head: dict[str, Any] = {"format": FORMAT}
         head |= {name: value for name, value in self.base.drive.items() if not isinstance(value, Mapping)}
         tables = {name: table for name, table in self.base.drive.items() if isinstance(table, Mapping)}
         return tomllib.loads(document(head, tables))
 
     def _standard(self, hammer: Hammer) -> tuple[Waveform | None, Hashable]:
-        """Return what is fired where the drive does not say, and what that does; many hammers share it."""
+        """Return the default waveform of a hammer and its identity, shared by many hammers."""
         if id(hammer) not in self._standards:
             fired = self.base.waveform if self.base.waveform is not None else hammer.waveform
             does = None if fired is None else (fired.quantity, fired.segments().tobytes())

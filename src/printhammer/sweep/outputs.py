@@ -1,4 +1,4 @@
-"""Outputs: the arrays of a store, what each says, and which of them a spec asks for."""
+"""Outputs of a sweep: the arrays of the store, their meanings, and their selection in a spec."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ STATUSES: Final = (
     "worker lost",
     "no such hammer",
 )
-"""Statuses of members by code; "no such hammer": the axis values make no hammer that rests, or no drive."""
+"""Statuses of members by code; "no such hammer": the axis values yield no hammer with a rest state, or no
+drive."""
 
 WORKER_LOST: Final = STATUSES.index("worker lost")
 NO_HAMMER: Final = STATUSES.index("no such hammer")
 NOT_YET: Final = -1
-"""Status of a member whose block is not done."""
+"""Status code of a member whose block is not done."""
 
 FIRING: Final = "firing"
 TIME: Final = "time"
@@ -39,7 +40,7 @@ TIME: Final = "time"
 
 @dataclass(frozen=True)
 class Output:
-    """One array: its name, the dimension behind those of the members, type, unit, meaning."""
+    """Output array: name, dimension after those of the members, type, unit, meaning."""
 
     name: str
     dim: str
@@ -49,7 +50,7 @@ class Output:
 
     @property
     def fill(self) -> Any:
-        """What stands where there is nothing to tell."""
+        """Fill value of missing entries."""
         return {"f": np.nan, "b": False, "i": -1 if self.name in _CODES else 0}[np.dtype(self.dtype).kind]
 
     @property
@@ -71,7 +72,7 @@ ALWAYS: Final = (
     Output("reached", "", "float64", "s", "time at which the run ended"),
     Output("steps", "", "int64", "", "steps of the integrator"),
 )
-"""What is kept of every member."""
+"""Outputs stored for every member."""
 
 DOTS: Final = (
     Output("fired", FIRING, "bool", "", "whether there was such a firing in the run"),
@@ -114,26 +115,26 @@ OF_MOTION: Final = (
     Output("damping_loss", "", "float64", "J", "energy that the damping of the armature took"),
     Output("energy_residual", "", "float64", "J", "what the energy ledger leaves over"),
 )
-"""Scalars for which the whole motion is computed once more, which takes several times as long."""
+"""Scalars that require the whole motion, at several times the computation time."""
 
 
 class Outputs(Declared):
-    """What is kept of each member."""
+    """Outputs stored for each member."""
 
     arrays: tuple[Output, ...] = part("all arrays, the status first")
     firings: int = part("length of the dimension of the firings")
     times: FloatArray = part("times of the displacements, s")
 
     def wants(self, *outputs: Output) -> bool:
-        """Tell whether one of some arrays is asked for."""
+        """Whether any of the outputs is selected."""
         return any(output in self.arrays for output in outputs)
 
     def length(self, output: Output) -> tuple[int, ...]:
-        """Return the shape of an array behind the dimensions of the members."""
+        """Return the shape of an array beyond the dimensions of the members."""
         return {"": (), FIRING: (self.firings,), TIME: (self.times.size,)}[output.dim]
 
     def empty(self, members: int) -> dict[str, Any]:
-        """Return arrays that tell nothing yet, of shape (members, ...)."""
+        """Return arrays of fill values, of shape (members, ...)."""
         return {
             output.name: np.full((members, *self.length(output)), output.fill, output.dtype)
             for output in self.arrays
@@ -141,12 +142,12 @@ class Outputs(Declared):
 
 
 def read_outputs(table: OutputsTable, firings: int) -> Outputs:
-    """Read which outputs a spec asks for.
+    """Parse the outputs selected by a spec.
 
     Raises
     ------
     InputError
-        A name is not known or named twice, the times are out of order, or nothing is asked for.
+        A name is unknown or repeated, the times are out of order, or no output is selected.
     """
     arrays = [*ALWAYS]
     arrays += _chosen(table.dots, {output.name: output for output in DOTS}, "dots")

@@ -1,6 +1,6 @@
-"""Plans: the members of a spec, the blocks of work, and the layout of the store.
+"""Plan of a sweep: members, blocks of work, and layout of the store.
 
-Designs: the members of a grid or of a Latin hypercube, and how they are divided into blocks of work.
+The members form a grid or a Latin hypercube, divided into blocks of work.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 
 
 def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:
-    """Draw a Latin hypercube, shape (members, axes), of numbers from 0 to below 1.
+    """Draw a Latin hypercube, shape (members, axes), of numbers in [0, 1).
 
-    Each axis is divided into as many equal strata as there are members; each stratum holds one of them, at
-    random within it (McKay, Beckman and Conover, Technometrics 21 (1979) 239).
+    Each axis is divided into as many equal strata as there are members; each stratum holds one random point
+    (McKay, Beckman and Conover, Technometrics 21 (1979) 239).
     """
     random = np.random.Generator(np.random.PCG64(seed))
     drawn = np.empty((members, axes))
@@ -45,7 +45,7 @@ def latin_hypercube(members: int, seed: int, axes: int) -> FloatArray:
 
 
 def between(share: FloatArray, low: float, high: float, geometric: bool) -> FloatArray:
-    """Return the values at given shares, 0 to 1, of a range."""
+    """Return the values at given fractions, 0 to 1, of a range, on a linear or geometric scale."""
     values: FloatArray
     if geometric:
         values = np.exp(np.log(low) + share * (np.log(high) - np.log(low)))
@@ -55,14 +55,14 @@ def between(share: FloatArray, low: float, high: float, geometric: bool) -> Floa
 
 
 class Blocks(Declared):
-    """Members of a grid in blocks that are whole chunks of it and consecutive in its order."""
+    """Division of a grid of members into blocks, each a whole chunk and contiguous in member order."""
 
     shape: tuple[int, ...] = part("members along each dimension; the last one runs fastest")
     chunks: tuple[int, ...] = part("those of a block")
 
     @classmethod
     def of(cls, shape: Sequence[int], most: int) -> Blocks:
-        """Divide a grid into blocks of at most so many members."""
+        """Divide a grid into blocks of at most `most` members."""
         chunks = [1] * len(shape)
         inner = 1
         for dim in reversed(range(len(shape))):
@@ -74,7 +74,7 @@ class Blocks(Declared):
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Blocks along each dimension."""
+        """Number of blocks along each dimension."""
         return tuple(-(-length // chunk) for length, chunk in zip(self.shape, self.chunks, strict=True))
 
     @property
@@ -83,18 +83,18 @@ class Blocks(Declared):
         return math.prod(self.counts)
 
     def indices(self) -> Iterator[tuple[int, ...]]:
-        """Run through the places of the blocks in the chunk grid, in the order of the members."""
+        """Iterate over the block indices in the chunk grid, in the order of the members."""
         return iter(np.ndindex(*self.counts))
 
     def size(self, index: Sequence[int]) -> tuple[int, ...]:
-        """Return the members of a block along each dimension."""
+        """Return the number of members of a block along each dimension."""
         return tuple(
             min(chunk, length - i * chunk)
             for i, length, chunk in zip(index, self.shape, self.chunks, strict=True)
         )
 
     def members(self, index: Sequence[int]) -> range:
-        """Return the numbers of the members of a block."""
+        """Return the indices of the members of a block."""
         first = 0
         for i, length, chunk in zip(index, self.shape, self.chunks, strict=True):
             first = first * length + i * chunk
@@ -114,7 +114,7 @@ _MOST_BYTES: Final = 2**25
 
 
 class Plan(Declared):
-    """A spec and what follows from it."""
+    """Spec of a sweep with its members, blocks and store layout."""
 
     spec: Spec = part("the spec")
     shape: tuple[int, ...] = part("members along each dimension")
@@ -128,7 +128,7 @@ class Plan(Declared):
 
     @cached_property
     def _drawn(self) -> FloatArray:
-        """Values of the axes, shape (members, axes), of a Latin hypercube."""
+        """Axis values, shape (members, axes), of a Latin hypercube."""
         spec = self.spec
         share = latin_hypercube(spec.members or 0, spec.seed or 0, len(spec.axes))
         columns = [
@@ -138,7 +138,7 @@ class Plan(Declared):
         return np.stack(columns, axis=1)
 
     def rows(self, members: Iterable[int]) -> FloatArray:
-        """Return the values of the axes, SI, of some members, shape (members, axes)."""
+        """Return the axis values, SI, of the given members, shape (members, axes)."""
         which = np.fromiter(members, np.int64)
         if not self.spec.grid:
             return self._drawn[which]
@@ -161,7 +161,7 @@ class Plan(Declared):
             )
             for output in outputs.arrays
         ]
-        # What a reader of a store may want to know.
+        # Metadata for readers of the store.
         attrs: dict[str, Any] = {
             "title": self.spec.title,
             "hammer_file": self.spec.base.hammer.to_toml(),
@@ -170,7 +170,7 @@ class Plan(Declared):
         }
         if not self.spec.grid:
             attrs["seed"] = self.spec.seed
-            # Read by xarray: these arrays are coordinates.
+            # xarray reads this attribute to mark the coordinates.
             attrs["coordinates"] = " ".join(axis.name for axis in self.spec.axes)
         return Layout(self.blocks.chunks, (*results, *self._coordinates()), attrs, identity(self.spec))
 
@@ -195,7 +195,7 @@ class Plan(Declared):
         return coordinates
 
     def table(self) -> list[tuple[Output, tuple[int, ...], int]]:
-        """List the arrays with their shapes and sizes in bytes, before they are compressed."""
+        """List the arrays with their shapes and uncompressed sizes in bytes."""
         outputs = self.spec.outputs
         shapes = [(*self.shape, *outputs.length(output)) for output in outputs.arrays]
         return [
@@ -204,7 +204,7 @@ class Plan(Declared):
         ]
 
     def summary(self) -> Summary:
-        """Return axes, members, blocks and arrays of the sweep."""
+        """Summarise axes, members, blocks and arrays of the sweep."""
         spec, every = self.spec, self.table()
         values = [axis.values for axis in spec.axes]
         axes = [
@@ -238,7 +238,7 @@ class Plan(Declared):
 
 
 def size_text(size: float) -> str:
-    """Return a size in bytes, such as "1.2 MB"."""
+    """Format a size in bytes, such as "1.2 MB"."""
     for unit in ("B", "kB", "MB", "GB"):
         if size < 1000.0:
             return f"{size:.3g} {unit}"
@@ -247,7 +247,7 @@ def size_text(size: float) -> str:
 
 
 def identity(spec: Spec) -> dict[str, str]:
-    """Return what must be the same for results to lie in one store; the readable first."""
+    """Return the properties that results in one store must share, the readable ones first."""
     return {
         "store_format": FORMAT,
         **provenance(hammer=spec.base.hammer, tolerance=spec.base.tolerance),
@@ -262,12 +262,12 @@ def _coordinate(name: str, dims: tuple[str, ...], values: Any, attrs: dict[str, 
 
 
 def make_plan(spec: Spec) -> Plan:
-    """Make the plan of a spec.
+    """Build the plan of a spec.
 
     Raises
     ------
     InputError
-        There are too many members, names collide, or of three members tried none can be made.
+        There are too many members, names collide, or three test members are all invalid.
     """
     if spec.grid:
         dims, shape = tuple(axis.name for axis in spec.axes), tuple(len(axis.values) for axis in spec.axes)
@@ -292,7 +292,7 @@ def make_plan(spec: Spec) -> Plan:
 
 
 def _try(plan: Plan) -> None:
-    """Refuse a sweep that cannot work: neither its first, middle nor last member can be made."""
+    """Raise InputError if the first, middle and last member are all invalid."""
     maker = Maker(plan.spec.base)
     faults: list[InputError] = []
     for row in plan.rows([0, plan.members // 2, plan.members - 1]):

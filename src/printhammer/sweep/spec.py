@@ -1,4 +1,4 @@
-"""Specs: a TOML file to hammer, drive, axes and outputs; every fault is told in one sentence.
+"""Specs of sweeps: parsing of a TOML file into hammer, drive, axes and outputs.
 
 A spec has ``format = 1``, ``hammer``, a table ``[drive]`` with the tables of a drive file, one table
 ``[[axis]]`` for each axis, and ``[outputs]``; see `printhammer.sweep.tables` for all keys. Every quantity has
@@ -33,7 +33,7 @@ from printhammer.sweep.tables import read_quantity, read_tables
 
 
 class Spec(Declared):
-    """A sweep as it is meant."""
+    """Parsed specification of a sweep."""
 
     where: str = part("what to name in a message, usually the file")
     text: str = part("TOML")
@@ -53,7 +53,7 @@ class Spec(Declared):
 
     @property
     def fingerprint(self) -> str:
-        """Hexadecimal digest of what is computed and how it is divided; layout and comments do not enter."""
+        """Hexadecimal digest of members, outputs and blocks, independent of layout and comments."""
         base = self.base
         content = {
             "hammer": base.hammer.fingerprint,
@@ -72,7 +72,7 @@ class Spec(Declared):
 
 
 def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
-    """Read a spec: a TOML file, or what one says.
+    """Parse a spec: a TOML file, or its contents as a mapping.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
 
 
 def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str, Any], Path]:
-    """Return the tables of a drive, and where what they name lies."""
+    """Return the tables of a drive, and the folder of the files that it refers to."""
     if not isinstance(source, str):
         return dict(source), folder
     path = folder / source
@@ -175,7 +175,7 @@ def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str,
 
 
 def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
-    """Check what can be told of a drive by itself; read its waveform unless an axis changes it."""
+    """Validate a drive on its own; read its waveform unless an axis changes it."""
     kinds = [name for name in KINDS if name in base.drive]
     if len(kinds) != 1 or not isinstance(base.drive[kinds[0]], Mapping):
         tables = ", ".join(f"[drive.{name}]" for name in KINDS)
@@ -212,7 +212,7 @@ def _checked_drive(base: Base, own: Mapping[str, Any] | None) -> Base:
 
 
 def _firings(base: Base) -> int:
-    """Return the most firings of any member."""
+    """Return the largest number of firings of any member."""
     timing = base.drive[base.kind]
     if "at" in timing:
         at = timing["at"]

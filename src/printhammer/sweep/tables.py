@@ -1,6 +1,6 @@
-"""The tables of a spec as they are written, before units and keys are looked at.
+"""Tables of a spec as written, before units and keys are interpreted.
 
-Quantities in a spec: always with their unit, as text or as a table.
+Quantities in a spec always carry their unit, as text or as a table.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ _MANY: Final[dict[str, Any]] = {
 }
 
 OneQuantity = Annotated[Any, WithJsonSchema(_ONE)]
-"""Type of a field that holds one quantity as a spec writes it."""
+"""Type of a field that holds one quantity."""
 
 ManyQuantities = Annotated[Any, WithJsonSchema(_MANY)]
-"""Type of a field that holds several."""
+"""Type of a field that holds several quantities."""
 
 
 def read_quantity(written: Any, si: str, where: str) -> float:
-    """Read one quantity into SI: "1.2 kHz" or { value = 1.2, unit = "kHz" }; a bare number if it is pure."""
+    """Parse one quantity into SI: "1.2 kHz" or { value = 1.2, unit = "kHz" }; a bare number if pure."""
     with located(where, key=where):
         if isinstance(written, str):
             return parse(written, si)
@@ -68,7 +68,7 @@ def read_quantity(written: Any, si: str, where: str) -> float:
 
 
 def read_quantities(written: Any, si: str, where: str) -> list[float]:
-    """Read several quantities into SI: a list of what `read_quantity` takes, or values with one unit."""
+    """Parse several quantities into SI: a list of single ones, or values with a common unit."""
     values: Iterable[Any] = written if isinstance(written, list) else ()
     if isinstance(written, Mapping):
         with located(where, key=where):
@@ -102,7 +102,7 @@ class _Table(BaseModel):
 
 
 class AxisTable(_Table):
-    """One axis: a key with values, or with a range."""
+    """Axis: a key with values, or with a range."""
 
     key: str = Field(description="what it changes, such as 'pack.stiffness', 'drive.rate' or 'state.x'")
     values: ManyQuantities = Field(None, description="the values themselves")
@@ -113,14 +113,14 @@ class AxisTable(_Table):
 
 
 class StateTable(_Table):
-    """The initial state; by default the rest state."""
+    """Initial state; by default the rest state."""
 
     x: OneQuantity = Field(None, description="displacement; by default that at rest")
     v: OneQuantity = Field(None, description="velocity; by default 0")
 
 
 class TimesTable(_Table):
-    """Times at which the displacement is kept."""
+    """Times at which the displacement is stored."""
 
     start: OneQuantity = Field("0 s", description="first time")
     end: OneQuantity = Field(description="last time")
@@ -128,7 +128,7 @@ class TimesTable(_Table):
 
 
 class OutputsTable(_Table):
-    """What is kept of a run."""
+    """Outputs stored for each run."""
 
     dots: list[str] | Literal["all"] = Field([], description="what each firing did")
     strobes: list[str] | Literal["all"] = Field([], description="state at each firing")
@@ -138,7 +138,7 @@ class OutputsTable(_Table):
 
 
 class SpecTable(_Table):
-    """A sweep."""
+    """Specification of a sweep."""
 
     format: Literal[1] = Field(description="version of the spec format")
     title: str = Field("", description="one line that says what it is")
@@ -163,7 +163,7 @@ class SpecTable(_Table):
 
 
 def read_tables(document: dict[str, Any]) -> SpecTable:
-    """Check the tables of a spec."""
+    """Validate the tables of a spec."""
     try:
         return SpecTable.model_validate(document)
     except ValidationError as error:
@@ -181,7 +181,7 @@ def schema() -> dict[str, Any]:
 
 
 def _fault(error: ValidationError) -> InputError:
-    """Return the first fault as an error: key, value and what was expected."""
+    """Convert the first fault to an error with key, value and expectation."""
     fault = error.errors(include_url=False)[0]
     key, table = _place(fault["loc"])
     if fault["type"] == "missing":
@@ -200,7 +200,7 @@ def _fault(error: ValidationError) -> InputError:
 
 
 def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:
-    """Return the key at which a fault lies, such as "axis[1].count", and the table that it belongs to."""
+    """Return the key of a fault, such as "axis[1].count", and the table that it belongs to."""
     key, table = "", SpecTable
     inner: dict[str, type[_Table]] = {
         "axis": AxisTable,
@@ -213,7 +213,7 @@ def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:
         if isinstance(step, int):
             key += f"[{step}]"
         elif place and step not in owner.model_fields and step in _CHOICES:
-            # Which of several types a value was tried for is no part of the key.
+            # The type tried for a value of several types is not part of the key.
             break
         else:
             key += f".{step}" if key else step

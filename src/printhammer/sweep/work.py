@@ -1,7 +1,4 @@
-"""The work of a block: its members integrated together, and what is kept of them.
-
-Sweeps on this machine: blocks of work in threads.
-"""
+"""Computation of blocks: the members of a block are integrated together, in threads."""
 
 from __future__ import annotations
 
@@ -39,7 +36,7 @@ if TYPE_CHECKING:
 Results = dict[str, Any]
 """Arrays by name, of shape (members of the block, ...)."""
 
-# Two kernels for the same laws must not be made at once.
+# Prevents two threads from compiling the same laws at once.
 _MAKING: Final = threading.Lock()
 
 
@@ -51,10 +48,10 @@ def run_chunk(
     threads: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Results:
-    """Integrate the members of a block, one for each row of axis values, SI; return arrays by name.
+    """Integrate the members of a block, one per row of axis values, SI; return arrays by name.
 
-    A member that cannot be made or does not get to its end is a row with a status. `progress` is called now
-    and then with the share done; what it raises ends the work.
+    An invalid member, or one that stops early, is a row with a status. `progress` is called from time to time
+    with the fraction done; an exception that it raises stops the work.
     """
     if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
         raise InputError(
@@ -138,7 +135,7 @@ def _from_ensemble(
 
 
 def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | None, list[Any], list[int]]:
-    """Return the times of the strobes of each member; which are firings, and which is the end."""
+    """Return the strobe times of each member, the range of firings among them, and the index of the end."""
     strobes, final = outputs.wants(*STROBES), outputs.wants(*FINAL)
     if not strobes and not final:
         return None, [], []
@@ -155,13 +152,13 @@ def _moments(members: Members, outputs: Outputs) -> tuple[list[FloatArray] | Non
 
 
 def _scalars(dots: DotTable, wanted: Collection[str]) -> dict[str, Any]:
-    """Return the wanted scalars that follow from the dots of each member, shape (members,)."""
+    """Return the selected scalars that follow from the dots of each member, shape (members,)."""
     struck, counts = dots.struck, dots.struck.sum(axis=1)
     scalars: dict[str, Any] = {"struck_dots": counts, "lost_dots": (dots.fired & ~struck).sum(axis=1)}
     for name in ("flight_time", "peak_force"):
         values = getattr(dots, name)
         if f"{name}_mean" in wanted:
-            # math.fsum rounds once, so that a mean does not depend on how many empty places follow.
+            # math.fsum rounds once, so that a mean does not depend on the number of padded entries.
             sums = [math.fsum(row[made]) for row, made in zip(values, struck, strict=True)]
             scalars[f"{name}_mean"] = np.where(counts > 0, sums, np.nan) / np.maximum(counts, 1)
         if f"{name}_spread" in wanted:
@@ -197,7 +194,7 @@ _INTERVAL: Final = 0.1
 
 
 class _StopError(Exception):
-    """Ends the work of a block that is no longer wanted."""
+    """Stops a block that is no longer needed."""
 
 
 def run_local(
@@ -207,17 +204,17 @@ def run_local(
     tell: Callable[[float], None],
     threads: int | None = None,
 ) -> None:
-    """Do blocks of work in threads, by default as many as there are cores, and write each when it is done.
+    """Compute blocks in threads, by default one per core, and write each when it is done.
 
-    `write` takes the place of a block in the chunk grid and its results, in this thread; `tell` is called now
-    and then with the number of members of blocks under way that are done, possibly not whole.
+    `write` receives the index of a block in the chunk grid and its results, in this thread; `tell` is called
+    from time to time with the number of members done in unfinished blocks, possibly fractional.
 
     Raises
     ------
     InputError
-        As `run_chunk`, or from `write`.
+        Raised by `run_chunk` or `write`.
     KeyboardInterrupt
-        Where it is interrupted; blocks under way are dropped.
+        On Ctrl-C; unfinished blocks are dropped.
     """
     blocks = list(todo)
     workers = thread_count(threads)
@@ -244,7 +241,7 @@ def run_local(
     with ThreadPoolExecutor(at_once) as pool:
         try:
             while True:
-                # One more than can be under way, so that no thread waits for the disk.
+                # One more than the number of threads, so that no thread waits for the disk.
                 while len(under_way) <= at_once and (index := next(left, None)) is not None:
                     under_way[pool.submit(work, index)] = index
                 if not under_way:

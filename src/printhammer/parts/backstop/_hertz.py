@@ -1,4 +1,4 @@
-"""Constants of the Hertz backstop from what one can measure: two bodies, and one rebound."""
+"""Constants of the Hertz backstop from measurable quantities: two bodies, and one rebound."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def stiffness_from_bodies(
 
 
 def damping_from_restitution(k: float, restitution: float, speed: float) -> float:
-    """Return the damping l of equation (7), N s/m^2.5, that gives a free rebound a certain restitution.
+    """Return the damping l of equation (7), N s/m^2.5, for a given restitution of a free rebound.
 
     With z = (l/k) v_in and y = (l/k) v_out a free contact obeys z - ln(1 + z) = -(y + ln(1 - y)), at any mass
     and stiffness: divide m v dv = -(k - l v) delta^1.5 d(x) by (k - l v) and integrate both ways. Solved for

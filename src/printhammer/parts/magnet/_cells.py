@@ -1,4 +1,4 @@
-"""Where a place lies among the knots of a packed table: for laws that are splines."""
+"""Cell search in the knots of a packed table, for laws that are splines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 
 def cell_of(c: Any, first: int, knots: int, at: float) -> int:
-    """Return the cell, counted from 0, that holds `at`, of knots that stand in c[first:first + knots]."""
+    """Return the index of the cell that holds `at`; the knots are c[first:first + knots]."""
     low = 0
     high = knots - 1
     while high - low > 1:

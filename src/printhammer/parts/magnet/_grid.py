@@ -1,4 +1,4 @@
-"""A table measured over displacement and current: checks, reading from CSV, bicubic spline, and its part."""
+"""Tables over displacement and current: validation, reading from CSV, bicubic spline, and the part."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 UNITS: Final = {"force": "N", "linkage": "Wb"}
-"""SI units of what may be measured."""
+"""SI units of the quantities of a table."""
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,15 @@ class Grid:
 
 
 def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str) -> Grid:
-    """Make a table of points in any order: displacement, m, current, A, and the quantity measured.
+    """Collect points in any order into a complete grid: displacement, m, current, A, and the quantity.
 
     Messages begin with `what`.
 
     Raises
     ------
     InputError
-        A point is not finite, given twice or missing, there are fewer than two displacements or currents, or
-        0 A lies outside the currents.
+        A point is not finite, repeated or missing, there are fewer than two displacements or currents, or 0 A
+        lies outside the currents.
     """
     points: dict[tuple[float, float], float] = {}
     for x, current, value in rows:
@@ -91,16 +91,16 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str)
 
 
 def read_csv(path: Path, quantity: str) -> Grid:
-    """Read a table of one quantity of `UNITS` from a CSV file with one line a point.
+    """Read a table of one quantity of `UNITS` from a CSV file with one point per line.
 
-    The heading names the columns with their units, ``displacement [mm],current [A],force [N]``, in any
-    order; the points may come in any order. Blank lines and lines that begin with # are passed over.
+    The heading names the columns with their units, ``displacement [mm],current [A],force [N]``, in any order;
+    the points may come in any order. Blank lines and lines that begin with # are skipped.
 
     Raises
     ------
     InputError
-        The file cannot be read, is empty, lacks a unit, holds something else than finite numbers, or no
-        complete grid.
+        The file cannot be read, is empty, lacks a unit, holds anything but finite numbers, or not a complete
+        grid.
     """
     from printhammer.units import to_si
 
@@ -180,7 +180,7 @@ def bicubic(table: Grid) -> FloatArray:
 
 
 def cell_at_zero(table: Grid) -> tuple[int, float]:
-    """Return the cell of the currents that holds 0 A, and how far 0 A lies in it, A."""
+    """Return the index of the current cell that holds 0 A, and the offset of 0 A in the cell, A."""
     import numpy as np
 
     current = table.current
@@ -189,10 +189,10 @@ def cell_at_zero(table: Grid) -> tuple[int, float]:
 
 
 class GridMagnet(MagnetPart):
-    """A magnet whose law is the spline through a table read from a CSV file."""
+    """Magnet whose law is a spline through a table from a CSV file."""
 
     quantity: ClassVar[str]
-    """What the table holds, a key of `UNITS`."""
+    """Quantity of the table, a key of `UNITS`."""
 
     file: str = Field(description="CSV file of the table, relative to the file that names it")
     _table: Grid = PrivateAttr()
@@ -214,13 +214,13 @@ class GridMagnet(MagnetPart):
 
     @classmethod
     def check(cls, table: Grid, where: str) -> None:
-        """Refuse a table that the law cannot use; messages begin with `where`."""
+        """Raise InputError for a table that the law cannot use; messages begin with `where`."""
 
     @classmethod
     def from_arrays(
         cls, x: Sequence[float], current: Sequence[float], values: Sequence[Sequence[float]], file: str = ""
     ) -> Self:
-        """Make the part from arrays.
+        """Create the part from arrays.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class GridMagnet(MagnetPart):
         values : sequence of sequence of float
             Forces, N, or flux linkages, Wb, shape (len(x), len(current)).
         file : str, optional
-            File name, only remembered.
+            File name, stored only.
         """
         what = f"{cls.quantity} table"
         if len(values) != len(x) or any(len(line) != len(current) for line in values):
@@ -255,14 +255,14 @@ class GridMagnet(MagnetPart):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Displacements of the table, `(x_min, x_max)` in m."""
+        """Range of displacements of the table, `(x_min, x_max)` in m."""
         return (self._table.x[0], self._table.x[-1])
 
     @property
     def current_range(self) -> tuple[float, float]:
-        """Currents of the table, A."""
+        """Range of currents of the table, A."""
         return (self._table.current[0], self._table.current[-1])
 
     def content(self) -> Mapping[str, Any]:
-        """Return the points, which belong to the identity of the magnet: x, m; current, A; values, SI."""
+        """Return the points, part of the identity of the magnet: x, m; current, A; values, SI."""
         return {"x": self._table.x, "current": self._table.current, self.quantity: self._table.values}

@@ -32,7 +32,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
     if x <= 0.0:
         return math.nan
     pull = c[1] - c[2] * current
-    # Division and root side by side are faster than one after the other.
+    # Independent division and root run in parallel, faster than in sequence.
     return float(c[0] - pull * pull / x * math.sqrt(x))
 
 
@@ -101,7 +101,7 @@ class InverseRootMagnet(MagnetPart):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Displacements for which the law holds, `(x_min, x_max)` in m; open at 0."""
+        """Range of displacements of the law, `(x_min, x_max)` in m; open at 0."""
         return (
             0.0 if self.range_min is None else self.range_min,
             math.inf if self.range_max is None else self.range_max,

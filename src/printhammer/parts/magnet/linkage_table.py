@@ -39,7 +39,7 @@ def _inside(c: Any, x: float, current: float) -> bool:
 
 
 def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return the linkage at x in a cell of the currents: powers 0 to 3 of the current from its lower end."""
+    """Return the linkage at x in a current cell, as a polynomial: coefficients of powers 0 to 3."""
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
     dx = x - c[2 + i]
@@ -53,7 +53,7 @@ def _along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float
 
 
 def _slope_along_current(c: Any, x: float, j: int) -> tuple[float, float, float, float]:
-    """Return the slope of the linkage along x in the same powers."""
+    """Return the slope of the linkage along x in a current cell, as coefficients of powers 0 to 3."""
     nx = int(c[0])
     i = cell_of(c, 2, nx, x)
     dx = x - c[2 + i]
@@ -67,7 +67,7 @@ def _slope_along_current(c: Any, x: float, j: int) -> tuple[float, float, float,
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force that the linkage asks for, N, 0 without current; NaN outside the table."""
+    """Return the force that follows from the linkage, N, 0 without current; NaN outside the table."""
     if not _inside(c, x, current):
         return math.nan
     nx = int(c[0])
@@ -78,7 +78,7 @@ def magnet_force(c: Any, x: float, current: float) -> float:
     di = current - c[2 + nx + j]
     k = 2 + nx + ni + 16 * (nx - 1) * (ni - 1) + 3 * (i * (ni - 1) + j)
     a, b, d, e = _slope_along_current(c, x, j)
-    # The quarters and thirds are those of the integral along the current.
+    # Integration along the current yields the halves, thirds and quarters.
     cell = di * (a + di * (0.5 * b + di * (d / 3.0 + di * 0.25 * e)))
     return float(c[k] + dx * (c[k + 1] + dx * c[k + 2]) + cell)
 
@@ -124,7 +124,7 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
     """Return the current of a linkage with a constant inductance in series, A; NaN outside the table.
 
-    A current that rounding puts beyond the table is that of its end.
+    A current that rounding places beyond the table is clipped to its end.
     """
     nx = int(c[0])
     ni = int(c[1])
@@ -146,7 +146,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
     least = 0.0
     most = width
     di = 0.5 * width
-    # Newton's steps, and halves of the interval where one leaves it; 60 halves are all the bits.
+    # Newton steps, safeguarded by bisection; 60 bisections exhaust the bits of a float.
     for _ in range(60):
         value = a + di * (b + di * (d + di * e))
         if value > 0.0:
@@ -162,7 +162,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
         di = after
     value = a + di * (b + di * (d + di * e))
     rise = b + di * (2.0 * d + di * 3.0 * e)
-    # At an end of the interval something may be left over.
+    # A residual at an end of the interval may remain.
     if not (rise > 0.0 and abs(value) <= slack * rise):
         return math.nan
     return float(c[2 + nx + low] + di)
@@ -183,7 +183,7 @@ class LinkageTableMagnet(GridMagnet):
 
     @classmethod
     def check(cls, table: Grid, where: str) -> None:
-        """Refuse a table, or a spline through it, that does not rise with the current everywhere."""
+        """Raise InputError for a table, or a spline through it, that does not increase with the current."""
         import numpy as np
 
         ending = "expected one that rises with the current, or there is no coenergy"
@@ -196,7 +196,7 @@ class LinkageTableMagnet(GridMagnet):
                         file=where,
                         key="linkage",
                     )
-        # Least slope of the spline in each cell of the currents, at five places in each cell along x.
+        # Smallest slope of the spline in each current cell, at five positions in each cell along x.
         places = np.linspace(0.0, 1.0, 5) * np.diff(table.x)[:, None]
         powers = np.power(places[..., None], np.arange(4))
         b, d, e = np.einsum("ikp,ijpq->qikj", powers, bicubic(table))[1:]

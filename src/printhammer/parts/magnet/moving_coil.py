@@ -58,7 +58,7 @@ def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float
 
 @register
 class MovingCoilMagnet(MagnetPart):
-    """The force constant of a moving coil."""
+    """Force constant of a moving coil."""
 
     law: ClassVar[str] = "moving-coil"
 

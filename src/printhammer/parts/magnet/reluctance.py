@@ -48,7 +48,7 @@ MU0: Final = 4e-7 * math.pi
 
 
 def _gap_inductance(c: Any, x: float) -> float:
-    """Return N^2 P, H; NaN where the law ends."""
+    """Return N^2 P, H; NaN outside the range of the law."""
     g = c[0] * (x - c[1])
     s = g + c[3]
     if not (s > 0.0 and c[6] - c[7] * g >= 0.0):
@@ -72,7 +72,7 @@ def _unsaturated(p: float, q: float, y: float) -> float:
 
 
 def magnet_force(c: Any, x: float, current: float) -> float:
-    """Return the force, N; NaN where the law ends."""
+    """Return the force, N; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -82,12 +82,12 @@ def magnet_force(c: Any, x: float, current: float) -> float:
 
 
 def magnet_energy(c: Any, x: float) -> float:
-    """Return 0 J, the energy without current; NaN where the law ends."""
+    """Return 0 J, the energy without current; NaN outside the range of the law."""
     return 0.0 * _gap_inductance(c, x)
 
 
 def magnet_linkage(c: Any, x: float, current: float) -> float:
-    """Return the flux linkage, Wb; NaN where the law ends."""
+    """Return the flux linkage, Wb; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -97,7 +97,7 @@ def magnet_linkage(c: Any, x: float, current: float) -> float:
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the slope of the linkage along x, Wb/m; NaN where the law ends."""
+    """Return the slope of the linkage along x, Wb/m; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -108,7 +108,7 @@ def magnet_emf(c: Any, x: float, current: float) -> float:
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the differential inductance, H; NaN where the law ends."""
+    """Return the differential inductance, H; NaN outside the range of the law."""
     length = _gap_inductance(c, x)
     if not length > 0.0:
         return math.nan
@@ -120,7 +120,7 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
     """Return the current of a linkage with a constant inductance in series, A.
 
-    NaN where the law ends, and without any leakage at the saturation flux and beyond it.
+    NaN outside the range of the law, and without any leakage at the saturation flux and beyond.
     """
     length = _gap_inductance(c, x)
     if not length > 0.0:
@@ -166,14 +166,14 @@ class ReluctanceMagnet(MagnetPart):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Displacements for which the law holds, in m; open where the gap is -g0."""
+        """Range of displacements of the law, m; open where the gap is -g0."""
         reach = math.inf if self.leakage_reach is None else self.leakage_reach
         if self.pull == "paper":
             return (self.closed_at - reach, self.closed_at + self.residual_gap)
         return (self.closed_at - self.residual_gap, self.closed_at + reach)
 
     def packed(self, origin: float) -> tuple[float, ...]:
-        """Return the constants as the module states."""
+        """Return the packed constants in the order stated by the module."""
         scale = MU0 * self.turns**2
         return (
             -1.0 if self.pull == "paper" else 1.0,

@@ -69,7 +69,7 @@ def magnet_energy(c: Any, x: float) -> float:
 
 
 def _linkage(c: Any, x: float, j: int) -> tuple[float, float, float]:
-    """Return the linkage at x in a cell of the currents: powers 0 to 2 of the current from its lower end."""
+    """Return the linkage at x in a current cell, as coefficients of powers 0 to 2."""
     nx = int(c[0])
     ni = int(c[1])
     i = cell_of(c, 2, nx, x)
@@ -100,7 +100,7 @@ def magnet_linkage(c: Any, x: float, current: float) -> float:
 
 
 def magnet_emf(c: Any, x: float, current: float) -> float:
-    """Return the slope of the force along the current, N/A, which is that of the linkage along x."""
+    """Return the slope of the force along the current, N/A, equal to that of the linkage along x."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -118,7 +118,7 @@ def magnet_emf(c: Any, x: float, current: float) -> float:
 
 
 def magnet_inductance(c: Any, x: float, current: float) -> float:
-    """Return the differential inductance, H, without that at the table's beginning; NaN outside."""
+    """Return the differential inductance relative to the smallest displacement, H; NaN outside."""
     nx = int(c[0])
     ni = int(c[1])
     if not (c[2] <= x <= c[1 + nx] and c[2 + nx] <= current <= c[1 + nx + ni]):
@@ -131,7 +131,7 @@ def magnet_inductance(c: Any, x: float, current: float) -> float:
 def magnet_current(c: Any, x: float, linkage: float, inductance: float) -> float:
     """Return the current of a linkage with a constant inductance in series, A; NaN outside the table.
 
-    A current that rounding puts beyond the table is that of its end.
+    A current that rounding places beyond the table is clipped to its end.
     """
     nx = int(c[0])
     ni = int(c[1])
@@ -177,7 +177,7 @@ class TableMagnet(GridMagnet):
 
 
 def _packed_spline(table: Grid) -> tuple[float, ...]:
-    """Return the spline of the forces with its integrals along x: of itself, and of its slope along I."""
+    """Return the spline of the forces and its integrals along x: of the force, and of its slope along I."""
     import numpy as np
 
     x, current = np.array(table.x), np.array(table.current)
@@ -192,7 +192,7 @@ def _packed_spline(table: Grid) -> tuple[float, ...]:
 
 
 def _integral(x: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return a cubic spline's integral from its first knot: cells first, powers of x last, five for four."""
+    """Return the integral of a cubic spline from its first knot, shape (cells, ..., 5 powers of x)."""
     import numpy as np
 
     whole = np.zeros((*slope.shape[:-1], 5))

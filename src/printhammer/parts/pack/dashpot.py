@@ -32,7 +32,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 
 
 def pack_unloading(c: Any, x: float, v: float, q: float) -> float:
-    """Return the force of spring and dashpot, N: a pack without memory unloads as it loads."""
+    """Return the force of spring and dashpot, N; a pack without memory unloads along its loading curve."""
     depth = x - c[2]
     if depth < 0.0:
         return 0.0

@@ -36,7 +36,7 @@ def pack_loading(c: Any, x: float, v: float) -> float:
 def pack_memory(c: Any, peak: float) -> float:
     """Return q = S rmax^-8.3 of a local maximum, N, which the unloading branch needs.
 
-    It is 0 where the indentation is below 1e-30 d, whose force would be below 1e-81 S.
+    It is 0 for an indentation below 1e-30 d, whose force would be below 1e-81 S.
     """
     r = (peak - c[1]) * c[2]
     if r <= 1e-30:

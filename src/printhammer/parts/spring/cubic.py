@@ -1,11 +1,11 @@
-"""Spring of Duffing's equation: a linear and a cubic term about the place where it is relaxed.
+"""Spring of Duffing's equation: a linear and a cubic term about the relaxed position.
 
     Fs = -K (x - x0) - D (x - x0)^3
 
 Source: G. Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (Vieweg, 1918); with a negative K
-and a positive D two wells, P. Holmes, Phil. Trans. R. Soc. Lond. A 292 (1979) 419.
-Validity: deflections for which higher terms are small. Weakness: symmetric about x0, neither mass nor damping
-of its own; with a negative D it pushes away without bound beyond sqrt(-K / D).
+and a positive D two wells, P. Holmes, Phil. Trans. R. Soc. Lond. A 292 (1979) 419. Validity: deflections for
+which higher terms are small. Weakness: symmetric about x0, neither mass nor damping of its own; with a
+negative D it pushes away without bound beyond sqrt(-K / D).
 
 Packed constants: c = [K, D, x0].
 """
@@ -25,14 +25,14 @@ def spring_force(c: Any, x: float) -> float:
 
 
 def spring_energy(c: Any, x: float) -> float:
-    """Return the potential energy of the spring, J, zero where it is relaxed."""
+    """Return the potential energy of the spring, J, zero at the relaxed position."""
     square = (x - c[2]) * (x - c[2])
     return float((0.5 * c[0] + 0.25 * c[1] * square) * square)
 
 
 @register
 class CubicSpring(SpringPart):
-    """Stiffness, coefficient of the cubic term, and place where the spring is relaxed."""
+    """Stiffness, coefficient of the cubic term, and relaxed position of the spring."""
 
     law: ClassVar[str] = "cubic"
 

@@ -1,4 +1,4 @@
-"""What the reconstruction found, as it ships with the package: base rates, search, family, schemes of 1983.
+"""Shipped results of the reconstruction: base rates, search, family, schemes of 1983.
 
 Five JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
 All values are SI.
@@ -59,7 +59,7 @@ class _Panel(_Counted):
 
 
 class BaseRates(_Table):
-    """How often each claim holds among random plausible hammers."""
+    """Frequency of each claim among random plausible hammers."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     hammers: _Some = Field(description="the number of random hammers")
@@ -71,18 +71,18 @@ class BaseRates(_Table):
     poincare_panels: dict[str, _Panel] = Field({}, description="for each panel of Fig. 11 the same")
 
     def share(self, name: str) -> Share | None:
-        """Return how often a claim holds; None where that was not measured."""
+        """Return the frequency of a claim; None if it was not measured."""
         return _share(self.claims.get(name))
 
     @property
     def panels(self) -> dict[str, Share]:
-        """How often each panel of Fig. 11 is as printed."""
+        """Frequency of the printed verdict for each panel of Fig. 11."""
         shares = {name: _share(panel) for name, panel in self.poincare_panels.items()}
         return {name: share for name, share in shares.items() if share is not None}
 
 
 class Predictions(_Table):
-    """Hammers found by searching on the stated claims alone, and the claims that did not steer."""
+    """Hammers found by searching on the stated claims alone, and the other claims that they satisfy."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     seed: int = Field(description="the seed of the search")
@@ -92,12 +92,12 @@ class Predictions(_Table):
     claims: dict[_ClaimName, _Predicted] = Field(description="for each claim how often it holds")
 
     def share(self, name: str) -> Share | None:
-        """Return for how many of the hammers a claim holds; None where that was not measured."""
+        """Return the fraction of the hammers for which a claim holds; None if it was not measured."""
         return _share(self.claims.get(name))
 
 
 class Searched(_Table):
-    """One search, by what decides on it and how far it came."""
+    """One search: its objective and its result."""
 
     aim: Literal["stated", "all", "panels", "buzz", "claims"] = Field(description="the claims that led")
     seed: int = Field(description="the seed of the search")
@@ -105,7 +105,7 @@ class Searched(_Table):
 
 
 class BestFor(_Table):
-    """The hammer that comes closest to one claim."""
+    """Hammer that comes closest to one claim."""
 
     value: dict[str, Any] = Field(description="what was measured with it")
     holds: bool = Field(description="whether the claim holds for it")
@@ -114,7 +114,7 @@ class BestFor(_Table):
 
 
 class Failing(_Table):
-    """A claim that fails for the shipped hammer."""
+    """Claim that fails for the shipped hammer."""
 
     value: dict[str, Any] = Field(description="what was measured with the shipped hammer")
     why: str = Field(description="why it fails")
@@ -122,7 +122,7 @@ class Failing(_Table):
 
 
 class Search(_Table):
-    """The searches that found the shipped hammer."""
+    """Searches that found the shipped hammer."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the shipped hammer")
@@ -135,7 +135,7 @@ class Search(_Table):
 
 
 class FamilyMember(_Table):
-    """One hammer of the family."""
+    """Hammer of the family."""
 
     name: str = Field(description="its name")
     constants: dict[str, _Number] = Field(description="its constants by file key, SI")
@@ -145,7 +145,7 @@ class FamilyMember(_Table):
 
 
 class Conclusion(_Table):
-    """What follows for all hammers of the family."""
+    """Consequence common to the hammers of the family."""
 
     low: _Number | None = Field(description="the lowest value in the family")
     high: _Number | None = Field(description="the highest value in the family")
@@ -154,7 +154,7 @@ class Conclusion(_Table):
 
 
 class Family(_Table):
-    """Clearly different hammers that satisfy the claims about as well as the shipped one."""
+    """Distinct hammers that satisfy the claims about as well as the shipped one."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     hammers: list[FamilyMember] = Field(min_length=1, description="the hammers")
@@ -162,7 +162,7 @@ class Family(_Table):
 
 
 class FamilyPanels(_Table):
-    """Panels of Fig. 11 of one hammer of the family, of twelve."""
+    """Number of panels of Fig. 11, of twelve, for one hammer of the family."""
 
     exact: _Count = Field(description="the number with the verdict of the paper, exactly")
     computed: _Count = Field(description="the same as the Runge-Kutta method of 1983 computes them")
@@ -170,7 +170,7 @@ class FamilyPanels(_Table):
 
 
 class Change(_Table):
-    """How often one way of computing gives another verdict on a panel than another way."""
+    """Frequency with which two ways of computing a panel give different verdicts."""
 
     first: str = Field(description="one way of computing")
     second: str = Field(description="the other")
@@ -183,7 +183,7 @@ class Change(_Table):
 
 
 class Schemes(_Table):
-    """What the integrators of 1983 do to verdicts."""
+    """Effect of the integrators of 1983 on the verdicts."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the hammer of panels and claims")
@@ -204,7 +204,7 @@ FILES: Final[dict[str, type[_Table]]] = {
     "family": Family,
     "schemes": Schemes,
 }
-"""Name of each file, less ".json", to what it holds."""
+"""Name of each file, without ".json", and its class."""
 
 _Model = TypeVar("_Model", bound=_Table)
 
@@ -219,7 +219,7 @@ def _file(name: str, model: type[_Model], meaning: str) -> cached_property[_Mode
 
 @dataclass(frozen=True)
 class Results:
-    """The results in a folder; each is None where its file is absent."""
+    """Results in a folder; each is None if its file is absent."""
 
     folder: Path | Traversable
     base_rates = _file("base_rates", BaseRates, "How often each claim holds among random plausible hammers.")
@@ -254,7 +254,7 @@ class Results:
 
 
 def shipped_results() -> Results:
-    """Return the results that ship with the package."""
+    """Return the shipped results."""
     return Results(files("printhammer").joinpath("report", "reconstruction", "data"))
 
 
@@ -267,7 +267,7 @@ def _refuse(text: str) -> None:
 
 
 def _fault(error: ValidationError, model: type[_Table]) -> InputError:
-    """Return the first fault as an error: key, value and what was expected."""
+    """Convert the first fault to an error with key, value and expectation."""
     fault = error.errors(include_url=False)[0]
     steps = [step for step in fault["loc"] if step != "[key]"]
     key = "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")

@@ -1,4 +1,4 @@
-"""How many of many: a share with its binomial interval."""
+"""Fractions with their binomial confidence intervals."""
 
 from __future__ import annotations
 
@@ -8,39 +8,39 @@ from typing import Any, Final
 
 from printhammer.results import Declared, part
 
-CONFIDENCE: Final = 0.95  # Of the interval of a share
+CONFIDENCE: Final = 0.95  # Normal quantile of the 95 % interval.
 
 _Z: Final = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE)
 
 
 class Share(Declared):
-    """Of `measured` hammers something holds for `holds`."""
+    """Fraction of hammers for which a statement holds: `holds` of `measured`."""
 
     measured: int = part("number of hammers, at least one")
     holds: int = part("number of those for which it holds")
 
     @property
     def rate(self) -> float:
-        """The share, from 0 to 1."""
+        """Fraction of hammers, from 0 to 1."""
         return self.holds / self.measured
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the share, after E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209.
+        """95 % interval of the fraction, after E. B. Wilson, J. Amer. Statist. Assoc. 22 (1927) 209.
 
-        It is the set of probabilities p with ``|rate - p| <= z sqrt(p (1 - p) / n)``, and so stays within 0
-        and 1 and has a width even where none or all hold.
+        It is the set of probabilities p with ``|rate - p| <= z sqrt(p (1 - p) / n)``; it stays within 0 and
+        1, and has a width even if none or all hold.
         """
         n, p = self.measured, self.rate
         middle = p + _Z**2 / (2.0 * n)
         half = _Z * sqrt(p * (1.0 - p) / n + (_Z / (2.0 * n)) ** 2)
         scale = 1.0 + _Z**2 / n
-        # The ends are exact where none or all hold.
+        # The ends are exact if none or all hold.
         low = 0.0 if self.holds == 0 else (middle - half) / scale
         high = 1.0 if self.holds == n else (middle + half) / scale
         return low, high
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what goes to `claims.json`."""
+        """Return the entry of `claims.json`."""
         low, high = self.interval
         return {"rate": self.rate, "low": low, "high": high, "measured": self.measured, "holds": self.holds}
