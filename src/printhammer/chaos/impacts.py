@@ -34,6 +34,7 @@ from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.regime import Firing, Regime, regimes_of
 from printhammer.run.simulate import touches_of
 from printhammer.run.start import initial_state
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 
 Surface = Literal["pack", "backstop"]
@@ -110,6 +111,7 @@ class Section(Result):
         )
 
 
+@checked
 def section(
     hammer: Hammer | Regime,
     *,

@@ -23,6 +23,7 @@ from printhammer.results.summary import (
     Summary,
 )
 from printhammer.run.simulate import simulate
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -109,6 +110,7 @@ class ImpactTime(Result, rows=_CELLS):
         return UNITS[self.signal]
 
 
+@checked
 def impact_time(
     hammer: Hammer,
     *,

@@ -26,6 +26,7 @@ from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem, check_tolerance
 from printhammer.run.simulate import end_of_run
 from printhammer.run.start import initial_state
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray
 
 _IN_PARTS: Final = "relative change of a quantity per relative change of a constant"
@@ -262,6 +263,7 @@ class Spread(Result):
         return self.sensitivities.plot(**options)
 
 
+@checked
 def sensitivities(
     hammer: Hammer,
     drive: Drive,

@@ -135,7 +135,7 @@ class PulseTrains(Sequence[PulseTrain]):
     """
 
     def __init__(self, waveform: Waveform, at: Iterable[npt.ArrayLike], overlap: Overlap = "add") -> None:
-        firings = Ragged.of([np.atleast_1d(read_array(row, "at", "firing times, s")) for row in at])
+        firings = Ragged.of([np.atleast_1d(read_array(row, "at", "firing times, s", "s")) for row in at])
         rates = np.full(len(firings), np.nan)
         self._place([PulseTrain(waveform, overlap=overlap)], np.zeros(len(firings), np.int64), firings, rates)
         self._check()
@@ -150,7 +150,7 @@ class PulseTrains(Sequence[PulseTrain]):
         start: float | str = 0.0,
     ) -> Self:
         """Create trains of equal length at constant rates, Hz, with the first firing at `start`, s."""
-        grid = read_array(rates, "rates", "numbers, Hz").reshape(-1)
+        grid = read_array(rates, "rates", "numbers, Hz", "Hz").reshape(-1)
         steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
         with np.errstate(all="ignore"):
             periods = 1.0 / grid

@@ -78,8 +78,13 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
     return count
 
 
-def read_array(values: npt.ArrayLike, name: str, what: str = "numbers") -> FloatArray:
-    """Parse numbers into a new array of any shape."""
+def read_array(values: npt.ArrayLike, name: str, what: str = "numbers", si: str = "") -> FloatArray:
+    """Parse numbers into a new array of any shape.
+
+    With a unit `si`, a list may hold text with units beside numbers in SI.
+    """
+    if si and isinstance(values, (list, tuple)) and any(isinstance(value, str) for value in values):
+        return np.array([read_number(value, si, name) for value in values], dtype=np.float64)
     try:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):

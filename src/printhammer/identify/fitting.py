@@ -10,10 +10,12 @@ from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.identify.result import Fit, with_error
+from printhammer.support.arguments import checked
 
 KINDS: Final = ("magnet", "solenoid", "spring", "pack", "backstop", "motion", "coil")
 
 
+@checked
 def fit(
     kind: str, path: str | Path | Sequence[str | Path], *, hammer: Hammer | None = None, **options: Any
 ) -> Fit:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from printhammer.drive.base import Overlap
 from printhammer.drive.batch import PulseTrains
-from printhammer.drive.input import PULSES, read_count
+from printhammer.drive.input import PULSES, read_array, read_count
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
@@ -66,12 +66,12 @@ def frequency_map(
     hammer : Hammer
         The hammer.
     rates : array, optional
-        Firing rates, Hz, ascending; by default 512 from 500 Hz to 2 kHz.
+        Firing rates, Hz or text with units, ascending; by default 512 from 500 Hz to 2 kHz.
     pulses : int, optional
         Number of firings at each rate.
     times : array or int, optional
-        Times from the first firing, s, ascending, or their number, spread evenly from the first firing to 1
-        ms after the last one at the lowest rate; by default 512.
+        Times from the first firing, s or text with units, ascending, or their number, spread evenly from the
+        first firing to 1 ms after the last one at the lowest rate; by default 512.
     waveform : Waveform, optional
         Waveform of every firing; by default that of the hammer.
     overlap : str, optional
@@ -195,10 +195,7 @@ def _spacing(times: FloatArray) -> float:
 def _rates(rates: npt.ArrayLike | None) -> FloatArray:
     if rates is None:
         return np.linspace(LOWEST, HIGHEST, RATES)
-    try:
-        grid = np.atleast_1d(np.array(rates, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError("rates: expected numbers, Hz", key="rates") from None
+    grid = np.atleast_1d(read_array(rates, "rates", "numbers, Hz", "Hz"))
     if grid.ndim != 1 or grid.size == 0:
         raise InputError(
             f"rates: an array of shape {grid.shape}", key="rates", expected="a list of at least one rate, Hz"
@@ -225,7 +222,7 @@ def _times(times: npt.ArrayLike | None, end: float) -> FloatArray:
         if count > MOST_CELLS:
             raise InputError.of("times", count, f"at most {MOST_CELLS}")
         return np.linspace(0.0, end, int(count))
-    grid = np.array(times, dtype=np.float64)
+    grid = read_array(times, "times", "times, s", "s")
     if grid.ndim != 1 or grid.size == 0 or not np.isfinite(grid).all():
         raise InputError("times: expected a list of finite numbers, s", key="times")
     if grid[0] < 0.0 or (np.diff(grid) <= 0.0).any() or grid[-1] <= 0.0:

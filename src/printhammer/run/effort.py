@@ -15,6 +15,7 @@ from typing import Any, Final, TypedDict, TypeVar
 
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.problem import TOLERANCE, check_tolerance
+from printhammer.support.arguments import check_objects
 from printhammer.support.threads import Progress, mapped, shifted, thread_count
 
 A = TypeVar("A")
@@ -136,6 +137,7 @@ def computation(function: F) -> F:
     keys = vars(sys.modules[function.__module__])[rest.annotation[7:-1]].__annotations__
     names = [name for name in _TYPES if name in keys]
     allowed = {each.name for each in own} | (keys.keys() - _TYPES.keys())
+    check = check_objects(function)
 
     @functools.wraps(function)
     def call(*args: Any, **keywords: Any) -> Any:
@@ -145,6 +147,7 @@ def computation(function: F) -> F:
         unknown = keywords.keys() - allowed
         if unknown:
             raise TypeError(f"{function.__name__}() got an unexpected keyword argument {min(unknown)!r}")
+        check(args, keywords)
         return function(*args, **keywords)
 
     fired = rest.name == "firing"

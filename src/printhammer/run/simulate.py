@@ -19,7 +19,8 @@ from printhammer.kernel.model.modes import BACKSTOP_SURFACE, PACK_SURFACE, PAUSE
 from printhammer.results import Declared, part, scalar
 from printhammer.run.motion import Motion
 from printhammer.run.problem import TOLERANCE, Problem, Stretch, check_tolerance
-from printhammer.run.start import initial_state, state_beyond
+from printhammer.run.start import initial_state, read_state, state_beyond
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray
 
 CYCLE: Final = 4e-3
@@ -32,12 +33,13 @@ SCHEMES: Final = get_args(Scheme)
 _FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100
 
 
+@checked
 def simulate(
     hammer: Hammer,
     drive: Drive,
     *,
     duration: float | str | None = None,
-    state: Sequence[float] | None = None,
+    state: Sequence[float | str] | None = None,
     tolerance: float = TOLERANCE,
     points: int | None = None,
     times: npt.ArrayLike | None = None,
@@ -56,11 +58,12 @@ def simulate(
     duration : float or str, optional
         End of the run, s, or text with a unit; by default 4 ms after the last firing, and required for a
         drive that does not end.
-    state : sequence of float, optional
-        Displacement, m, and velocity, m/s, at time 0; by default the rest state. In the pack with the mode
-        and the memory, as in `printhammer.run.ensemble.Strobes`; under a voltage then with the current in the
-        coil, A, or with that, the current in its shorted turn, A, and the voltage of the supply's capacitor,
-        V; by default there is no current, and the capacitor is charged. `Motion.state_at` hands out all.
+    state : sequence of float or str, optional
+        Displacement, m, and velocity, m/s, or text with units, at time 0; by default the rest state. In the
+        pack with the mode and the memory, as in `printhammer.run.ensemble.Strobes`; under a voltage then with
+        the current in the coil, A, or with that, the current in its shorted turn, A, and the voltage of the
+        supply's capacitor, V; by default there is no current, and the capacitor is charged.
+        `Motion.state_at` hands out all.
     tolerance : float, optional
         Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
     points : int, optional
@@ -83,8 +86,9 @@ def simulate(
         raise InputError.of("scheme", scheme, f"one of {', '.join(SCHEMES)}")
     check_tolerance(tolerance)
     end = end_of_run(drive, duration)
-    beyond = state_beyond(hammer, state, drive.quantity)
-    start = initial_state(hammer, None if state is None else state[:2])
+    numbers = None if state is None else read_state(state)
+    beyond = state_beyond(hammer, numbers, drive.quantity)
+    start = initial_state(hammer, None if numbers is None else numbers[:2])
     if scheme == "default":
         problem = Problem(hammer, drive, start, 0.0, tolerance, beyond)
     else:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.kernel.model.modes import (
     HELD_LOADING,
@@ -50,7 +51,26 @@ STATE: Final = (
 HELD_BRANCHES: Final = {HELD_LOADING: LOADING, HELD_UNLOADING: UNLOADING}
 """Branches of the pack on which the armature rests, and those that they are part of."""
 
+_UNITS: Final = ("m", "m/s")
+_UNITS_BEYOND: Final = ("1", "m", "A", "A", "V")
+"""Units of a state: of displacement and velocity, and of the fields of `Beyond`."""
+
 _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
+
+
+def read_state(state: Sequence[float | str]) -> tuple[float, ...]:
+    """Read a state of any of its forms, in SI or as text with units; InputError for text without its unit."""
+    units = (*_UNITS, *(_UNITS_BEYOND[place] for place in FORMS.get(len(state), ())))
+    texts = [isinstance(number, str) for number in state]
+    if len(units) != len(state) or not any(texts):
+        try:
+            return tuple(float(number) for number in state)
+        except (TypeError, ValueError):
+            raise InputError.of("state", tuple(state), STATE) from None
+    return tuple(
+        read_number(number, si, "state") if isinstance(number, str) else float(number)
+        for number, si in zip(state, units, strict=True)
+    )
 
 
 def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float, float]:

@@ -35,6 +35,7 @@ from printhammer.run.effort import Effort
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime
 from printhammer.run.supply import current_of
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 
 FIRINGS: Final = 1000
@@ -245,6 +246,7 @@ class Lyapunov(Result, rows="firing exponent"):
         return {name: (replace(note, name=name), values) for name, (note, values) in entries.items()}
 
 
+@checked
 def lyapunov(
     hammer: Hammer | Regime,
     *,

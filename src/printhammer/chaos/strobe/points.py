@@ -43,7 +43,8 @@ from printhammer.run.ensemble import MODE_NAMES
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.regime import Firing, Regime, Window, regimes_of, window_of
 from printhammer.run.scheme_runs import READINGS, Reading, Scheme, SchemeProblem
-from printhammer.run.start import initial_state
+from printhammer.run.start import initial_state, read_state
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
@@ -137,12 +138,13 @@ class Strobe(Result):
         return {name: value for name, value in judged.items() if name != "tolerance"}
 
 
+@checked
 def strobe(
     hammer: Hammer | Regime,
     *,
     points: SupportsIndex = POINTS,
     transient: SupportsIndex = 0,
-    state: Sequence[float] | None = None,
+    state: Sequence[float | str] | None = None,
     tolerance: float = TOLERANCE,
     verdict: bool = True,
     **firing: Unpack[Firing],
@@ -157,9 +159,9 @@ def strobe(
         Number of points; by default 200, as in Fig. 11.
     transient : int, optional
         Number of firings left out before the first point.
-    state : sequence of float, optional
-        Displacement, m, velocity, m/s, and what else belongs to the state at the first firing, as for
-        `printhammer.simulate`; by default the rest state.
+    state : sequence of float or str, optional
+        Displacement, m, velocity, m/s, or text with units, and what else belongs to the state at the first
+        firing, as for `printhammer.simulate`; by default the rest state.
     tolerance : float, optional
         As for `printhammer.simulate`.
     verdict : bool, optional
@@ -178,7 +180,7 @@ def strobe(
         Regime.of(hammer, **firing),
         points=points,
         transient=transient,
-        states=None if state is None else [state],
+        states=None if state is None else [read_state(state)],
         tolerance=tolerance,
         verdict=verdict,
         every_exponent=True,

@@ -27,6 +27,7 @@ from printhammer.identify.bench.sensor import (
     wrong_rows,
 )
 from printhammer.results import Column, Result, part, scalar
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ class Measurement(Result):
         write_file(path, self.to_csv())
 
 
+@checked
 def measure(
     kind: str,
     hammer: Hammer,

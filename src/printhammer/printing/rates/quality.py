@@ -42,6 +42,7 @@ from printhammer.run.motion import Motion
 from printhammer.run.pieces import PiecewiseMotion, simulate_pieces
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 PITCH: Final = 25.4e-3 / 60.0  # Distance of neighbouring slots on the paper by default, m: sixty to the inch
@@ -272,6 +273,7 @@ class Quality(Result):
         return None if self.heat is None else self.heat * self.rate / len(self.wanted)
 
 
+@checked
 def quality(
     hammer: Hammer,
     rate: float | str,

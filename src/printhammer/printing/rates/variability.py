@@ -23,6 +23,7 @@ from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.magnet.inverse_root import InverseRootMagnet
 from printhammer.parts.pack.power import PowerPack
 from printhammer.results import Declared, part
+from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray
 
 
@@ -60,6 +61,7 @@ class Perturbation(Declared):
         return ", ".join(words) or "nominal"
 
 
+@checked
 def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
     """Return a hammer that differs by a perturbation.
 
