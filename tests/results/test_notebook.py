@@ -120,3 +120,24 @@ def test_completion_shows_public_names_only(motion: ph.Motion) -> None:
         assert all(hasattr(value, name) for name in names)
     assert {"x", "dots", "plot", "to_dataframe"} <= set(dir(motion))
     assert dir(ph) == sorted(ph.__all__)
+
+
+def test_a_notebook_shows_the_constants_of_a_hammer() -> None:
+    hammer = ph.load("hendriks-1983")
+    html = shown(hammer)["text/html"]
+    for constant in hammer.constants.values():
+        assert f"<td>{constant.key}</td>" in html
+    assert hammer.name in html
+
+
+def test_pyplot_shows_a_picture_where_it_has_windows(
+    motion: ph.Motion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from matplotlib import pyplot
+
+    for backend, number in (("agg", 0), ("tkagg", 1)):
+        monkeypatch.setattr("matplotlib.get_backend", lambda backend=backend: backend)
+        figure = motion.plot()
+        assert len(pyplot.get_fignums()) == number
+    assert pyplot.gcf() is figure
+    pyplot.close("all")

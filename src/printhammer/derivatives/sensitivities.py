@@ -8,7 +8,7 @@ tolerances on the dots.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from printhammer.run.simulate import end_of_run
 from printhammer.run.start import initial_state
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _IN_PARTS: Final = "relative change of a quantity per relative change of a constant"
 _INDEPENDENT: Final = "standard deviation for independent constants"
@@ -258,8 +261,8 @@ class Spread(Result):
         names = [name for name, (note, _) in kept.items() if note.kind == "coordinate"]
         return super().entries() | {name: kept[name] for name in (*names, "value", "run_value")}
 
-    def plot(self, **options: Any) -> Any:
-        """Draw the underlying sensitivities; returns a matplotlib figure."""
+    def plot(self, **options: Any) -> Figure:
+        """Draw the sensitivities that the spread follows from."""
         return self.sensitivities.plot(**options)
 
 

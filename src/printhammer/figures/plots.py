@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
@@ -64,4 +65,21 @@ def plot(result: object, picture: str = "", **options: Any) -> Figure:
         raise AttributeError(f"no picture of {name} is known")
     module, _, function = PLOTS[name].rpartition(".")
     drawn: Figure = getattr(import_module(f"{__package__}.{module}"), function)(result, **options)
+    _attach(drawn)
     return drawn
+
+
+def _attach(figure: Figure) -> None:
+    """Let `pyplot.show` show a figure, where pyplot is in use and opens windows.
+
+    Elsewhere nothing global keeps the figure: pyplot would hold it until it is closed.
+    """
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is None:
+        return
+    from matplotlib import get_backend
+    from matplotlib.backends.registry import BackendFilter, backend_registry
+
+    registry: Any = backend_registry  # without types of its own
+    if get_backend().lower() in registry.list_builtin(BackendFilter.INTERACTIVE):
+        pyplot.figure(figure)

@@ -26,6 +26,7 @@ from printhammer.hammer.file import FORMAT, Contents, build, file_options, read_
 from printhammer.hammer.uncertainty import UNCERTAINTY, Uncertainty
 from printhammer.parts import BackstopPart, CoilPart, DampingPart, MagnetPart, PackPart, Part, SpringPart
 from printhammer.support.constants import Constant, quantities
+from printhammer.support.html import html_table, titled
 
 _CHANGED: Final = ", changed"
 
@@ -401,6 +402,22 @@ class Hammer:
 
     def __repr__(self) -> str:
         return f"<Hammer {self.name} {self.fingerprint[:8]}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: name and title, the laws, and the constants with their sources."""
+        laws = [(role, part.law) for role, part in self.parts.items()]
+        if self.waveform is not None:
+            laws.append(("waveform", f"{self.waveform.shape}, {self.waveform.quantity}"))
+        rows = [
+            (each.key, f"{each.value:.6g} {each.unit}", each.meaning, each.status, each.source)
+            for each in self.constants.values()
+        ]
+        heads = ("constant", "value", "meaning", "status", "source")
+        return titled(
+            f"{self.name}: {self.title}" if self.title else self.name,
+            html_table(laws, ("part", "law")),
+            html_table(rows, heads),
+        )
 
 
 def _physics(model: Any) -> dict[str, Any]:

@@ -14,7 +14,6 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from functools import cached_property
-from html import escape
 from inspect import cleandoc
 from typing import (
     TYPE_CHECKING,
@@ -30,22 +29,10 @@ from typing import (
 
 import numpy as np
 
+from printhammer.support.html import html_table, titled
+
 MOST_ROWS: Final = 40
 """Largest number of rows shown of a table; longer tables show the first and last rows. Arbitrary."""
-
-_MOST_LETTERS: Final = 80
-
-
-def html_table(rows: Sequence[Sequence[str]], heads: Sequence[str] = ()) -> str:
-    """Return an HTML table; cells are truncated to 80 characters."""
-    head = f"<thead><tr>{''.join(f'<th>{escape(name)}</th>' for name in heads)}</tr></thead>" if heads else ""
-    cells = ("".join(f"<td>{escape(_cut(cell))}</td>" for cell in row) for row in rows)
-    return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
-
-
-def titled(title: str, *parts: str) -> str:
-    """Return HTML blocks below a bold title."""
-    return f"<div><b>{escape(title)}</b>{''.join(parts)}</div>"
 
 
 def cell(value: Any) -> str:
@@ -79,10 +66,6 @@ def shortened(rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[Sequ
     if hidden <= 0:
         return list(rows)
     return [*rows[:half], [*["…"] * (len(rows[0]) - 1), f"{hidden} more"], *rows[len(rows) - half :]]
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _MOST_LETTERS else f"{text[: _MOST_LETTERS - 3]}..."
 
 
 Kind = Literal["column", "coordinate", "scalar", "part"]

@@ -33,20 +33,20 @@ from printhammer.results.declare import (
     columns_of,
     coordinate,
     extent,
-    html_table,
     part,
     public_names,
     scalar,
     span,
-    titled,
     with_attributes,
 )
 from printhammer.results.provenance import provenance
 from printhammer.results.summary import Cells, Facts, Summary
+from printhammer.support.html import html_table, titled
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.figure import Figure
 
     Entries = dict[str, tuple[Column, Any]]
 
@@ -174,14 +174,15 @@ class Result:
         """
         files.save(path, self.to_dataset, self.to_dataframe, self.ENDINGS)
 
-    def plot(self, **options: Any) -> Any:
-        """Draw the result; returns a matplotlib figure.
+    def plot(self, **options: Any) -> Figure:
+        """Draw the result; `pyplot.show` shows the figure too where pyplot has windows.
 
         Options are those of the plot function that `printhammer.figures.plots` registers for the class;
         `picture` names an alternative picture.
         """
-        # Look up the figure by name, so that physics does not depend on pictures.
-        return import_module("printhammer.figures.plots").plot(self, **options)
+        # By name, so that physics does not depend on pictures.
+        figure: Figure = import_module("printhammer.figures.plots").plot(self, **options)
+        return figure
 
     def summary(self) -> Summary:
         """Summarise the result; by default the range and meaning of each declared column.

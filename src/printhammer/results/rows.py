@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, Self, SupportsIndex, TypeVar, overload
 import numpy as np
 import numpy.typing as npt
 
-from printhammer.results.declare import Declared, cell, columns_of, html_table, shortened
+from printhammer.results.declare import Declared, cell, columns_of, shortened
 from printhammer.results.files import write_csv, write_parquet
+from printhammer.support.html import html_table
 
 if TYPE_CHECKING:
     import pandas as pd

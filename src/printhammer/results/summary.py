@@ -16,7 +16,8 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from printhammer.results.declare import html_table, shortened
+from printhammer.results.declare import shortened
+from printhammer.support.html import html_table
 
 System = Literal["si", "inch"]
 Style = Literal["good", "poor", "bad", "strong", "best", "dim", "cyan", "magenta"]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from printhammer.drive.input import read_number
@@ -59,16 +60,18 @@ _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
 
 
 def read_state(state: Sequence[float | str]) -> tuple[float, ...]:
-    """Read a state of any of its forms, in SI or as text with units; InputError for text without its unit."""
+    """Read a state in any of its forms, in SI or as text with units.
+
+    Raises
+    ------
+    InputError
+        It has none of these forms, or a text has no unit.
+    """
     units = (*_UNITS, *(_UNITS_BEYOND[place] for place in FORMS.get(len(state), ())))
-    texts = [isinstance(number, str) for number in state]
-    if len(units) != len(state) or not any(texts):
-        try:
-            return tuple(float(number) for number in state)
-        except (TypeError, ValueError):
-            raise InputError.of("state", tuple(state), STATE) from None
+    if len(units) != len(state):
+        raise InputError.of("state", tuple(state), STATE)
     return tuple(
-        read_number(number, si, "state") if isinstance(number, str) else float(number)
+        float(number) if isinstance(number, Real) else read_number(number, si, "state")
         for number, si in zip(state, units, strict=True)
     )
 

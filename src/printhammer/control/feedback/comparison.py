@@ -42,6 +42,8 @@ from printhammer.run.simulate import simulate
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from printhammer.results.result import Entries
 
 BURST: Final = "11101101"  # Pattern of the run that is shown
@@ -141,7 +143,7 @@ class Feedback(Result, rows=_DOTS):
             "drive_fingerprint_shown": self.run.motion.drive.fingerprint,
         }
 
-    def plot_run(self, **options: Any) -> Any:
+    def plot_run(self, **options: Any) -> Figure:
         """Draw the run with what the controller saw; returns a matplotlib figure."""
         return self.plot(picture="run", **options)
 

@@ -1,0 +1,49 @@
+"""Arguments that are objects: what is no hammer, drive or waveform is refused by its name."""
+
+from typing import Any
+
+import pytest
+from tests.errors import refused
+
+import printhammer as ph
+
+HAMMER = ph.load("hendriks-1983")
+TRAIN = ph.PulseTrain(HAMMER.waveform, rate="1 kHz", pulses=2)
+
+
+@pytest.mark.parametrize(
+    ("call", "key", "value"),
+    [
+        (lambda: ph.simulate("hendriks-1983", TRAIN), "hammer", "hendriks-1983"),
+        (lambda: ph.simulate(HAMMER, HAMMER.waveform), "drive", HAMMER.waveform),
+        (lambda: ph.simulate(TRAIN, HAMMER), "hammer", TRAIN),
+        (lambda: ph.simulate(hammer=HAMMER, drive="fire"), "drive", "fire"),
+        (lambda: ph.frequency_map("hendriks-1983"), "hammer", "hendriks-1983"),
+        (lambda: ph.frequency_map(HAMMER, waveform=TRAIN), "waveform", TRAIN),
+        (lambda: ph.strobe(HAMMER.waveform, rate="1 kHz"), "hammer", HAMMER.waveform),
+        (lambda: ph.safe_rate("impact-wire"), "hammer", "impact-wire"),
+        (lambda: ph.judge_table(HAMMER, "table.json"), "table", "table.json"),
+        (lambda: ph.measure("magnet", "hendriks-1983"), "hammer", "hendriks-1983"),
+    ],
+)
+def test_wrong_objects_are_named(call: Any, key: str, value: object) -> None:
+    with refused(key, value):
+        call()
+
+
+def test_a_state_takes_text_with_units() -> None:
+    state = (HAMMER.position, 0.25)
+    text = (f"{HAMMER.position * 1e6} um", "0.25 m/s")
+    motion, other = (ph.simulate(HAMMER, TRAIN, state=each) for each in (state, text))
+    assert motion.dots[0].flight_time == pytest.approx(other.dots[0].flight_time, rel=1e-9)
+    for wrong in (("100 um", "1 s"), ("100 um", None), ("100 um",), ("a", "b")):
+        with refused("state"):
+            ph.simulate(HAMMER, TRAIN, state=wrong)
+
+
+def test_a_map_takes_text_with_units() -> None:
+    chart = ph.frequency_map(HAMMER, ["700 Hz", 900.0, "1.1 kHz"], pulses=2, times=["0 s", "1 ms"])
+    assert chart["rate"].values.tolist() == [700.0, 900.0, 1100.0]
+    assert chart["time"].values.tolist() == [0.0, 1e-3]
+    with refused("rates"):
+        ph.frequency_map(HAMMER, ["700 um"])
