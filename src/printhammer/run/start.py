@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
@@ -59,7 +59,7 @@ _UNITS_BEYOND: Final = ("1", "m", "A", "A", "V")
 _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
 
 
-def read_state(state: Sequence[float | str]) -> tuple[float, ...]:
+def read_state(state: Sequence[Any]) -> tuple[float, ...]:
     """Read a state in any of its forms, in SI or as text with units.
 
     Raises
