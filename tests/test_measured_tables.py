@@ -26,7 +26,7 @@ SILENT = (
     "support/c_code",
     "support/constants",
     "support/files",
-    "support/sheets",
+    "support/tables",
     "support/threads",
     "units",
 )

@@ -13,7 +13,7 @@ from tests.errors import refused
 import printhammer as ph
 from printhammer.identify.bench.laboratory import KINDS, SENSORS, SI, UNITS
 from printhammer.identify.bench.sensor import Amount, Channel, Sensor, by_quantity, wrong_rows
-from printhammer.identify.tables import read_table
+from printhammer.support.tables.readings import read_table
 
 HAMMER = hammers.crude()
 MANY = np.linspace(60e-6, 300e-6, 4000)

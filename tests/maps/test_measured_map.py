@@ -140,21 +140,21 @@ BAD_TABLES = {
     "no unit": (LONG.replace("time [us]", "time"), "time"),
     "unknown unit": (LONG.replace("[us]", "[uz]"), "time [uz]"),
     "other dimension": (LONG.replace("[um]", "[N]"), "displacement [N]"),
-    "word": (LONG.replace("1.2,10,71", "1.2,10,much"), "displacement [um]"),
-    "infinite": (LONG.replace("1.2,10,71", "1.2,10,inf"), "displacement [um]"),
-    "no time": (LONG.replace("1.2,10,71", "1.2,,71"), "time [us]"),
+    "word": (LONG.replace("1.2,10,71", "1.2,10,much"), "displacement"),
+    "infinite": (LONG.replace("1.2,10,71", "1.2,10,inf"), "displacement"),
+    "no time": (LONG.replace("1.2,10,71", "1.2,,71"), "time"),
     "rate of zero": (LONG.replace("1.2,", "0,"), "rate"),
     "twice": (LONG.replace("1.2,10,71", "1.2,20,71"), "time"),
     "one sample": (LONG + "1.7,0,50\n", "rate"),
     "cells": (LONG.replace("1.2,10,71", "1.2,10"), "line 8"),
     "another column": (
         LONG.replace("displacement", "velocity"),
-        "columns",
+        "velocity [um]",
     ),
-    "no rate": (WIDE.replace("1.2 kHz", "left"), "left [um]"),
-    "rate in metres": (WIDE.replace("1.2 kHz", "1.2 m"), "1.2 m [um]"),
-    "rate twice": (WIDE.replace("1.2 kHz", "0.5 kHz"), "500 Hz [mil]"),
-    "empty": ("", "rows"),
+    "no rate": (WIDE.replace("1.2 kHz", "left"), "left"),
+    "rate in metres": (WIDE.replace("1.2 kHz", "1.2 m"), "1.2 m"),
+    "rate twice": (WIDE.replace("1.2 kHz", "0.5 kHz"), "500 Hz"),
+    "empty": ("", "heading"),
     "heading alone": (WIDE.splitlines()[0], "rows"),
     "quotes": ('time [us],500 Hz [um]\n"0,1\n', "line 2"),
 }
@@ -176,9 +176,8 @@ def test_odd_files(tmp_path: Path) -> None:
         (tmp_path / "broken.nc").write_bytes(start + b"broken")
         with refused(None, file="broken.nc"):
             load_measured_map(tmp_path / "broken.nc")
-    (tmp_path / "latin.csv").write_bytes("time [µs],500 Hz [µm]\n".encode("latin-1"))
-    with refused(None, file="latin.csv"):
-        load_measured_map(tmp_path / "latin.csv")
+    (tmp_path / "latin.csv").write_bytes("time [µs],500 Hz [µm]\n0,1\n1,2\n".encode("latin-1"))
+    np.testing.assert_allclose(load_measured_map(tmp_path / "latin.csv")["displacement"], [[1e-6, 2e-6]])
 
 
 def laboratory(**changes: object) -> xr.Dataset:

@@ -45,47 +45,44 @@ def test_two_tables_are_equal_if_their_points_are(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "key"),
     [
-        ("", "the file is empty"),
-        ("# nothing\n\n", "the file is empty"),
-        (GRID.replace(" [A]", ""), "column 'current' has no unit"),
-        (GRID.replace("[A]", "[]"), "column 'current []' has no unit"),
-        (GRID.replace("[A]", "[V]"), "the unit 'V' is a voltage, expected a current (A)"),
-        (GRID.replace("[mm]", "[parsec]"), "the unit 'parsec' is not known"),
+        ("", "heading"),
+        ("# nothing\n\n", "heading"),
+        (GRID.replace(" [A]", ""), "current"),
+        (GRID.replace("[A]", "[]"), "current"),
+        (GRID.replace("[A]", "[V]"), "current [V]"),
+        (GRID.replace("[mm]", "[parsec]"), "displacement [parsec]"),
         (
             GRID.replace("current", "voltage"),
-            "the heading is 'displacement [mm],voltage [A],force [N]', expected",
+            "voltage [A]",
         ),
-        (GRID.replace(",force [N]", ""), "the heading is 'displacement [mm],current [A]', expected"),
-        (GRID.replace("current [A]", "force [N]"), "the heading is"),
-        (GRID.replace("0.2,0,3\n", ""), "the point 0.0002 m, 0 A is missing, expected a complete grid of 2"),
-        (GRID.replace("0.2,0,3", "0.1,0,3"), "the point 0.0001 m, 0 A is given twice"),
+        (GRID.replace(",force [N]", ""), "line 3"),
+        (GRID.replace("current [A]", "force [N]"), "force"),
+        (GRID.replace("0.2,0,3\n", ""), "point"),
+        (GRID.replace("0.2,0,3", "0.1,0,3"), "point"),
         (
             GRID.replace("0.2,0,3\n", "").replace("0.2,1,4.5\n", ""),
-            "1 different displacements, expected at least 2",
+            "displacements",
         ),
         (
             GRID.replace("0.1,1,2\n", "").replace("0.2,1,4.5\n", ""),
-            "1 different currents, expected at least 2",
+            "currents",
         ),
-        (GRID.replace(",0,", ",3,"), "the currents go from 1 to 3 A, expected a range with 0 A in it"),
-        (GRID.replace("4.5", "four"), "line 6: 'four' is expected to be a finite number"),
-        (GRID.replace("4.5", "nan"), "line 6: 'nan' is expected to be a finite number"),
-        (GRID.replace("4.5", ""), "line 6: '' is expected to be a finite number"),
-        (GRID.replace("4.5", "4.5,6"), "line 6 has 4 cells, expected 3"),
-        (GRID.replace("4.5", "1e308").replace("[N]", "[kN]"), "line 6: 1e+308 kN is not a finite number"),
-        (GRID.replace("4.5", '"4.5'), "expected comma-separated values"),
-        (b"\xff\xfe\x00", "expected to be UTF-8 text"),
+        (GRID.replace(",0,", ",3,"), "current"),
+        (GRID.replace("4.5", "four"), "force"),
+        (GRID.replace("4.5", "nan"), "force"),
+        (GRID.replace("4.5", ""), "force"),
+        (GRID.replace("4.5", "4.5,6"), "line 6"),
+        (GRID.replace("4.5", "1e308").replace("[N]", "[kN]"), "force"),
+        (GRID.replace("4.5", '"4.5'), "line 6"),
+        (b"\xff\xfe\x00\x00", None),
     ],
 )
-def test_a_bad_table_is_refused_in_one_sentence(tmp_path: Path, text: str | bytes, sentence: str) -> None:
+def test_a_bad_table_is_refused_in_one_sentence(tmp_path: Path, text: str | bytes, key: str | None) -> None:
     path = tmp_path / "bad.csv"
-    with pytest.raises(InputError) as caught:
+    with refused(key, file="bad.csv"):
         read(path, text)
-    assert str(caught.value).startswith(f"{path}: ")
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["absent.csv", "."])
@@ -147,10 +144,10 @@ def test_linkages_are_read(tmp_path: Path) -> None:
         ),
         (
             LINKAGES.replace("linkage [mWb]", "force [N]"),
-            "expected 'displacement [mm],current [A],linkage [Wb]'",
+            "the column 'force [N]' is not known",
         ),
         (LINKAGES.replace("mWb", "N"), "the unit 'N' is a force, expected"),
-        ("", "and a grid of linkages"),
+        ("", "no heading"),
     ],
 )
 def test_a_table_of_linkages_without_coenergy_is_refused(tmp_path: Path, text: str, sentence: str) -> None:

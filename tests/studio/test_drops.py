@@ -28,7 +28,7 @@ WRITTEN = {
     "units below": "x-axis,Position,Current\nsecond,mm,A\n0,0.05,0\n1e-5,0.0515,0.5\n2E-5,0.052,1.25\n",
     "lines above": (
         "Model,XYZ\nSample Interval,1e-5\n\n"
-        "time [s],displacement [m],current [A]\n-1e-5,50e-6,0\n0,51.5e-6,.5\n1e-5,52e-6,1.25\n"
+        "time [s],displacement [m],current [A]\n0,50e-6,0\n1e-5,51.5e-6,.5\n2e-5,52e-6,1.25\n"
     ),
 }
 
@@ -78,6 +78,13 @@ def test_what_columns_hold_is_asked_for_where_the_heading_does_not_say_it() -> N
     assert set(found.curves) == {"current"}
 
 
+def test_a_curve_keeps_its_times_before_the_firing() -> None:
+    found = record_of("time [ms],current [A]\n-0.5,0\n0,0\n0.5,1\n1,1.2\n")
+    np.testing.assert_allclose(found.times, [-0.5e-3, 0.0, 0.5e-3, 1e-3])
+    with refused("current"):
+        record_of("time [ms],current [A]\n-0.5,0.3\n0,0.5\n0.5,1\n")
+
+
 def test_a_long_curve_is_thinned_and_keeps_its_ends() -> None:
     rows = "\n".join(f"{k / 10},{k % 7}" for k in range(10 * MOST_SAMPLES))
     found = record_of(f"time [us],current [A]\n{rows}")
@@ -91,9 +98,9 @@ def test_a_long_curve_is_thinned_and_keeps_its_ends() -> None:
         ("", "heading"),
         ("time [us],colour [m]\nred,blue", "heading"),
         ("time [us],current [A]\n0,1\n0,2", "time"),
-        ("time [us],current [A]\n0,1\n1,x", "a.csv: row 3"),
-        ("time [us],current [A]\n0,1\n1,nan", "a.csv: row 3"),
-        ("time [us],current [A]\n0,1\n1", "row 3"),
+        ("time [us],current [A]\n0,1\n1,x", "current"),
+        ("time [us],current [A]\n0,1\n1,nan", "current"),
+        ("time [us],current [A]\n0,1\n1", "line 3"),
         ("time [us],current [s]\n0,1\n1,2", "current"),
         ('time [us],current [A]\n0,"1\n1,2', "line 3"),
         ("time [us],current [A],current [A]\n0,1,1\n1,2,2", "current"),

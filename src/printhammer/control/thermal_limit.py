@@ -134,7 +134,7 @@ def thermal_limit(
 
 def read_rates(path: Path) -> dict[str, list[float]]:
     """Read a file of rates, with `COLUMNS`, the rail optional, as arguments of `thermal_limit`."""
-    from printhammer.identify.tables import read_table
+    from printhammer.support.tables.readings import read_table
 
     wanted = {name: COLUMNS[name] for name in ("ambient", "rate")}
     table = read_table(path, wanted, optional={"voltage": COLUMNS["voltage"]})

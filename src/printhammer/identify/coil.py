@@ -30,10 +30,10 @@ from printhammer.identify.least_squares import Parameters
 from printhammer.identify.lowpass import bandwidth_of, lowpass_lines, time_constant
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
-from printhammer.identify.tables import Readings, read_table
 from printhammer.results import Declared, part
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import FloatArray
+from printhammer.support.tables.readings import Readings, read_table
 
 _FINEST: Final = 0.5e-6
 """Largest step of the current that goes through the probe, s."""
@@ -248,16 +248,8 @@ def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], Floa
 
 def _read(path: str | Path, hammer: Hammer, locked: float | None, bandwidth: float | None) -> Trace:
     table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"})
+    table.check_times()
     t = table.values["time"]
-    bad = np.flatnonzero(np.diff(t) <= 0.0)
-    if len(bad):
-        line, value = table.lines[bad[0] + 1], t[bad[0] + 1]
-        raise InputError(
-            f"{table.path}: line {line}: time {value:.9g} s",
-            file=table.path,
-            key="time",
-            expected="ascending times",
-        )
     if not t[-1] > 0.0:
         raise InputError(
             f"{table.path}: no time after 0 s",

@@ -88,7 +88,7 @@ def fit(
 
 def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
     """Tell which of two tables has no currents."""
-    from printhammer.identify.tables import read_table
+    from printhammer.support.tables.readings import read_table
 
     columns = {"displacement": "m", "force": "N"}
     with_current = [

@@ -19,7 +19,7 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from printhammer.identify.tables import Readings
+    from printhammer.support.tables.readings import Readings
 
 
 def time_constant(bandwidth: float | None) -> float:

@@ -120,5 +120,7 @@ def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) ->
     result = samples[left] + share * (samples[right] - samples[left])
     exact = known[right] == times
     result[exact] = samples[right[exact]]
-    result[(times < known[0]) | (times > known[-1])] = np.nan
+    # Room for the last bit of times that are meant to be the same.
+    room = 1e-12 * max(abs(known[0]), abs(known[-1]))
+    result[(times < known[0] - room) | (times > known[-1] + room)] = np.nan
     return result

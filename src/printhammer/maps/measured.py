@@ -9,14 +9,13 @@ Two layouts of CSV tables are accepted, each with units in the heading, SI or an
 - one row for each time: ``time [us]``, then a column for each rate, such as ``500 Hz [um],1.2 kHz [um]``.
 
 Times count from the first firing. Rows may come in any order, and every rate may have times of its own. An
-empty cell, or nan, is a gap. Blank lines and lines that begin with # are passed over.
+empty cell, or nan, is a gap.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
@@ -25,12 +24,15 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from printhammer.errors import InputError, located, missing_extra
+from printhammer.errors import InputError, missing_extra
 from printhammer.maps.layout import interpolated, map_dataset
 from printhammer.results import Declared, column, scalar
 from printhammer.results.files import need_for
-from printhammer.support.arrays import FloatArray, IntArray
-from printhammer.support.sheets import read_sheet, split_heading
+from printhammer.support.arrays import FloatArray
+from printhammer.support.tables.columns import Columns
+from printhammer.support.tables.layout import Table, read_layout
+from printhammer.support.tables.names import Heading
+from printhammer.support.tables.readings import Readings, columns_of, readings_of
 from printhammer.units import parse, to_si
 
 if TYPE_CHECKING:
@@ -40,7 +42,6 @@ _SI: Final = {"rate": "Hz", "time": "s", "displacement": "m"}
 _HEADINGS: Final = (
     "'rate [Hz],time [us],displacement [um]', or 'time [us]' and a column such as '500 Hz [um]' for each rate"
 )
-_GAPS: Final = ("", "nan", "na")
 
 
 class RateRecord(Declared):
@@ -51,49 +52,8 @@ class RateRecord(Declared):
     displacement: FloatArray = column("m", "displacement", "sample", more="NaN for a gap")
 
 
-@dataclass(frozen=True)
-class Cells:
-    """CSV file: heading, line numbers, and rows of cells."""
-
-    what: str
-    heading: list[str]
-    lines: IntArray
-    rows: list[list[str]]
-
-    def column(self, index: int, si: str, unit: str, *, gaps: bool = False) -> FloatArray:
-        """Return a column in SI.
-
-        Raises
-        ------
-        InputError
-            The unit is of another dimension, or a cell is neither a finite number nor an allowed gap.
-        """
-        name = self.heading[index]
-        with located(f"{self.what}: column {name!r}", file=self.what, key=name):
-            factor = to_si(1.0, unit, si)
-        values = np.empty(len(self.rows))
-        for k, row in enumerate(self.rows):
-            text = row[index].strip()
-            if gaps and text.lower() in _GAPS:
-                values[k] = math.nan
-                continue
-            try:
-                values[k] = float(text)
-            except ValueError:
-                values[k] = math.nan
-            if not math.isfinite(values[k]):
-                raise InputError(
-                    f"{self.what}: line {self.lines[k]}, column {name!r}: {text!r} is expected to be a finite"
-                    " number",
-                    file=self.what,
-                    key=name,
-                    value=text,
-                )
-        return values * factor
-
-
-def read_records(path: Path) -> list[RateRecord]:
-    """Read the records of a CSV file, by ascending rate.
+def read_records(path: Path, columns: str | None = None) -> list[RateRecord]:
+    """Read the records of a table, by rising rate; `columns` as for `load_measured_map`.
 
     Raises
     ------
@@ -101,12 +61,13 @@ def read_records(path: Path) -> list[RateRecord]:
         The file cannot be read, its heading fits neither layout, a cell is not a number, or a time is
         repeated for one rate.
     """
-    cells = _cells(path)
-    names = [_named(cells.what, cell) for cell in cells.heading]
-    if sorted(name for name, _unit in names) == sorted(_SI):
-        records = _one_row_a_sample(cells, dict(names))
+    told = columns_of(path, columns)
+    table = read_layout(path, "the measured map")
+    names = list(told.sources) if told else [column.name for column in table.columns]
+    if any(name.lower() == "rate" for name in names):
+        records = _one_row_a_sample(readings_of(table, _SI, gaps=("displacement",), columns=told))
     else:
-        records = _one_column_a_rate(cells, names)
+        records = _one_column_a_rate(table, names, told)
     return sorted(records, key=lambda record: record.rate)
 
 
@@ -148,92 +109,42 @@ def checked(
     return RateRecord(rate, at, x)
 
 
-def _one_row_a_sample(cells: Cells, units: dict[str, str]) -> list[RateRecord]:
-    index = {_named(cells.what, cell)[0]: k for k, cell in enumerate(cells.heading)}
-    rate, time, x = (
-        cells.column(index[name], si, units[name], gaps=name == "displacement") for name, si in _SI.items()
-    )
+def _one_row_a_sample(table: Readings) -> list[RateRecord]:
+    rate, time, x = (table.values[name] for name in _SI)
     records = []
     for value in np.unique(rate):
         rows = np.flatnonzero(rate == value)
-        places = [f"line {line}" for line in cells.lines[rows]]
-        records.append(checked(cells.what, float(value), time[rows], x[rows], places))
+        places = [f"line {line}" for line in table.lines[rows]]
+        records.append(checked(str(table.path), float(value), time[rows], x[rows], places))
     return records
 
 
-def _one_column_a_rate(cells: Cells, names: list[tuple[str, str]]) -> list[RateRecord]:
-    columns = [k for k, (name, _unit) in enumerate(names) if name == "time"]
-    if len(columns) != 1 or len(names) < 2:
-        raise InputError(
-            f"{cells.what}: columns {', '.join(map(repr, cells.heading))}",
-            file=cells.what,
-            key="columns",
-            expected=_HEADINGS,
-        )
-    times = cells.column(columns[0], "s", names[columns[0]][1])
-    records: dict[float, RateRecord] = {}
-    for k, (name, unit) in enumerate(names):
-        if k == columns[0]:
+def _one_column_a_rate(table: Table, names: list[str], told: Columns | None) -> list[RateRecord]:
+    rates: dict[str, float] = {}
+    for place, name in enumerate(names):
+        if not name or Heading(name).quantity == "time" or (table.clock and place == table.clock.numbers):
             continue
-        if name in _SI:
-            raise InputError(
-                f"{cells.what}: columns {', '.join(map(repr, cells.heading))}",
-                file=cells.what,
-                key="columns",
-                expected=_HEADINGS,
-            )
         try:
             rate = parse(name, "Hz")
         except InputError as error:
             raise InputError(
-                f"{cells.what}: column {cells.heading[k]!r}: {error}; expected {_HEADINGS}",
-                file=cells.what,
-                key=cells.heading[k],
+                f"{table.where}: column {name!r}: {error}; expected {_HEADINGS}",
+                file=table.where,
+                key=name,
                 value=name,
             ) from None
-        if rate in records:
+        if rate in rates.values():
             raise InputError(
-                f"{cells.what}: column {cells.heading[k]!r}: the rate {rate:.9g} Hz has two columns",
-                file=cells.what,
-                key=cells.heading[k],
+                f"{table.where}: column {name!r}: the rate {rate:.9g} Hz has two columns",
+                file=table.where,
+                key=name,
             )
-        places = [f"line {line}, column {cells.heading[k]!r}" for line in cells.lines]
-        x = cells.column(k, "m", unit, gaps=True)
-        records[rate] = checked(cells.what, rate, times, x, places)
-    return list(records.values())
-
-
-def _named(what: str, cell: str) -> tuple[str, str]:
-    """Split a heading cell into name and unit."""
-    name, unit = split_heading(cell)
-    if not unit:
-        raise InputError(
-            f"{what}: column {cell!r} is expected to carry its unit, such as 'time [us]'", file=what, key=cell
-        )
-    return (name.lower() if name.lower() in _SI else name), unit
-
-
-def _cells(path: Path) -> Cells:
-    what = str(path)
-    rows = read_sheet(path, "the measured map").rows
-    if len(rows) < 2:
-        raise InputError(
-            f"{what}: {len(rows)} rows",
-            file=what,
-            key="rows",
-            expected=f"the heading {_HEADINGS}, and samples",
-        )
-    heading = [cell.strip() for cell in rows[0][1]]
-    for line, row in rows[1:]:
-        if len(row) != len(heading):
-            raise InputError(
-                f"{what}: line {line} has {len(row)} cells",
-                file=what,
-                key=f"line {line}",
-                expected=f"{len(heading)}",
-            )
-    lines = np.array([line for line, _row in rows[1:]], dtype=np.int64)
-    return Cells(what, heading, lines, [row for _line, row in rows[1:]])
+        rates[name if told else name.lower()] = rate
+    wanted = {"time": "s", **dict.fromkeys(rates or ("500 hz",), "m")}
+    found = readings_of(table, wanted, gaps=list(rates), columns=told)
+    times = found.values["time"]
+    places = [f"line {line}" for line in found.lines]
+    return [checked(table.where, rate, times, found.values[name], places) for name, rate in rates.items()]
 
 
 MOST_TIMES: Final = 8192
@@ -242,7 +153,9 @@ MOST_TIMES: Final = 8192
 _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
 
 
-def load_measured_map(path: str | Path, *, times: npt.ArrayLike | None = None) -> xr.Dataset:
+def load_measured_map(
+    path: str | Path, *, times: npt.ArrayLike | None = None, columns: str | None = None
+) -> xr.Dataset:
     """Read a measured map, in the layout of `printhammer.frequency_map`.
 
     Parameters
@@ -253,9 +166,12 @@ def load_measured_map(path: str | Path, *, times: npt.ArrayLike | None = None) -
         `displacement` lies over `rate` and one more dimension, and `time` over that one, or over both where
         every rate has times of its own.
     times : array, optional
-        Times from the first firing, s, ascending, at which the records are interpolated linearly. By default
-        the times of the samples if they are the same at all rates, else evenly spaced times with the spacing
-        of the finest record.
+        Times from the first firing, s, ascending, to which the records are brought by straight lines between
+        samples. By default those of the samples if all rates have the same ones; otherwise even ones, as
+        close as the samples of the closest record.
+    columns : str, optional
+        What the columns of a CSV file hold, such as "time=1, 500 Hz=2*50 um/V"; by default what a file
+        beside it says, and else its heading; see `printhammer.support.tables.columns`.
 
     Returns
     -------
@@ -270,7 +186,7 @@ def load_measured_map(path: str | Path, *, times: npt.ArrayLike | None = None) -
     """
     source = Path(path)
     stored = source.suffix.lower() == ".zarr" or _magic(source).startswith((_CLASSIC, _HDF5))
-    records = _stored_records(source) if stored else read_records(source)
+    records = _stored_records(source) if stored else read_records(source, columns)
     grid = _common_times(records) if times is None else _checked_times(times)
     rows = np.stack([interpolated(record.times, record.displacement, grid) for record in records])
     attributes = {

@@ -31,7 +31,7 @@ from printhammer.errors import InputError, missing_extra
 from printhammer.results.declare import Column, Declared, heading, part
 from printhammer.results.provenance import KEYS
 from printhammer.support.files import write_file
-from printhammer.support.sheets import read_sheet
+from printhammer.support.tables.text import read_cells
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -372,7 +372,7 @@ def _read_arrays(source: Path) -> xr.Dataset:
 def _read_csv(source: Path) -> pd.DataFrame:
     import pandas as pd
 
-    sheet = read_sheet(source, "the result", gaps=True)
+    sheet = read_cells(source, "the result", gaps=True)
     lengths = {len(cells) for _line, cells in sheet.rows}
     if len(lengths) != 1:
         raise InputError(

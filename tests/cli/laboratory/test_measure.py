@@ -8,7 +8,7 @@ import pytest
 
 import printhammer as ph
 from printhammer.identify.bench.laboratory import KINDS
-from printhammer.identify.tables import read_table
+from printhammer.support.tables.readings import read_table
 
 
 @pytest.fixture

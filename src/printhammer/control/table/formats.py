@@ -31,7 +31,7 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 from printhammer.support.c_code import comment, identifier, nested, numbers
 from printhammer.support.constants import shown
-from printhammer.support.sheets import sheet_of
+from printhammer.support.tables.text import split_cells
 
 if TYPE_CHECKING:
     Head = dict[str, Any]
@@ -100,7 +100,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
             ) from None
     _check_head(head)
     gaps, wanted = head["gaps"], columns(head["gaps"])
-    table = [cells for _line, cells in sheet_of(text, "table", gaps=True).rows]
+    table = [cells for _line, cells in split_cells(text, "table", gaps=True).rows]
     if not table or table[0] != wanted:
         raise InputError.of(
             "columns",

@@ -1,6 +1,6 @@
 """Sampled waveforms: measured records of a current or force.
 
-Records are validated samples, from arrays or from CSV files with units in the heading.
+Records of a measured current or force: checked samples, and tables with units in the heading.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from printhammer.drive.segments import POLYNOMIAL, table
 from printhammer.drive.waveforms.base import QUANTITY_UNITS, QuantityName, Waveform
-from printhammer.errors import InputError, located
+from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import folder_of
-from printhammer.support.sheets import finite, read_sheet, split_heading
+from printhammer.support.tables.readings import read_table
 
-_UNITS: Final = {name: si for si, name in QUANTITY_UNITS.items()}
+_UNITS: Final[dict[str, str]] = {name: si for si, name in QUANTITY_UNITS.items()}
 _HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
 
 
@@ -86,73 +86,31 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
 
 
 def read_csv(path: Path) -> Samples:
-    """Read a record from a CSV file.
+    """Read a record from a table of time and current or force.
 
-    Its columns are ``time [unit]`` and ``current [unit]`` or ``force [unit]``. Blank lines and lines that
-    begin with # are skipped.
+    The firing is at time 0 of the record. What the record has before is cut off; nothing is driven there.
 
     Raises
     ------
     InputError
-        The file cannot be read, is empty, lacks units, or holds anything but finite numbers at increasing
-        times.
+        The file cannot be read, is empty, lacks units, holds something else than finite numbers at
+        increasing times, or something is driven before time 0.
     """
     what = str(path)
-    rows = read_sheet(path, "the sampled waveform").rows
-    if not rows:
+    table = read_table(path, {"time": "s"}, optional=_UNITS, what="the sampled waveform")
+    table.check_times()
+    driven = [name for name in table.values if name != "time"]
+    if len(driven) != 1:
         raise InputError(
-            f"{what}: the file is empty",
+            f"{what}: columns {', '.join(map(repr, table.values))}",
             file=what,
-            key="samples",
-            expected=f"the heading {_HEADINGS} and at least 2 samples",
+            key="columns",
+            expected=_HEADINGS,
         )
-    time_unit, name, unit = _heading(rows[0][1], what)
-    columns: tuple[list[float], list[float]] = ([], [])
-    for line, row in rows[1:]:
-        if len(row) != 2:
-            raise InputError(
-                f"{what}: line {line} has {len(row)} cells", file=what, key=f"line {line}", expected="2"
-            )
-        for cell, column in zip(row, columns, strict=True):
-            column.append(finite(cell, f"{what}: line {line}"))
-    return checked(
-        _converted(columns[0], time_unit, "s", what),
-        _converted(columns[1], unit, _UNITS[name], what),
-        name,
-        what,
-    )
-
-
-def _heading(cells: list[str], what: str) -> tuple[str, QuantityName, str]:
-    """Return the unit of time, the driven quantity, and its unit."""
-    if len(cells) != 2:
-        raise InputError(
-            f"{what}: {len(cells)} columns", file=what, key="columns", expected=f"the 2 columns {_HEADINGS}"
-        )
-    names, units = zip(*map(split_heading, cells), strict=True)
-    for cell, unit in zip(cells, units, strict=True):
-        if not unit:
-            raise InputError(
-                f"{what}: heading {cell.strip()!r} is expected to carry its unit, such as 'time [us]'",
-                file=what,
-                key=cell.strip(),
-            )
-    names = tuple(name.lower() for name in names)
-    for quantity in _UNITS:
-        if names == ("time", quantity):
-            return units[0], quantity, units[1]
-    raise InputError(
-        f"{what}: columns {names[0]!r} and {names[1]!r}", file=what, key="columns", expected=_HEADINGS
-    )
-
-
-def _converted(column: list[float], unit: str, si: str, what: str) -> list[float]:
-    """Convert a column to SI."""
-    from printhammer.units import to_si
-
-    with located(what):
-        to_si(1.0, unit, si)
-        return [to_si(number, unit, si) for number in column]
+    quantity: QuantityName = driven[0]  # type: ignore[assignment]
+    times, values = table.values["time"], table.values[quantity]
+    table.check_before(times, quantity)
+    return checked(times[times >= 0.0], values[times >= 0.0], quantity, what)
 
 
 Interpolation = Literal["pchip", "linear"]

@@ -21,10 +21,10 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.identify.lowpass import bandwidth_of, lowpass_waveform
 from printhammer.identify.noise import noise_of_record, outliers_of, robust_scale, running_median
-from printhammer.identify.tables import read_table
 from printhammer.results import Declared, part, scalar
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.constants import quantities
+from printhammer.support.tables.readings import read_table
 from printhammer.units import from_si
 
 Surface = Literal["pack", "backstop"]
@@ -91,14 +91,7 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
     """
     table = read_table(path, {"time": "s", "displacement": "m"}, optional={"current": "A"})
     name, t, x = str(table.path), table.values["time"], table.values["displacement"]
-    bad = np.flatnonzero(np.diff(t) <= 0.0)
-    if len(bad):
-        raise InputError(
-            f"{name}: line {table.lines[bad[0] + 1]}: time {t[bad[0] + 1]:.9g} s",
-            file=name,
-            key="time",
-            expected="ascending times",
-        )
+    table.check_times()
     if len(t) < 4 * FEWEST:
         raise InputError(
             f"{name}: {len(t)} samples",

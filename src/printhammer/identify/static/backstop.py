@@ -28,9 +28,9 @@ from printhammer.errors import InputError
 from printhammer.identify.least_squares import Solution
 from printhammer.identify.result import Fit, FittedConstant
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
-from printhammer.identify.tables import read_table
 from printhammer.parts.backstop._hertz import damping_from_restitution, stiffness_from_bodies
 from printhammer.support.arrays import FloatArray
+from printhammer.support.tables.readings import read_table
 
 _SERIES: Final = (1.0, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225)
 """y / z in powers of z, from the law by comparing coefficients."""

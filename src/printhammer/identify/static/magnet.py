@@ -20,8 +20,8 @@ from printhammer.errors import InputError
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
 from printhammer.identify.static.spring import start_of as spring_start
-from printhammer.identify.tables import Readings, read_table
 from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.tables.readings import Readings, read_table
 
 
 class TotalLaw:

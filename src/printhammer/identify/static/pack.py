@@ -23,9 +23,9 @@ from printhammer.identify.least_squares import NoSolutionError, Solution, solve
 from printhammer.identify.noise import robust_scale
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
-from printhammer.identify.tables import Readings, read_table
 from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
+from printhammer.support.tables.readings import Readings, read_table
 from printhammer.units import from_si
 
 _TURN: Final = 0.05

@@ -18,9 +18,9 @@ from printhammer.errors import InputError
 from printhammer.identify.least_squares import Parameters
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, solved
-from printhammer.identify.tables import read_table
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet, magnet_force, magnet_linkage
 from printhammer.support.arrays import FloatArray
+from printhammer.support.tables.readings import read_table
 
 CONSTANTS: Final = {
     "pole_area": "m^2",

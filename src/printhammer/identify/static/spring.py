@@ -14,8 +14,8 @@ import numpy as np
 from printhammer.errors import InputError
 from printhammer.identify.result import Fit
 from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
-from printhammer.identify.tables import read_table
 from printhammer.support.arrays import FloatArray
+from printhammer.support.tables.readings import read_table
 
 _ROWS = 5
 

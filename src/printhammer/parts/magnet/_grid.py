@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from printhammer.errors import InputError, located
+from printhammer.errors import InputError
 from printhammer.parts.base import MagnetPart
 from printhammer.support.constants import folder_of
-from printhammer.support.sheets import finite, read_sheet, split_heading
+from printhammer.support.tables.readings import read_table
 
 if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
@@ -93,8 +93,8 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str)
 def read_csv(path: Path, quantity: str) -> Grid:
     """Read a table of one quantity of `UNITS` from a CSV file with one point per line.
 
-    The heading names the columns with their units, ``displacement [mm],current [A],force [N]``, in any order;
-    the points may come in any order. Blank lines and lines that begin with # are skipped.
+    The heading names the columns with their units, ``displacement [mm],current [A],force [N]``, in any
+    order; the points may come in any order.
 
     Raises
     ------
@@ -102,64 +102,10 @@ def read_csv(path: Path, quantity: str) -> Grid:
         The file cannot be read, is empty, lacks a unit, holds anything but finite numbers, or not a complete
         grid.
     """
-    from printhammer.units import to_si
-
-    what = str(path)
     columns = {"displacement": "m", "current": "A", quantity: UNITS[quantity]}
-    heading = f"displacement [mm],current [A],{quantity} [{UNITS[quantity]}]"
-    lines = read_sheet(path, f"the {quantity} table").rows
-    if not lines:
-        raise InputError(
-            f"{what}: the file is empty",
-            file=what,
-            key="heading",
-            expected=f"the heading {heading!r} and a grid of {quantity}s",
-        )
-    order, units = _heading(lines[0][1], what, columns, heading)
-    rows = []
-    for number, cells in lines[1:]:
-        if len(cells) != len(order):
-            raise InputError(
-                f"{what}: line {number} has {len(cells)} cells",
-                file=what,
-                key=f"line {number}",
-                expected=f"{len(order)}",
-            )
-        row = dict(zip(order, (finite(cell, f"{what}: line {number}") for cell in cells), strict=True))
-        with located(f"{what}: line {number}"):
-            x, current, value = (to_si(row[name], units[name], si) for name, si in columns.items())
-        rows.append((x, current, value))
-    return gather(rows, what, quantity)
-
-
-def _heading(
-    cells: Sequence[str], what: str, columns: Mapping[str, str], heading: str
-) -> tuple[list[str], dict[str, str]]:
-    """Return the columns in order and the unit of each."""
-    from printhammer.units import to_si
-
-    units = {}
-    for cell in cells:
-        name, unit = split_heading(cell)
-        name = name.lower()
-        if name not in columns or name in units:
-            break
-        if not unit:
-            raise InputError(
-                f"{what}: column {cell.strip()!r} has no unit",
-                file=what,
-                key=cell.strip(),
-                expected=f"the heading {heading!r}",
-            )
-        with located(f"{what}: column {cell.strip()!r}", file=what, key=cell.strip()):
-            to_si(1.0, unit, columns[name])
-        units[name] = unit
-    if len(units) != len(columns) or len(cells) != len(columns):
-        listed = ",".join(cell.strip() for cell in cells)
-        raise InputError(
-            f"{what}: the heading is {listed!r}", file=what, key="heading", expected=f"{heading!r}"
-        )
-    return list(units), units
+    table = read_table(path, columns, what=f"the {quantity} table")
+    points = zip(*(table.values[name].tolist() for name in columns), strict=True)
+    return gather(points, str(path), quantity)
 
 
 def bicubic(table: Grid) -> FloatArray:

@@ -1,39 +1,33 @@
 """Measured curves as oscilloscopes and spreadsheets write them: time, and what is declared in `QUANTITIES`.
 
-Columns are parted by tabs, semicolons or commas, numbers may have a decimal comma, lines above the heading
-are passed over, and units stand in the heading, as "time [us]" or "time (us)", or in a row below it. What a
-column holds is never guessed from its numbers: where heading and unit do not say it, it is asked for.
+Tables are read as everywhere, see `printhammer.support.tables`. Where heading and units do not say what a
+column holds, it is asked for. A curve keeps its times before the firing, which is at time 0.
 """
 
 from __future__ import annotations
 
-import re
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from printhammer.errors import InputError, located
+from printhammer.errors import InputError
 from printhammer.studio.bounds import LARGEST_CURRENT, LARGEST_VOLTAGE, LONGEST_TIME, MOST_SAMPLES
-from printhammer.support.sheets import sheet_of, split_heading
-from printhammer.units import parse, to_si
+from printhammer.support.tables.columns import Columns, Source
+from printhammer.support.tables.layout import Table, layout_of
+from printhammer.support.tables.marks import is_number
+from printhammer.support.tables.names import Heading
+from printhammer.support.tables.readings import quantities_of, readings_of
+from printhammer.support.tables.text import with_line_ends
+from printhammer.units import split
 
 QUANTITIES: Final = {"time": "s", "displacement": "m", "current": "A", "force": "N", "voltage": "V"}
 """What a column may hold, with its SI unit."""
 
-EXPECTED: Final = "'time [us],displacement [um]', 'time [us],current [A]' or 'time [us],force [N]'"
+_CURVES: Final = {name: si for name, si in QUANTITIES.items() if name != "time"}
 
 MOST_COLUMNS: Final = 16
 """Columns of a table."""
-
-_NAMES: Final = {
-    "time": ("time", "t", "x-axis", "sec", "second", "seconds", "zeit", "temps"),
-    "displacement": ("displacement", "position", "x", "weg"),
-    "current": ("current", "i", "strom"),
-    "force": ("force", "f", "kraft"),
-    "voltage": ("voltage", "u", "spannung", "tension"),
-}
-_NUMBER: Final = re.compile(r"\s*[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?\s*")
-_WHOLE: Final = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
 
 
 class Column(NamedTuple):
@@ -46,7 +40,7 @@ class Column(NamedTuple):
 
 
 class Record(NamedTuple):
-    """Curves over one time, SI, beginning at time 0, thinned evenly to at most `MOST_SAMPLES`."""
+    """Curves over one time, SI, thinned evenly to at most `MOST_SAMPLES`."""
 
     times: np.ndarray[Any, Any]
     curves: dict[str, np.ndarray[Any, Any]]
@@ -62,35 +56,68 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
     where : str
         What messages call it.
     told : list of tuple, optional
-        What each column holds, see `QUANTITIES`, or nothing, and its unit; by default as its heading says.
+        What each column holds, see `QUANTITIES`, or nothing, and its unit, or what 1 stands for, such as
+        "10 A"; by default as its heading says.
 
     Returns
     -------
     Record or list of Column
-        The curves, or the columns where it has to be asked what they hold.
+        The curves, or the columns where it has to be asked what these hold.
 
     Raises
     ------
     InputError
         It is no such table.
     """
-    columns, rows, line = _table(text, where)
-    if told is not None:
-        if len(told) != len(columns):
+    table = layout_of(with_line_ends(text.removeprefix("\ufeff")), where)
+    if not any(is_number(cell.strip()) for row in table.rows[:1] for cell in row):
+        raise InputError(
+            f"{where}: expected columns of numbers below a heading such as 'time [us],current [A]'",
+            file=where,
+            key="heading",
+        )
+    if len(table.columns) > MOST_COLUMNS:
+        raise InputError(
+            f"{where}: {len(table.columns)} columns",
+            file=where,
+            key="columns",
+            expected=f"at most {MOST_COLUMNS}",
+        )
+    known = quantities_of(table, QUANTITIES)
+    if told is None:
+        columns = [
+            Column(name, unit, quantity, [cell.strip() for cell in cells])
+            for (name, unit), quantity, *cells in zip(table.columns, known, *_filled(table), strict=True)
+        ]
+        unclear = any(column.quantity and not column.unit for column in columns)
+        timed = "time" in known or table.clock is not None
+        if unclear or not timed or not set(known) - {"time", ""}:
+            return columns
+    else:
+        if len(told) != len(known):
             raise InputError(
-                f"{where}: {len(columns)} columns",
+                f"{where}: {len(known)} columns",
                 file=where,
                 key="columns",
                 expected=f"as many answers, not {len(told)}",
             )
-        columns = [
-            column._replace(quantity=what, unit=unit)
-            for column, (what, unit) in zip(columns, told, strict=True)
-        ]
-    known = [column.quantity for column in columns]
-    unclear = any(column.quantity and not column.unit for column in columns)
-    if told is None and (unclear or "time" not in known or len(set(known) - {"time", ""}) == 0):
-        return columns
+        known = [quantity for quantity, _unit in told]
+        names = [heading.name for heading in table.columns]
+        table = replace(
+            table, columns=[Heading(name, unit) for name, (_, unit) in zip(names, told, strict=True)]
+        )
+    return _checked(_record(table, known), where)
+
+
+def _filled(table: Table) -> list[list[str]]:
+    """Return the first three rows, all cells of them."""
+    width = len(table.columns)
+    return [[*row[:width], *[""] * (width - len(row))] for row in table.rows[:3]]
+
+
+def _record(table: Table, known: list[str]) -> Record:
+    """Return the curves of a table of which it is known what its columns hold."""
+    where = table.where
     for quantity in QUANTITIES:
         if known.count(quantity) > 1:
             raise InputError(
@@ -99,25 +126,31 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
                 key=quantity,
                 expected="one",
             )
-    if "time" not in known or not set(known) - {"time", ""}:
+    if not set(known) - {"time", ""}:
         raise InputError(
             f"{where}: expected a column of time and one of displacement, current, force or voltage",
             file=where,
             key="time",
         )
-    curves = {}
-    for place, column in enumerate(columns):
-        if column.quantity:
-            values = np.array([_number(row[place], f"{where}: row {line + k}") for k, row in enumerate(rows)])
-            with located(f"{where}: {column.name or column.quantity}", file=where, key=column.name):
-                curves[column.quantity] = values * _factor(column.unit, QUANTITIES[column.quantity])
-    times = curves.pop("time")
-    if len(times) < 2 or (np.diff(times) <= 0.0).any():
-        raise InputError(f"{where}: expected at least 2 samples at increasing times", file=where, key="time")
+    sources, headings = {}, list(table.columns)
+    for place, quantity in enumerate(known):
+        if not quantity:
+            continue
+        name, unit = headings[place]
+        sources[quantity] = Source(place + 1)
+        if unit[:1].isdigit() or unit[:1] in {"-", "+", "."}:
+            # What 1 stands for.
+            factor, unit = split(unit, QUANTITIES[quantity])
+            sources[quantity] = Source(place + 1, factor, unit)
+            headings[place] = Heading(name)
+    table = replace(table, columns=headings)
+    readings = readings_of(table, {"time": "s"}, optional=_CURVES, columns=Columns(sources, where=where))
+    readings.check_times()
+    times = readings.values.pop("time")
+    for name in {"current", "force", "voltage"} & set(readings.values):
+        readings.check_before(times, name)
     keep = np.unique(np.linspace(0, len(times) - 1, min(len(times), MOST_SAMPLES)).astype(int))
-    # Oscilloscopes count time from their trigger.
-    record = Record(times[keep] - min(times[0], 0.0), {name: values[keep] for name, values in curves.items()})
-    return _checked(record, where)
+    return Record(times[keep], {name: values[keep] for name, values in readings.values.items()})
 
 
 def _checked(record: Record, where: str) -> Record:
@@ -141,94 +174,3 @@ def _checked(record: Record, where: str) -> Record:
                 expected=f"at most {most:g} {unit}",
             )
     return record
-
-
-def _table(text: str, where: str) -> tuple[list[Column], list[list[str]], int]:
-    """Return the columns of a table, its rows of numbers, and the number of the first of these."""
-    if not text.strip():
-        raise InputError(
-            f"{where}: the file is empty", file=where, key="heading", expected=f"the heading {EXPECTED}"
-        )
-    delimiter = _delimiter(text)
-    rows = [_bare(cells) for _line, cells in sheet_of(text, where, delimiter=delimiter).rows]
-    begin = next(
-        (k for k, row in enumerate(rows) if len(row) > 1 and all(map(_NUMBER.fullmatch, row[:2]))), None
-    )
-    if begin is None:
-        raise InputError(
-            f"{where}: expected columns of numbers below a heading such as {EXPECTED}",
-            file=where,
-            key="heading",
-        )
-    width = len(rows[begin])
-    if width > MOST_COLUMNS:
-        raise InputError(
-            f"{where}: {width} columns", file=where, key="columns", expected=f"at most {MOST_COLUMNS}"
-        )
-    numbers = rows[begin:]
-    for k, row in enumerate(numbers):
-        if len(row) != width:
-            raise InputError(
-                f"{where}: row {begin + k + 1} has {len(row)} cells",
-                file=where,
-                key=f"row {begin + k + 1}",
-                expected=f"{width} numbers",
-            )
-    if delimiter != "," and any(_WHOLE.fullmatch(cell) for row in numbers[:50] for cell in row):
-        numbers = [[cell.replace(",", ".") for cell in row] for row in numbers]
-    above = [row for row in rows[:begin] if len(row) == width][-2:]
-    units = [""] * width
-    if len(above) == 2 and all(not cell.strip() or _measures(cell) for cell in above[1]):
-        units = [cell.strip() for cell in above.pop()]
-    names = above[-1] if above else [""] * width
-    columns = []
-    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
-        bare, own = _heading(name)
-        columns.append(Column(bare, own or unit, _quantity(bare), [row[place] for row in numbers[:3]]))
-    return columns, numbers, begin + 1
-
-
-def _bare(cells: list[str]) -> list[str]:
-    """Return cells without empty ones at the end."""
-    while cells and not cells[-1].strip():
-        cells = cells[:-1]
-    return cells
-
-
-def _delimiter(text: str) -> str:
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    counts = {sign: sum(sign in line for line in lines) for sign in "\t;"}
-    return next((sign for sign, count in counts.items() if 2 * count > len(lines)), ",")
-
-
-def _heading(cell: str) -> tuple[str, str]:
-    name, unit = split_heading(cell)
-    if not unit and cell.strip().endswith(")"):
-        name, unit = split_heading(cell.replace("(", "[").replace(")", "]"))
-    return name, unit
-
-
-def _quantity(name: str) -> str:
-    return next((what for what, names in _NAMES.items() if name.lower() in names), "")
-
-
-def _measures(cell: str) -> bool:
-    """Whether a cell is a unit of something that a column may hold."""
-    for si in QUANTITIES.values():
-        try:
-            to_si(1.0, cell.strip(), si)
-        except InputError:
-            continue
-        return True
-    return cell.strip().lower() in ("volt", "volts")
-
-
-def _factor(unit: str, si: str) -> float:
-    """Return what 1 is in SI; a unit may also be what 1 stands for, such as "10 A"."""
-    return parse(unit, si) if _NUMBER.match(unit) and unit.strip() != "1" else to_si(1.0, unit, si)
-
-
-def _number(cell: str, where: str) -> float:
-    if not _NUMBER.fullmatch(cell) or "," in cell:
-        raise InputError(f"{where} is expected to hold finite numbers, not {cell.strip()[:40]!r}", key=where)
-    return float(cell)

@@ -193,7 +193,7 @@ export function mount(element, send, address = { read: () => "", write: () => {}
       studio.say(`${file.name} has ${file.size} bytes, expected at most ${most}`, true);
       return;
     }
-    const text = thinned(await file.text(), studio.limits.file);
+    const text = thinned(decoded(await file.arrayBuffer()), studio.limits.file);
     const ask = (columns) => studio.ask("drop", { name: file.name, text, columns });
     let frame = await ask(null);
     if (frame.what === "columns") {
@@ -216,7 +216,9 @@ export function mount(element, send, address = { read: () => "", write: () => {}
     }
     if (quantity) {
       shown.push(`its ${quantity} is the pulse that is fired`);
-      const waveform = { shape: "sampled", times: [...data.t], values: [...data[quantity]], quantity };
+      // The firing is at time 0 of the record; nothing is driven before.
+      const begin = data.t.findIndex((time) => time >= 0);
+      const waveform = { shape: "sampled", times: [...data.t.slice(begin)], values: [...data[quantity].slice(begin)], quantity };
       // What was measured together is compared with one such pulse.
       studio.store.set({ waveform, ...(data.displacement ? { pulses: 1, pattern: "" } : {}) });
     }
@@ -313,9 +315,21 @@ function honesty(hammer) {
 }
 
 /** Return a text with every so many of its lines, so that it is not too long; the first hundred stay. */
+/** Text of a file in UTF-8 or UTF-16, else in Latin-1 as Windows extends it. */
+function decoded(buffer) {
+  const [first, second] = new Uint8Array(buffer);
+  const wide = (first === 0xff && second === 0xfe && "utf-16le") || (first === 0xfe && second === 0xff && "utf-16be");
+  try {
+    return new TextDecoder(wide || "utf-8", { fatal: true }).decode(buffer);
+  } catch {
+    return new TextDecoder("windows-1252").decode(buffer);
+  }
+}
+
 function thinned(text, most) {
   if (text.length <= most) return text;
   const lines = text.split("\n");
   const step = Math.ceil(text.length / (0.8 * most));
-  return lines.filter((_line, k) => k < 100 || k % step === 0).join("\n");
+  // Empty lines keep the numbers of the others.
+  return lines.map((line, k) => (k < 100 || k % step === 0 ? line : "")).join("\n");
 }

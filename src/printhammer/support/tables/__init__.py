@@ -1,0 +1,1 @@
+"""Tables of numbers in text files, as people, spreadsheets and instruments write them."""

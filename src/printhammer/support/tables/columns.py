@@ -1,0 +1,200 @@
+"""What the columns of a table hold, said beside the table: in a text, or in a file of its own.
+
+``time=1, current=2*-10 A/V, displacement=3*50 um/V+120 um, delay(current)=2 us``: columns are counted from 1.
+The factor leads from the number in the table to the quantity; where the table says a unit of its own, the
+factor is per such a unit. What is added to it comes after the factor. A delay is how much later than the time
+beside it a column shows what happened. Times of even samples are ``time=-1 ms + 20 us``: first time and step.
+
+The file beside ``trace.csv`` is ``trace.csv.toml``::
+
+    [columns]
+    time = "1"
+    current = "2*-10 A/V"
+
+    [delay]
+    current = "20 us"
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from printhammer.errors import InputError, located
+from printhammer.support.files import read_text
+from printhammer.support.tables.layout import Clock
+from printhammer.units import parse, to_si
+
+_NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_ENTRY: Final = re.compile(
+    r"\s*(delay\s*\(\s*(?P<late>[^()]+?)\s*\)|(?P<name>[^=()]+?))\s*=\s*(?P<value>.*?)\s*"
+)
+_COLUMN: Final = re.compile(
+    rf"(?P<place>\d+)\s*(?:\*\s*(?P<factor>{_NUMBER})\s*(?P<unit>[^+=-]*?)\s*)?"
+    rf"(?:(?P<sign>[+-])\s*(?P<offset>[^\s+-][^+=]*))?"
+)
+_EVEN: Final = re.compile(
+    rf"(?P<start>{_NUMBER}\s*[^\d\s+-][^+]*?)\s*\+\s*(?P<step>{_NUMBER}\s*[^\d\s+-][^+]*)"
+)
+EXAMPLE: Final = "'time=1, current=2*-10 A/V, delay(current)=2 us'"
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a quantity comes from: a column, and how its numbers become the quantity."""
+
+    place: int
+    """Column, counted from 1."""
+    factor: float = 1.0
+    """Factor from the number in the table to the quantity, in `unit`."""
+    unit: str = ""
+    """Unit of the factor, such as "A/V" or "A"; empty where the factor is a pure number."""
+    offset: str = ""
+    """Quantity that is added, with its unit; empty for nothing."""
+
+    def scale(self, own: str, si: str) -> float:
+        """Return the factor from a number in the table, whose unit there is `own` or empty, to SI.
+
+        Raises
+        ------
+        InputError
+            The unit of the factor does not lead from that of the table to the quantity.
+        """
+        if not self.unit and not own:
+            raise InputError(
+                f"column {self.place} has no unit",
+                expected=f"a factor, such as --columns '...={self.place}*1 {si}'",
+            )
+        if not self.unit:
+            return self.factor * to_si(1.0, own, si)
+        if _converts(self.unit, si):
+            if own:
+                raise InputError(
+                    f"{self.unit} stands for 1 {own}", value=self.unit, expected=f"{self.unit}/{own}"
+                )
+            return self.factor * to_si(1.0, self.unit, si)
+        above, _slash, below = self.unit.rpartition("/")
+        each = to_si(1.0, above.strip() or self.unit, si)
+        return self.factor * each * (to_si(1.0, own, below.strip()) if own else 1.0)
+
+
+def _converts(unit: str, si: str) -> bool:
+    with suppress(InputError):
+        return to_si(1.0, unit, si) is not None
+    return False
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What the columns of a table hold, by the name of the quantity."""
+
+    sources: dict[str, Source]
+    clock: Clock | None = None
+    """Times of the rows, where they are in no column."""
+    delays: dict[str, float] = field(default_factory=dict)
+    """Delay of a quantity, s."""
+    where: str = "--columns"
+    """What messages call it."""
+
+
+def read_columns(text: str, where: str = "--columns") -> Columns:
+    """Read what columns hold from a text; `where` stands in messages.
+
+    Raises
+    ------
+    InputError
+        An entry is none, or a quantity is given twice.
+    """
+    sources: dict[str, Source] = {}
+    delays: dict[str, float] = {}
+    clock = None
+    seen: set[str] = set()
+    for entry in text.split(","):
+        match = _ENTRY.fullmatch(entry)
+        if match is None:
+            raise InputError.of(where, entry.strip(), f"entries such as {EXAMPLE}", said=": expected")
+        name, value = " ".join((match["late"] or match["name"]).split()), match["value"]
+        # A rate, such as "1.2 kHz", is the name of a column of a measured map.
+        name = name if name[0].isdigit() else name.lower()
+        key = f"delay({name})" if match["late"] else name
+        if key in seen:
+            raise InputError(f"{where}: {key} is given twice", key=key, file=where, expected="once")
+        seen.add(key)
+        column, even = _COLUMN.fullmatch(value), _EVEN.fullmatch(value)
+        if match["late"]:
+            with located(f"{where}: {key}", file=where, key=key):
+                delays[name] = parse(value, "s")
+        elif column and int(column["place"]) > 0:
+            offset = f"{column['sign']}{column['offset'].strip()}" if column["sign"] else ""
+            sources[name] = Source(
+                int(column["place"]), float(column["factor"] or 1.0), (column["unit"] or "").strip(), offset
+            )
+        elif name == "time" and even:
+            with located(f"{where}: time", file=where, key="time"):
+                clock = Clock(parse(even["start"], "s"), parse(even["step"], "s"))
+        else:
+            raise InputError.of(
+                name,
+                value,
+                "a column, counted from 1, such as '2*-10 A/V + 0.1 A'",
+                file=where,
+                said=": expected",
+            )
+    return Columns(sources, clock, delays, where)
+
+
+def columns_beside(path: Path) -> Columns | None:
+    """Read the file beside a table, whose name ends in .toml; None where there is none.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or holds something else than a table [columns] and perhaps [delay].
+    """
+    beside = path.with_name(f"{path.name}.toml")
+    try:
+        if not beside.is_file():
+            return None
+    except OSError:
+        return None
+    where = str(beside)
+    try:
+        content = tomllib.loads(read_text(beside, "the file of columns"))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{where}: expected TOML ({' '.join(str(error).split())})", file=where) from None
+    entries = []
+    for table, written in (("columns", "{}={}"), ("delay", "delay({})={}")):
+        values = content.pop(table, {})
+        if not isinstance(values, Mapping) or not all(isinstance(value, str) for value in values.values()):
+            raise InputError.of(table, values, "a table of texts such as current = '2*-10 A/V'", file=where)
+        entries += [written.format(name, value) for name, value in values.items()]
+    if content or not entries:
+        raise InputError(
+            f"{where}: {', '.join(content) or 'nothing'} is given",
+            file=where,
+            key="columns",
+            expected="[columns]",
+        )
+    return read_columns(", ".join(entries), where)
+
+
+def written(columns: Mapping[str, str], delays: Mapping[str, str] | None = None) -> str:
+    """Return the text of a file beside a table."""
+    tables = [("columns", columns), ("delay", delays or {})]
+    parts = [
+        "\n".join([f"[{table}]", *(f'{_quoted(name)} = "{value}"' for name, value in values.items())])
+        for table, values in tables
+        if values
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _quoted(name: str) -> str:
+    return name if name.isidentifier() else f'"{name}"'

@@ -1,0 +1,303 @@
+"""Layout of a table of numbers: separator, heading, units, facts around the numbers, times of even samples.
+
+Understood are the exports of oscilloscopes (Rigol, Tektronix, Keysight, PicoScope, LeCroy, Siglent, Rohde &
+Schwarz, GW Instek), of logic analysers (Saleae, sigrok), of LTspice, and of spreadsheets. No number is passed
+over: a row of numbers that does not belong to the table is refused with its line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from printhammer.errors import InputError, located
+from printhammer.support.arrays import FloatArray
+from printhammer.support.tables.marks import is_number, is_reading, with_points
+from printhammer.support.tables.names import Heading, headings, is_unit_row, split_heading
+from printhammer.support.tables.text import read_any, spaced, split_cells
+from printhammer.units import parse
+
+Row = tuple[int, list[str]]
+"""Line of the file, counted from 1, and cells."""
+
+_SEPARATORS: Final = "\t;|, "
+_LINES: Final = 2000
+"""Lines from which the separator is found."""
+_START: Final = ("start", "begin", "t0", "xorg", "xorigin", "x0", "hoffset", "tstart", "xzero")
+_STEP: Final = (
+    *("increment", "incr", "inc", "step", "delta", "tinc", "dt", "deltax", "timeincrement", "hresolution"),
+    *("xinc", "xincr", "xincrement", "sampleinterval", "samplinginterval", "samplingperiod"),
+)
+_CLOCK: Final = {*_START, *_STEP}
+_RATE: Final = ("samplerate", "samplingrate")
+_ZERO: Final = ("zeroindex", "triggerpoint")
+_TIME_UNIT: Final = ("horizontalunits", "xunits", "hunit", "timeunits", "timeunit")
+_VALUE_UNIT: Final = ("verticalunits", "yunits", "vunit")
+_NUMBERING: Final = ("x", "no", "no.", "nr", "n", "#", "index", "sample", "sequence", "point")
+_ASSIGNED: Final = re.compile(r"\s*([^=:]+?)\s*[=:]\s*([^=:]+?)\s*")
+
+
+class Clock(NamedTuple):
+    """Times of even samples."""
+
+    start: float
+    """Time of the first sample, s."""
+    step: float
+    """Time from one sample to the next, s."""
+    numbers: int | None = None
+    """Place of the column that numbers the samples; None where there is none."""
+
+    def times(self, count: int) -> FloatArray:
+        """Return the times of a number of samples, s."""
+        return np.asarray(self.start + self.step * np.arange(count), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of numbers whose columns need not have a meaning yet."""
+
+    where: str
+    """Name of the file, for messages."""
+    head: int
+    """Line of the heading; 0 where there is none."""
+    columns: list[Heading]
+    """Name and unit of each column, as its heading says."""
+    lines: list[int]
+    """Line of the file of each row, counted from 1."""
+    rows: list[list[str]]
+    """Cells; their numbers have a decimal point."""
+    comments: dict[str, str]
+    """Comments of the form ``# key: value``."""
+    clock: Clock | None
+    """Times of the rows where facts in the file say them."""
+
+    def cells(self, place: int) -> list[str]:
+        """Return the cells of a column, without spaces around them."""
+        return [row[place].strip() if place < len(row) else "" for row in self.rows]
+
+
+def read_layout(path: Path, what: str, words: Collection[str] = ()) -> Table:
+    """Read a table of a file; `what` names it in messages, `words` are cells allowed beside numbers."""
+    return layout_of(read_any(path, what), str(path), words)
+
+
+def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
+    """Find the layout of a table in a text; arguments as for `read_layout`.
+
+    Raises
+    ------
+    InputError
+        There is no heading, a row has too few or too many cells, a row of numbers stands outside the table,
+        or it is not clear whether numbers have a decimal comma or a decimal point.
+    """
+    separator = _separator(text)
+    split = split_cells(text, where, delimiter=separator)
+    whole = {line: len(row) for line, row in split.rows}
+    rows = [(line, _bare(row)) for line, row in split.rows]
+    if not rows:
+        raise InputError(
+            f"{where}: the file has no heading",
+            file=where,
+            key="heading",
+            expected="one such as 'time [us],current [A]' above the numbers",
+        )
+    rows, beside = _without_facts_beside(rows)
+    facts = {_key(key): [value] for key, value in split.comments.items()} | beside
+    # Where no row is one of numbers, each cell says its own fault.
+    begin = next((k for k, (_line, row) in enumerate(rows) if _is_data(row, words)), 1)
+    above, data = rows[:begin], rows[begin:]
+    width = _width(data, above)
+    for line, row in data:
+        if not len(row) <= width <= whole[line]:
+            raise InputError(
+                f"{where}: line {line} has {len(row)} cells",
+                file=where,
+                key=f"line {line}",
+                expected=f"{width}",
+            )
+    if not above and not beside:
+        above = _commented(split.notes, separator, width, data[0][0])
+    heading = _heading_rows(where, above, width)
+    for line, row in above[: len(above) - len(heading)]:
+        facts |= _facts_of(row) if line else {}
+    extra = [row[width:] for _line, row in heading]
+    for name, *values in zip(*extra, strict=False):
+        facts |= {_key(name): values} if values else _facts_of([name])
+    columns = _with_units(headings([row for _line, row in heading], width, separator), facts, above)
+    if beside and _TIME_UNIT[0] in facts:
+        columns = _beside_names(columns, facts)
+    lines = [line for line, _row in data]
+    cells = with_points(where, text, separator, lines, [row for _line, row in data])
+    if any("sigrok" in note for _line, note in split.notes):
+        facts.setdefault("start", ["0 s"])
+    clock = _clock(where, facts, columns, cells, numbered=any(extra))
+    if clock and clock.numbers is None and lines[-1] - lines[0] >= len(lines):
+        # Rows may be missing.
+        clock = None
+    head = heading[0][0] if heading else 0
+    return Table(where, head, columns, lines, cells, split.comments, clock)
+
+
+def _separator(text: str) -> str:
+    """Return the separator with which most lines are rows of numbers; if none are, that of most lines."""
+    lines = [line for line in text.split("\n", _LINES)[:_LINES] if line.strip() and line.strip()[0] != "#"]
+    best, chosen = 0, ""
+    for sign in _SEPARATORS:
+        count = 0
+        for line in lines:
+            cells = [cell.strip(' \t"') for cell in line.split(sign if sign != " " else None)]
+            count += len(cells) > 1 and all(map(is_reading, cells)) and any(map(is_number, cells))
+        if count > best:
+            best, chosen = count, sign
+    return chosen or next(
+        (sign for sign in "\t;|" if 2 * sum(sign in line for line in lines) > len(lines)), ","
+    )
+
+
+def _bare(row: list[str]) -> list[str]:
+    """Return a row without empty cells at its end."""
+    while row and not row[-1].strip():
+        row = row[:-1]
+    return row
+
+
+def _is_data(row: list[str], words: Collection[str]) -> bool:
+    """Whether a row is one of numbers: no cell is anything else but a gap or one of the words."""
+    cells = [cell.strip() for cell in row]
+    return any(map(is_number, cells)) and all(is_reading(cell) or cell.lower() in words for cell in cells)
+
+
+def _width(data: list[Row], above: list[Row]) -> int:
+    """Return the number of columns: that of the heading, or else that of the longest row."""
+    last = above[-1][1] if above else []
+    if any(map(_is_named, last)) or is_unit_row(last):
+        facts = (k for k, cell in enumerate(last) if _key(cell) in _CLOCK or _ASSIGNED.fullmatch(cell))
+        numbers = (k for k, cell in enumerate(last) if is_number(cell.strip()) and not cell.strip().isdigit())
+        return min(next(facts, len(last)), next(numbers, len(last)))
+    return max((len(row) for _line, row in data), default=len(last))
+
+
+def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: int) -> list[Row]:
+    """Return the heading that stands in the last comment above the numbers, as NumPy writes it."""
+    above = [
+        (line, spaced(note).split() if separator == " " else note.split(separator))
+        for line, note in notes
+        if line < first
+    ]
+    return [(line, row) for line, row in above[-1:] if len(row) == width > 1]
+
+
+def _heading_rows(where: str, above: list[Row], width: int) -> list[Row]:
+    """Return the rows of names and units, of none to two, from the rows above the numbers."""
+    if not above or len(above[-1][1]) < width:
+        return []
+    line, last = above[-1]
+    numbers = [cell for cell in last[:width] if is_number(cell.strip())]
+    before = above[-2] if len(above) > 1 and len(above[-2][1]) >= width else None
+    if numbers and (is_number(last[0].strip()) or (before and any(map(_is_named, before[1])))):
+        raise InputError(
+            f"{where}: line {line}: {','.join(last)[:60]!r} is expected to hold numbers only",
+            file=where,
+            key=f"line {line}",
+            value=",".join(last),
+        )
+    return [before, above[-1]] if before and is_unit_row(last[:width]) else above[-1:]
+
+
+def _is_named(cell: str) -> bool:
+    heading = split_heading(cell)
+    return bool(heading.unit or heading.quantity)
+
+
+def _without_facts_beside(rows: list[Row]) -> tuple[list[Row], dict[str, list[str]]]:
+    """Cut columns of facts off the left of the numbers, as older Tektronix oscilloscopes write them."""
+    first = rows[0][1]
+    if not first[0].strip() or is_reading(first[0].strip()):
+        return rows, {}
+    width = len(first)
+    cut = width
+    while cut and all(len(row) == width and is_number(row[cut - 1].strip()) for _line, row in rows):
+        cut -= 1
+    if width - cut < 2:
+        return rows, {}
+    facts: dict[str, list[str]] = {}
+    for _line, row in rows:
+        facts |= _facts_of(row[:cut])
+    return [(line, row[cut:]) for line, row in rows], facts
+
+
+def _key(text: str) -> str:
+    """Return a name of a fact in lower case, letters and digits only."""
+    return "".join(letter for letter in text.lower() if letter.isalnum())
+
+
+def _facts_of(row: list[str]) -> dict[str, list[str]]:
+    """Return the facts of a row: "key,value,...", or cells such as "t0 = -1 ms"."""
+    facts = {_key(match[1]): [match[2]] for cell in row if (match := _ASSIGNED.fullmatch(cell))}
+    if len(row) > 1 and row[0].strip():
+        facts[_key(row[0])] = [cell.strip() for cell in row[1:]]
+    return facts
+
+
+def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list[Row]) -> list[Heading]:
+    """Return headings with units that stand in facts, of the columns without one."""
+    lecroy = bool(above) and above[0][1][0].upper().startswith("LECROY")
+    time = _fact(facts, _TIME_UNIT, ["s"] if lecroy else [""])[0]
+    values = _fact(facts, _VALUE_UNIT, ["V"] if lecroy else [""])
+    values = [split_heading(f"x [{value.rpartition(':')[2]}]").unit for value in values if value.strip()] or [
+        ""
+    ]
+    made, channel = [], 0
+    for column in columns:
+        if column.quantity == "time":
+            made.append(column._replace(unit=column.unit or split_heading(f"x [{time}]").unit))
+            continue
+        unit = column.unit or values[channel if len(values) > 1 and channel < len(values) else 0]
+        made.append(column._replace(unit=unit))
+        channel += 1
+    return made
+
+
+def _beside_names(columns: list[Heading], facts: dict[str, list[str]]) -> list[Heading]:
+    """Return the headings of an older Tektronix: time, and the source that its facts name."""
+    source = _fact(facts, ("source",), [""])[0]
+    unit = split_heading(f"x [{facts[_TIME_UNIT[0]][0]}]").unit
+    return [Heading("time", unit), *(column._replace(name=source) for column in columns[1:])]
+
+
+def _fact(facts: dict[str, list[str]], keys: Collection[str], default: list[str]) -> list[str]:
+    return next((facts[key] for key in keys if facts.get(key)), default)
+
+
+def _clock(
+    where: str, facts: dict[str, list[str]], columns: list[Heading], rows: list[list[str]], *, numbered: bool
+) -> Clock | None:
+    """Return the times of samples that facts say: start and step, or step and the index of time zero."""
+    start = _seconds(where, "start", _fact(facts, _START, [""])[0])
+    step = _seconds(where, "step", _fact(facts, _STEP, [""])[0])
+    rate, zero = (_fact(facts, keys, [""])[0] for keys in (_RATE, _ZERO))
+    if step is None and rate:
+        with located(f"{where}: sampling rate", file=where, key="rate"):
+            step = 1.0 / (float(rate) if is_number(rate) else parse(rate, "Hz"))
+    if start is None and step is not None and is_number(zero):
+        start = -float(zero) * step
+    if start is None or step is None:
+        return None
+    if not (numbered or columns[0].name.lower() in _NUMBERING[1:]):
+        return Clock(start, step)
+    numbers = [row[0].strip() for row in rows]
+    counted = all(is_number(number) and float(number) == k for k, number in enumerate(numbers))
+    return Clock(start, step, 0) if counted else None
+
+
+def _seconds(where: str, name: str, text: str) -> float | None:
+    """Read a time in seconds, or with its unit; None for an empty text."""
+    if not text:
+        return None
+    with located(f"{where}: {name}", file=where, key=name):
+        return float(text) if is_number(text) else parse(text.replace(",", "."), "s")

@@ -1,0 +1,426 @@
+"""Tables of measurements as quantities in SI: which column is which, units, gaps, delays.
+
+A heading gives every column its unit: ``displacement [um],current [A],force [N]``, in any order and any unit
+of the dimension; every line after it is one row. A text of columns, or a file beside the table, says what
+columns hold where the heading does not; see `printhammer.support.tables.columns`. What a column holds is
+never guessed from its numbers. Times are those of the table: a record keeps what it has before its time 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from printhammer.errors import InputError, located
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.tables.columns import Columns, Source, columns_beside, read_columns
+from printhammer.support.tables.layout import Table, layout_of
+from printhammer.support.tables.marks import GAPS, OVER
+from printhammer.support.tables.text import read_any
+from printhammer.units import all_to_si, describe, parse, to_si
+
+_NONE: Final[Mapping[str, str]] = MappingProxyType({})
+_NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
+
+LARGEST: Final = 1e9
+"""Largest magnitude of a measured value in SI. Beyond it is what instruments write without a reading, such as
+9.9e37."""
+
+BEFORE: Final = 0.1
+"""Part of its peak that what is driven may have before time 0, which is noise. Arbitrary."""
+
+_TINY: Final = float(np.finfo(np.float64).tiny)
+_BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
+"""Quantities of a record that a unit tells where no name does; a voltage may stand for anything."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Columns of a table in the order of its rows."""
+
+    path: Path
+    """The file."""
+    values: dict[str, FloatArray]
+    """Columns of numbers by name, SI, shape (rows,)."""
+    words: dict[str, list[str]]
+    """Columns of words by name, in lower case."""
+    lines: IntArray
+    """Line of the file in which each row stands, counted from 1; shape (rows,)."""
+    comments: dict[str, str]
+    """Comments of the form ``# key: value``; of a key given twice, the last."""
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def check_times(self, *, least: int = 2) -> None:
+        """Refuse fewer rows than some, and times that do not ascend; InputError with the line."""
+        times, where = self.values["time"], str(self.path)
+        if len(times) < least:
+            raise InputError(
+                f"{where}: {len(times)} samples", file=where, key="time", expected=f"at least {least}"
+            )
+        bad = np.flatnonzero(np.diff(times) <= 0.0)
+        if len(bad):
+            row = int(bad[0]) + 1
+            raise InputError(
+                f"{where}: line {self.lines[row]}: time {times[row]:.9g} s after {times[row - 1]:.9g} s",
+                file=where,
+                key="time",
+                value=float(times[row]),
+                expected="ascending times",
+            )
+
+    def check_before(self, times: FloatArray, name: str) -> None:
+        """Refuse a column that drives something before time 0, the firing, at which it is to begin.
+
+        Raises
+        ------
+        InputError
+            More than `BEFORE` of its peak stands before time 0, or there is no time after it.
+        """
+        values, where = np.abs(self.values[name]), str(self.path)
+        early = times < 0.0
+        largest = float(values[early].max(initial=0.0))
+        if early.all() or largest > BEFORE * float(values.max()):
+            raise InputError(
+                f"{where}: a {name} of {largest:.4g} before time 0",
+                file=where,
+                key=name,
+                value=largest,
+                expected=f"the firing at time 0, or --columns 'time=1+{-times[0]:.9g} s, ...'",
+            )
+
+
+def read_table(
+    path: str | Path,
+    required: Mapping[str, str],
+    *,
+    optional: Mapping[str, str] = _NONE,
+    text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
+    gaps: Collection[str] = (),
+    columns: str | None = None,
+    what: str = "the table",
+) -> Readings:
+    """Read a table, numbers in SI; a column that was left out is not in it.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    required : mapping of str to str
+        Columns that must be there: name, in lower case, to SI unit.
+    optional : mapping of str to str, optional
+        Columns of numbers that may be left out.
+    text : mapping of str to tuple of str, optional
+        Columns of words, which may be left out: name to the words allowed, in lower case. They have no unit.
+    gaps : collection of str, optional
+        Columns that may have empty cells, which become NaN.
+    columns : str, optional
+        What the columns hold; by default what the file beside the table says, and else what its heading says.
+    what : str, optional
+        What messages call the file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, has no rows, a column is missing, not known or given twice, lacks its unit
+        or has one of another dimension, a cell is no finite number or no word allowed, or a number is
+        too large or too small to be a measured one, or a row has too many or too few cells.
+    """
+    source = Path(path)
+    content = read_any(source, what)
+    told = columns_of(source, columns)
+    words = {word for allowed in text.values() for word in allowed}
+    table = layout_of(content, str(source), words)
+    return readings_of(table, required, optional=optional, text=text, gaps=gaps, columns=told)
+
+
+def columns_of(path: Path, columns: str | None) -> Columns | None:
+    """Return what is said of the columns of a file: in a text, else in a file beside it; None for neither."""
+    return columns_beside(path) if columns is None else read_columns(columns)
+
+
+def readings_of(
+    table: Table,
+    required: Mapping[str, str],
+    *,
+    optional: Mapping[str, str] = _NONE,
+    text: Mapping[str, tuple[str, ...]] = _NO_WORDS,
+    gaps: Collection[str] = (),
+    columns: Columns | None = None,
+) -> Readings:
+    """Return the quantities of a table; arguments and errors as for `read_table`."""
+    numbers = {**required, **optional}
+    wanted = _wanted(required, optional, text)
+    sources, words = assigned(table, numbers, text, wanted, columns)
+    clock = columns.clock if columns and columns.clock else table.clock
+    missing = [name for name in required if name not in sources and not (name == "time" and clock)]
+    if missing:
+        raise InputError(
+            f"{table.where}: {_line(table)}the column {missing[0]!r} is missing among {_listed(table)}",
+            file=table.where,
+            key=missing[0],
+            expected=f"{wanted}, or --columns {_example(table, required)}",
+        )
+    if not table.rows:
+        raise InputError(
+            f"{table.where}: the table has no rows",
+            file=table.where,
+            key="rows",
+            expected="them below the heading",
+        )
+    values = {
+        name: _values(table, name, source, numbers[name], name in gaps) for name, source in sources.items()
+    }
+    if "time" in numbers and "time" not in values and clock:
+        values["time"] = clock.times(len(table.rows))
+    cells = {name: _words(table, name, place, text[name]) for name, place in words.items()}
+    lines = np.array(table.lines, dtype=np.int64)
+    if columns and columns.delays:
+        values, lines = _in_time(values, lines, columns, table.where)
+    return Readings(Path(table.where), values, cells, lines, table.comments)
+
+
+def assigned(
+    table: Table,
+    numbers: Mapping[str, str],
+    text: Mapping[str, tuple[str, ...]],
+    wanted: str,
+    columns: Columns | None,
+) -> tuple[dict[str, Source], dict[str, int]]:
+    """Return where numbers and words come from: what is said beside the table, else what its heading says."""
+    if columns is None:
+        return _by_heading(table, numbers, text, wanted)
+    for name, source in columns.sources.items():
+        if name not in numbers or source.place > len(table.columns):
+            raise InputError(
+                f"{columns.where}: {name} = {source.place} in {table.where}",
+                file=columns.where,
+                key=name,
+                value=source.place,
+                expected=f"{wanted}, and one of the {len(table.columns)} columns {_listed(table)}",
+            )
+    for name in columns.delays:
+        if name not in columns.sources:
+            raise InputError(
+                f"{columns.where}: delay({name})",
+                file=columns.where,
+                key=f"delay({name})",
+                expected="a column of it",
+            )
+    sources = dict(columns.sources)
+    if "time" in numbers and "time" not in sources and columns.clock is None:
+        times = [k for k, heading in enumerate(table.columns) if heading.quantity == "time" and heading.unit]
+        sources |= {"time": Source(times[0] + 1)} if len(times) == 1 else {}
+    return sources, {}
+
+
+def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
+    """Return the quantity of each column as its heading says: by name, or by the only such unit; or nothing.
+
+    A column that numbers the samples is none. Only time, current and force are known by their unit, and only
+    in a record over time: a voltage or a length may stand for anything.
+    """
+    known = []
+    for place, heading in enumerate(table.columns):
+        name = heading.name.lower()
+        numbered = table.clock is not None and place == table.clock.numbers
+        known.append("" if numbered else name if name in numbers else heading.quantity)
+    for name, si in _BY_UNIT.items() if "time" in numbers else ():
+        same = [k for k, heading in enumerate(table.columns) if not known[k] and _measures(heading.unit, si)]
+        if name in numbers and name not in known and len(same) == 1:
+            known[same[0]] = name
+    return known
+
+
+def _by_heading(
+    table: Table, numbers: Mapping[str, str], text: Mapping[str, tuple[str, ...]], wanted: str
+) -> tuple[dict[str, Source], dict[str, int]]:
+    """Return where numbers and words come from as the heading says: by name, or by the only such unit."""
+    where = f"{table.where}: {_line(table)}".rstrip(": ")
+    sources: dict[str, Source] = {}
+    words: dict[str, int] = {}
+    unknown = []
+    known = quantities_of(table, {*numbers, *text})
+    for place, (heading, name) in enumerate(zip(table.columns, known, strict=True)):
+        if name in sources or name in words:
+            raise InputError(
+                f"{where}: the column {name!r} is given twice", file=where, key=name, expected="it once"
+            )
+        if name in text:
+            if heading.unit:
+                raise InputError(
+                    f"{where}: heading {heading.shown!r}: expected {name!r}, words have no unit",
+                    file=where,
+                    key=heading.shown,
+                )
+            words[name] = place
+        elif name in numbers:
+            sources[name] = Source(place + 1)
+        elif (table.clock is None or place != table.clock.numbers) and (
+            heading.shown or not any(each.name for each in table.columns)
+        ):
+            unknown.append(place)
+    if unknown:
+        shown = table.columns[unknown[0]].shown[:60]
+        raise InputError(
+            f"{where}: the column {shown!r} is not known"
+            if shown
+            else f"{where}: column {unknown[0] + 1} has no heading",
+            file=where,
+            key=shown,
+            expected=f"{wanted}, or --columns {_example(table, numbers)}",
+        )
+    for name, source in sources.items():
+        heading = table.columns[source.place - 1]
+        such = f"{name} [{numbers[name]}]"
+        if not heading.unit:
+            raise InputError(
+                f"{where}: heading {heading.shown!r} is expected to carry its unit, such as {such!r}",
+                file=where,
+                key=heading.shown,
+            )
+        with located(f"{where}: heading {heading.shown!r}", file=where, key=heading.shown):
+            to_si(1.0, heading.unit, numbers[name])
+    return sources, words
+
+
+def _measures(unit: str, si: str) -> bool:
+    try:
+        to_si(1.0, unit, si)
+    except InputError:
+        return False
+    return True
+
+
+def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> FloatArray:
+    """Return the numbers of a column in SI."""
+    cells = table.cells(source.place - 1)
+    heading = table.columns[source.place - 1]
+    numbers = _floats(table, name, cells, heading.unit or source.unit, si, gaps)
+    place = heading.name or name
+    with located(f"{table.where}: {place}", file=table.where, key=place):
+        factor = source.scale(heading.unit, si)
+    if (source.factor, source.unit) == (1.0, ""):
+        try:
+            array = np.array(all_to_si(numbers, heading.unit, si), dtype=np.float64)
+        except InputError:
+            array = np.array(numbers) * math.inf
+    else:
+        array = np.array(numbers, dtype=np.float64) * factor
+    if source.offset:
+        with located(f"{table.where}: {place}", file=table.where, key=place):
+            array = array + parse(source.offset, si)
+    # Squares and powers of what no sensor reads are no numbers.
+    size = np.abs(array)
+    bad = np.flatnonzero((size > LARGEST) | ((size < _TINY) & (np.asarray(numbers) != 0.0)))
+    if len(bad):
+        row = int(bad[0])
+        raise InputError(
+            f"{table.where}: line {table.lines[row]}, column {name!r}: {cells[row]} {heading.unit}".rstrip(),
+            file=f"{table.where}: line {table.lines[row]}",
+            key=name,
+            value=cells[row],
+            expected=f"a measured value, 0 or one of a magnitude from {_TINY:.2g} to {LARGEST:g} {si}",
+        )
+    return array
+
+
+def _floats(table: Table, name: str, cells: list[str], unit: str, si: str, gaps: bool) -> list[float]:
+    """Return the numbers of a column in the unit of the table; a gap is NaN where it is allowed."""
+    numbers = []
+    for row, cell in enumerate(cells):
+        try:
+            number = float(cell)
+        except ValueError:
+            number = math.nan
+        if math.isfinite(number) and "_" not in cell:
+            numbers.append(number)
+            continue
+        if gaps and cell.lower() in GAPS:
+            numbers.append(math.nan)
+            continue
+        what = "beyond the range of the instrument" if cell.lower() in OVER else f"expected {describe(si)}"
+        raise InputError(
+            f"{table.where}: line {table.lines[row]}, column {name!r}: {cell[:40]!r} is no finite number,"
+            f" {what}" + (f" in {unit}" if unit else ""),
+            file=f"{table.where}: line {table.lines[row]}",
+            key=name,
+            value=cell,
+        )
+    return numbers
+
+
+def _words(table: Table, name: str, place: int, allowed: tuple[str, ...]) -> list[str]:
+    cells = [cell.lower() for cell in table.cells(place)]
+    for row, cell in enumerate(cells):
+        if cell not in allowed:
+            where = f"{table.where}: line {table.lines[row]}"
+            raise InputError(
+                f"{where}, column {name!r}: {cell[:40]!r}",
+                file=where,
+                key=name,
+                value=cell,
+                expected=" or ".join(allowed),
+            )
+    return cells
+
+
+def _in_time(
+    values: dict[str, FloatArray], lines: IntArray, columns: Columns, where: str
+) -> tuple[dict[str, FloatArray], IntArray]:
+    """Return the columns without their delays, over the times of the first; rows that not all have are cut.
+
+    The times of the first column are moved; the others are brought to them by straight lines between samples.
+    """
+    times = values["time"]
+    names = [name for name in values if name != "time"]
+    delays = {name: columns.delays.get(name, 0.0) for name in names}
+    first = delays[names[0]]
+    at = times - first
+    kept = np.ones(len(times), dtype=np.bool_)
+    moved = {}
+    for name in names:
+        if delays[name] == first:
+            moved[name] = values[name]
+            continue
+        own = times - delays[name]
+        kept &= (at >= own[0]) & (at <= own[-1])
+        moved[name] = np.interp(at, own, values[name])
+    if not kept.any():
+        raise InputError(
+            f"{where}: the delays leave no rows", file=where, key="delay", expected="shorter ones"
+        )
+    return {"time": at[kept], **{name: column[kept] for name, column in moved.items()}}, lines[kept]
+
+
+def _wanted(required: Mapping[str, str], optional: Mapping[str, str], text: Collection[str]) -> str:
+    must = ",".join(f"{name} [{si}]" for name, si in required.items())
+    may = ",".join([*(f"{name} [{si}]" for name, si in optional.items()), *text])
+    return f"the columns '{must}'" + (f" and perhaps '{may}'" if may else "")
+
+
+def _line(table: Table) -> str:
+    return f"line {table.head}: " if table.head else ""
+
+
+def _listed(table: Table) -> str:
+    """Return the columns of a table for messages, such as "1 'TIME [s]', 2 'CH1 [V]'"."""
+    listed = [f"{k} {heading.shown[:40]!r}" for k, heading in enumerate(table.columns[:8], 1)]
+    return ", ".join(listed) + (", ..." if len(table.columns) > len(listed) else "")
+
+
+def _example(table: Table, numbers: Mapping[str, str]) -> str:
+    """Return what `--columns` might say of a table."""
+    entries = []
+    for place, ((name, si), heading) in enumerate(zip(numbers.items(), table.columns, strict=False), 1):
+        own = heading.unit
+        factor = "" if own and _measures(own, si) else f"*1 {si}/{own}" if own else f"*1 {si}"
+        entries.append(f"{name}={place}{factor}")
+    return f"'{', '.join(entries)}'"

@@ -1,0 +1,130 @@
+"""Text of table files: encodings, line ends, comments, cells.
+
+Blank lines are passed over. Lines that begin with #, and those of sigrok and Matlab that begin with ; or %,
+are comments; one such as ``# sampling rate: 1 MHz`` is kept as a key and its text.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from printhammer.errors import InputError
+
+_COMMENT: Final = re.compile(r"\s*(#|//|[%;]\s*[^\W\d_][^;]*$)")
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of a table with the lines of the file in which they stand."""
+
+    where: str
+    """Name of the file, for messages."""
+    rows: list[tuple[int, list[str]]]
+    """Line of the file, counted from 1, and cells."""
+    comments: dict[str, str]
+    """Comments of the form ``# key: value``; of a key given twice, the last."""
+    notes: list[tuple[int, str]]
+    """Line and text of every comment."""
+
+
+def read_cells(path: Path, what: str, *, gaps: bool = False) -> Cells:
+    """Read comma-separated values; `what` names the file in messages, such as "the force table".
+
+    With `gaps`, a row of nothing but empty cells is a row.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or holds no comma-separated values.
+    """
+    return split_cells(read_any(path, what), str(path), gaps=gaps)
+
+
+def read_any(path: Path, what: str) -> str:
+    """Read a text file in UTF-8 or UTF-16, else in Latin-1 of Windows; line feeds end its lines."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file", file=path, expected=what) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: {what} cannot be read ({reason})", file=path) from None
+    return decoded(content, str(path))
+
+
+def decoded(content: bytes, where: str) -> str:
+    """Decode the bytes of a text file as `read_any` does."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "utf-16"
+    elif b"\0" in content[:200]:
+        encoding = "utf-16-be" if content[0] == 0 else "utf-16-le"
+    else:
+        encoding = "utf-8-sig"
+    text = ""
+    for each in (encoding, "cp1252"):
+        with suppress(UnicodeDecodeError):
+            text = content.decode(each)
+            break
+    if "\0" in text or bool(content) > bool(text):
+        raise InputError(f"{where}: the file is not text", file=where, expected="a table of numbers as text")
+    return with_line_ends(text)
+
+
+def with_line_ends(text: str) -> str:
+    """Return a text whose lines end with a line feed, whatever they ended with: CR LF, LF CR or CR."""
+    if "\r" not in text:
+        return text
+    text = text.replace("\r\r\n", "\n")
+    first = re.search(r"[\r\n]+", text)
+    pairs = ("\n\r", "\r\n") if first and first.group().startswith("\n\r") else ("\r\n", "\n\r")
+    for pair in pairs:
+        text = text.replace(pair, "\n")
+    return text.replace("\r", "\n")
+
+
+def split_cells(text: str, where: str, *, gaps: bool = False, delimiter: str = ",") -> Cells:
+    """Split the text of a table into cells; `where` stands in messages. A space is any white space."""
+    comments: dict[str, str] = {}
+    notes: list[tuple[int, str]] = []
+    lines = _uncommented(text, comments, notes)
+    if delimiter == " ":
+        lines = (spaced(line) + "\n" for line in lines)
+    reader = csv.reader(lines, strict=True, delimiter=delimiter, skipinitialspace=True)
+    rows = []
+    try:
+        for row in reader:
+            if any(map(str.strip, row)) or (gaps and len(row) > 1):
+                rows.append((reader.line_num, row))  # noqa: PERF401
+    except csv.Error as error:
+        raise InputError(
+            f"{where}: line {reader.line_num}: expected comma-separated values ({error})",
+            file=where,
+            key=f"line {reader.line_num}",
+        ) from None
+    return Cells(where, rows, comments, notes)
+
+
+def spaced(line: str) -> str:
+    """Return a line with single spaces, none of them between a name and its unit in brackets."""
+    return " ".join(re.sub(r"\s+(?=[\[(])", "", line).split())
+
+
+def _uncommented(text: str, comments: dict[str, str], notes: list[tuple[int, str]]) -> Iterator[str]:
+    """Yield the lines, empty ones in place of comments; keep the comments that have a key."""
+    for number, line in enumerate(io.StringIO(text), 1):
+        if not _COMMENT.match(line):
+            yield line
+            continue
+        bare = line.strip().lstrip("#%;/").strip()
+        notes.append((number, bare))
+        key, colon, value = bare.partition(":")
+        if colon and key.strip():
+            comments[key.strip()] = value.strip()
+        yield "\n"

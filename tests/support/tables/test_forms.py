@@ -1,0 +1,162 @@
+"""Forms in which one small record is written: every cell is right, or refused with its line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.errors import refused
+
+from printhammer.support.tables.readings import Readings, read_table
+from printhammer.support.tables.text import decoded, read_cells, split_cells
+
+RECORD = {"time": "s"}
+CHANNELS = {"current": "A", "voltage": "V"}
+
+
+def read(folder: Path, text: str | bytes, columns: str | None = None, **options: object) -> Readings:
+    path = folder / "trace.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_table(path, RECORD, optional=CHANNELS, columns=columns, **options)  # type: ignore[arg-type]
+
+
+def shows(found: Readings, times: list[float], **columns: list[float]) -> None:
+    np.testing.assert_allclose(found.values["time"], times, rtol=1e-15, atol=0.0)
+    assert set(found.values) == {"time", *columns}
+    for name, values in columns.items():
+        np.testing.assert_allclose(found.values[name], values, rtol=1e-15, atol=0.0)
+
+
+GAPS = "t,1,2\ns,V,V\n-3E-06,,0\n-2E-06,,0\n-1E-06,5,0.1\n0,5,0.2\n1E-06,5,0.3\n"
+MICRO = [-3e-6, -2e-6, -1e-6, 0.0, 1e-6]
+
+
+def test_empty_cells_at_the_beginning(tmp_path: Path) -> None:
+    shows(read(tmp_path, GAPS, "current=3*1 A/V"), MICRO, current=[0.0, 0.0, 0.1, 0.2, 0.3])
+    with refused("voltage", "", file="trace.csv: line 3"):
+        read(tmp_path, GAPS, "voltage=2")
+    found = read(tmp_path, GAPS, "voltage=2", gaps=["voltage"])
+    shows(found, MICRO, voltage=[np.nan, np.nan, 5.0, 5.0, 5.0])
+    heading = "time [us],voltage [V],current [A]\n"
+    with refused("voltage", "", file="trace.csv: line 2"):
+        read(tmp_path, heading + "-3,,0\n-2,,0\n-1,5,0.1\n")
+
+
+def test_decimal_commas_and_group_marks(tmp_path: Path) -> None:
+    heading = "time [us];current [mA]\n"
+    found = read(tmp_path, heading + "0;998,5\n1;999,5\n2;1.000\n3;1.001\n")
+    shows(found, [0.0, 1e-6, 2e-6, 3e-6], current=[0.9985, 0.9995, 1.0, 1.001])
+    found = read(tmp_path, heading + "0;1.000,5\n1;-1.234.567,25\n")
+    shows(found, [0.0, 1e-6], current=[1.0005, -1234.56725])
+    found = read(tmp_path, 'time [us],current [mA]\n0,"1,000.5"\n1,"1,002"\n')
+    shows(found, [0.0, 1e-6], current=[1.0005, 1.002])
+    for unclear in ("0;1,000\n1;1,001\n", "0;999\n1;1.000\n", "0;0,5\n1;0.5\n", "0;1.5\n1;0,5\n"):
+        with refused(f"line {2 if unclear.startswith('0;1,') else 3}"):
+            read(tmp_path, heading + unclear)
+
+
+def test_times_before_the_trigger_are_kept(tmp_path: Path) -> None:
+    found = read(tmp_path, "time [ms],current [A]\n-0.5,0\n0,0\n0.5,1\n1,1.2\n")
+    shows(found, [-0.5e-3, 0.0, 0.5e-3, 1e-3], current=[0.0, 0.0, 1.0, 1.2])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Time,Probe\n(us),(A)\n0,0\n1,0.5\n",
+        "Time,Probe\nSecond,Ampere\n0,0\n1E-6,0.5\n",
+        '"Time [us]", "Coil [A]"\n0, 0\n1, 0.5\n',
+        "time [us],current [A]\n\r0,0\n\r1,0.5\n\r",
+        "time [us],current [A]\r0,0\r1,0.5\r",
+        "time [us],current [A]\r\r\n0,0\r\r\n1,0.5",
+        "time (us);current (A)\n0;0\n1;0,5\n",
+        "Time (us)\tCurrent (A)\n0\t0\n1\t0.5\n",
+        "t/us;i/A\n0;0\n1;0,5\n",
+        "in us,Current in A\n0,0\n1,0.5\n",
+        "# time [us]  current [A]\n0.0  0.0\n 1.0  0.5\n",
+        ",time [us],current [A]\n0,0.0,0.0\n1,1.0,0.5\n",
+        "\ufefftime [us],current [A],\n0,0,\n1,0.5,\n",
+        "time [us]|current [A]\n0|0\n1|5e-1\n".encode("utf-16"),
+        "Zeit [µs];Strom [mA]\n0;0\n1;500\n".encode("latin-1"),
+        "Zeit [µs];Strom [mA]\n0;0\n1;500\n".encode("utf-16-le"),
+    ],
+)
+def test_two_samples_in_many_forms(tmp_path: Path, text: str | bytes) -> None:
+    shows(read(tmp_path, text), [0.0, 1e-6], current=[0.0, 0.5])
+
+
+def test_facts_beside_the_numbers(tmp_path: Path) -> None:
+    text = "Points,3,,0,0.0\nUnit,A,,1e-6,0.5\n,,,2e-6,1.0\n"
+    shows(read(tmp_path, text, "time=1*1 s,current=2*1 A"), [0.0, 1e-6, 2e-6], current=[0.0, 0.5, 1.0])
+    with refused(""):
+        read(tmp_path, text)
+
+
+def test_sample_numbers_with_start_and_step(tmp_path: Path) -> None:
+    text = "No,CH1,Begin,Step\nNumber,Volt,-1e-6,2e-6\n0,0\n1,0.5\n2,1\n"
+    shows(read(tmp_path, text, "current=2*1 A/V"), [-1e-6, 1e-6, 3e-6], current=[0.0, 0.5, 1.0])
+    with refused("CH1 [V]"):
+        read(tmp_path, text)
+    with refused("time"):
+        read(tmp_path, text.replace("\n1,0.5", ""), "current=2*1 A/V")
+
+
+@pytest.mark.parametrize(
+    ("rows", "line"), [("0.0,0\n0.1,0\n0.2,0\n0.0,0\n0.1,0\n", 5), ("0.0,0\n0.0,0\n0.1,0\n", 3)]
+)
+def test_times_that_do_not_ascend_are_named_by_their_line(tmp_path: Path, rows: str, line: int) -> None:
+    found = read(tmp_path, "time [ms],current [A]\n" + rows)
+    with refused("time") as caught:
+        found.check_times()
+    assert f"line {line}:" in str(caught.value)
+
+
+def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
+    text = '# by hand\n\ntime [us],"current [A]"\n# more\n0,0\n\n1,x\n'
+    with refused("current", "x", file="line 7"):
+        read(tmp_path, text)
+
+
+def test_a_name_with_brackets_is_no_unit(tmp_path: Path) -> None:
+    with refused("i(t)"):
+        read(tmp_path, "time [us],i(t)\n0,0\n1,1\n")
+    shows(read(tmp_path, "time [us],i(t)\n0,0\n1,1\n", "current=2*1 mA"), [0.0, 1e-6], current=[0.0, 1e-3])
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("time [us],current [A]\n1,x\n2,3\n", "line 2"),
+        ("time [us],current [A]\nx,1\n2,3\n", "line 2"),
+        ("time [us],current [A]\n0,1\n1,2\n2\n", "line 4"),
+        ("time [us],current [A]\n0,1\ntime [us],current [A]\n0,1\n", "time"),
+        ("0,1\n1,2\n", ""),
+        ("time [us],current [A]\n0,∞\n1,2\n", "current"),
+        ("time [us],current [A]\n0,1_000\n1,2\n", "line 2"),
+    ],
+)
+def test_no_row_is_lost(tmp_path: Path, text: str, key: str) -> None:
+    with refused(key):
+        read(tmp_path, text)
+
+
+TEXT = '# by hand\n#rate: 1 MHz: sharp\n\ntime [us],x [um]\n # more\n0,"1"\n,\n1,2\n'
+
+
+def test_cells_lines_and_comments(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\ufeff" + TEXT, encoding="utf-8")
+    cells = read_cells(path, "the table")
+    assert cells.rows == [(4, ["time [us]", "x [um]"]), (6, ["0", "1"]), (8, ["1", "2"])]
+    assert cells.comments == {"rate": "1 MHz: sharp"}
+    assert [line for line, _cells in split_cells(TEXT, "a", gaps=True).rows] == [4, 6, 7, 8]
+
+
+def test_what_is_no_text(tmp_path: Path) -> None:
+    with refused(None, file="none.csv"):
+        read_cells(tmp_path / "none.csv", "the table")
+    with refused(None, file="x" * 280):
+        read_cells(tmp_path / f"{'x' * 280}.csv", "the table")
+    with refused(None):
+        decoded(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + bytes(range(256)), "a.csv")
+    with refused("line 2"):
+        split_cells('t\n"1\n', "a")
