@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import printhammer as ph
+from printhammer.chaos.strobe.points import strobes
+from printhammer.run.regime import Regime
 
 BALL = ph.load("tufillaro-1992")
 FREQUENCY, RESTITUTION = 60.0, 0.5
@@ -17,7 +19,7 @@ def force(centimetres: float) -> float:
     return BALL.mass * 0.01 * centimetres * OMEGA**2
 
 
-def cycle(centimetres: float) -> int:
+def cycle(centimetres: float, restitution: float = RESTITUTION) -> int:
     """Periods of the table from one take-off of the ball from rest to the next, flight by flight."""
     height = 0.01 * centimetres
 
@@ -46,7 +48,7 @@ def cycle(centimetres: float) -> int:
             low, high = (middle, high) if rises(middle, t, v) > 0.0 else (low, middle)
         u = v + height * OMEGA * math.cos(OMEGA * t) - GRAVITY * (high - t)
         arrives = u - height * OMEGA * math.cos(OMEGA * high)
-        t, v = high, -RESTITUTION * arrives
+        t, v = high, -restitution * arrives
         if v < 1e-10 and pushed(t):
             waits = (leaves - t) % (1.0 / FREQUENCY)
             return round((t + waits - leaves) * FREQUENCY)
@@ -73,3 +75,39 @@ def test_basins_of_a_sticking_cycle_beside_a_bouncing_one() -> None:
     found = ph.basins(BALL, drive=ph.SineForce(force(0.0115), FREQUENCY), x=(1e-6, 6e-4, 8), v=(-0.1, 0.1, 8))
     assert [attractor.name for attractor in found.attractors] == ["period-2", "period-14"]
     assert found.counts[0] == 0
+
+
+def test_a_cycle_longer_than_64_that_comes_to_rest_is_superstable() -> None:
+    acceleration = 18.72
+    assert cycle(100.0 * acceleration / OMEGA**2, 0.63) > 64
+    regime = Regime.of(
+        BALL.replace("backstop.restitution", 0.63), drive=ph.SineForce(BALL.mass * acceleration, FREQUENCY)
+    )
+    (points,) = strobes(regime, points=1, firings=(201, 1200))
+    judged = points.verdict
+    assert judged is not None
+    assert (judged.name, judged.period, judged.exponent) == ("superstable", None, -math.inf)
+    assert judged.rests >= 2
+    assert judged.reason == ""
+    assert "inf" not in judged.evidence
+
+
+def test_a_period_that_hangs_on_the_last_bits_says_so() -> None:
+    # The first cycle changes with the tolerance; the second one is the same at any.
+    amplitudes = 0.01600361819149, force(0.0115)
+    diagram = ph.bifurcation(
+        BALL,
+        parameter="drive.amplitude",
+        values=np.array(amplitudes),
+        drive=ph.SineForce(amplitudes[0], FREQUENCY),
+        firings=500,
+        refine=0,
+        tolerance=1e-9,
+    )
+    assert diagram.cycles[0, 1] == 14
+    assert diagram.sensitive.tolist() == [[True, False]]
+    regime = Regime.of(BALL, drive=ph.SineForce(amplitudes[1], FREQUENCY))
+    (points,) = strobes(regime, points=1, firings=(201, 300), every_exponent=True)
+    assert points.verdict is not None
+    assert not points.verdict.hangs_on_rounding
+    assert [name for _tolerance, name in points.verdict.elsewhere] == ["period-14"] * 2

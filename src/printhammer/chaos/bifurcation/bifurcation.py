@@ -25,11 +25,11 @@ from printhammer.run.regime import Fired, Firing, Regime
 from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
 
-FIRINGS: Final = 300
-"""Firings of a train unless told otherwise."""
+FIRINGS: Final = 1000
+"""Default number of firings of a train."""
 
-TRANSIENT: Final = 100
-"""Of these, firings that are left out at the beginning."""
+_JUDGED: Final = 200
+"""Number of firings after the default transient."""
 
 REFINE: Final = 2
 """Times that the steps between neighbours that differ are halved, unless told otherwise."""
@@ -64,7 +64,7 @@ def bifurcation(
     parameter: str | None = None,
     values: npt.ArrayLike | None = None,
     firings: SupportsIndex = FIRINGS,
-    transient: SupportsIndex = TRANSIENT,
+    transient: SupportsIndex | None = None,
     direction: Direction = "from rest",
     state: tuple[float, float] | None = None,
     refine: SupportsIndex = REFINE,
@@ -86,7 +86,8 @@ def bifurcation(
         Instead: the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
         values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
     firings, transient : int, optional
-        Firings at each value, and how many of these are left out at the beginning.
+        Number of firings at each value, and of those to discard at the beginning: by default all but 200, at
+        least a third. With few firings, trains that settle slowly are undecided.
     direction : str, optional
         "from rest": every train begins at rest, with nothing fired before. "up", "down": it begins where the
         train at the value before, or after, ended, with the pulses before under way; the first begins at
@@ -115,7 +116,9 @@ def bifurcation(
         A KeyboardInterrupt, with what was done.
     """
     name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
-    count, skipped = read_count(firings, "firings"), read_count(transient, "transient", least=0)
+    count = read_count(firings, "firings")
+    default = max(count - _JUDGED, count // 3)
+    skipped = default if transient is None else read_count(transient, "transient", least=0)
     if count - skipped < 2:
         raise InputError.of("transient", transient, f"at least 2 fewer than the {count} firings")
     if direction not in DIRECTIONS:
@@ -139,6 +142,7 @@ def bifurcation(
             builder.refine(level)
         if exponents:
             builder.measure()
+        builder.compare()
     except KeyboardInterrupt:
         raise InterruptedDiagram(_result(builder)) from None
     return _result(builder)
@@ -164,6 +168,7 @@ def _result(builder: DiagramBuilder) -> Bifurcation:
         distances=table.distances[rows],
         exponents=builder.exponents[rows],
         standard_errors=builder.errors[rows],
+        sensitive=builder.sensitive[rows],
         levels=builder.levels[order],
         carried=table.carried,
         tolerance=builder.effort.tolerance,

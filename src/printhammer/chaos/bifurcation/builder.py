@@ -36,7 +36,8 @@ from printhammer.chaos.bifurcation.columns import (
     scales_of_columns,
     state_or_rest,
 )
-from printhammer.chaos.strobe.train import exponents_onward, forgets
+from printhammer.chaos.strobe.resting import exact_cycle, rests_of
+from printhammer.chaos.strobe.train import FINER, LONG_CYCLE, exponents_onward, forgets
 from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
@@ -175,6 +176,7 @@ class DiagramBuilder:
         whole, none = np.zeros(0, np.int64), np.zeros(0)
         self.values, self.levels, self.exponents, self.errors = none, whole, none, none
         self.table = Trains([], blank_columns(0, self.points), whole, none, np.zeros((0, 4)))
+        self.sensitive = np.zeros(0, np.bool_)
         self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
@@ -193,6 +195,7 @@ class DiagramBuilder:
         table.distances = np.append(table.distances, nothing)
         table.scales = np.concatenate([table.scales, scales])
         self.exponents, self.errors = np.append(self.exponents, nothing), np.append(self.errors, nothing)
+        self.sensitive = np.append(self.sensitive, np.zeros(len(every), np.bool_))
         self.values = np.append(self.values, values)
         self.levels = np.append(self.levels, np.full(len(values), level))
         self.known += len(every)
@@ -280,7 +283,39 @@ class DiagramBuilder:
         put(self.table.columns, rows, columns)
         self.table.cycles[list(rows)] = cycles
         self.table.distances[list(rows)] = distances
+        for row in np.flatnonzero(cycles == 0).tolist():
+            if self.rests(columns, row, self.table.regimes[rows[row]]):
+                self.exponents[rows[row]], self.errors[rows[row]] = -math.inf, math.inf
         self.done += len(rows)
+
+    def rests(self, columns: Columns, row: int, regime: Regime) -> bool:
+        """Whether a train without a period up to 64 comes to rest on its backstop in a longer cycle."""
+        if not forgets(regime) or columns.status[row] != OK or regime.phase:
+            return False
+        points = np.column_stack([columns.x[row], columns.v[row]])
+        count = exact_cycle(points)
+        return bool(count and rests_of(regime, points[-count:], self.effort.tolerance))
+
+    def compare(self) -> None:
+        """Mark the trains whose period differs at finer tolerances.
+
+        A ball that comes to rest forgets its past, but between two rests a small error may grow to the size
+        of the motion; the length of its cycle is then that of the rounding.
+        """
+        table = self.table
+        long = table.cycles >= LONG_CYCLE
+        rows = [int(row) for row in np.flatnonzero(long) if forgets(table.regimes[row])]
+        if not rows:
+            return
+        regimes = [table.regimes[row] for row in rows]
+        fronts, scales = np.full(len(rows), math.inf), table.scales[rows]
+        # From rest to rest once, and then twice round.
+        transient = int(table.cycles[rows].max())
+        for share in FINER:
+            finer = self.effort.at(share * self.effort.tolerance)
+            again = run_in_stretches(regimes, table.columns.last[rows], 4 * transient, transient, finer)
+            cycles, _distances = cycles_of(again, fronts, scales)
+            self.sensitive[rows] |= cycles != table.cycles[rows]
 
     def tell(self, done: int) -> None:
         """Tell how many trains are done; those that are run again to close joints do not count."""
@@ -295,7 +330,7 @@ class DiagramBuilder:
             # A start inside the pack would need its memory; such a train stays undecided.
             if branch >= 0.0 or math.isnan(x):
                 continue
-            if columns.status[row] == OK and not table.cycles[row]:
+            if columns.status[row] == OK and not table.cycles[row] and math.isnan(self.exponents[row]):
                 begun[row] = regime, (x, v, *(electric if regime.fired.quantity == "voltage" else ()))
         self.known += len(begun)
         done = self.done

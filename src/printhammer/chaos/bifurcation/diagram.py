@@ -21,7 +21,7 @@ import numpy.typing as npt
 from printhammer.chaos.bifurcation.builder import SAME
 from printhammer.chaos.bifurcation.columns import orbit_distance
 from printhammer.chaos.strobe.train import exponents_onward
-from printhammer.chaos.strobe.verdict import SIGNIFICANT, is_positive
+from printhammer.chaos.strobe.verdict import SIGNIFICANT, SUPERSTABLE, is_positive
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD, RATE
 from printhammer.results import Column, Declared, Result, column, coordinate, derived, part, scalar
@@ -46,7 +46,7 @@ MOST_UNDECIDED: Final = 32
 class Window(Declared):
     """Neighbouring values of the parameter with the same verdict; values and width in SI."""
 
-    verdict: str = part('"period-q", "strange" or "undecided"')
+    verdict: str = part('"period-q", "strange", "superstable" or "undecided"')
     period: int = part("number q; 0 where there is none")
     low: float = part("least value")
     high: float = part("largest value")
@@ -173,6 +173,13 @@ class Bifurcation(Result, rows="direction column"):
         name="standard_error",
         head="standard error",
     )
+    sensitive: BoolArray = column(
+        "1",
+        "whether the period differs at a tenth or a hundredth of the tolerance",
+        "direction column",
+        more="computed for periods from 5 on of motions that may come to rest on a rigid backstop",
+        dtype=np.int8,
+    )
     status: TextArray = column("", "how the run ended", "direction column")
     levels: IntArray = column(
         "1",
@@ -206,7 +213,9 @@ class Bifurcation(Result, rows="direction column"):
             widths = cells(self.values)
             share = float(widths[hysteresis(self)].sum() / (widths.sum() or 1.0))
             lines.append(f"Up and down lead to different attractors at {100.0 * share:.2f} % of the range.")
-        return Summary([*map(self._windows_grid, self.directions), *lines, *self._undecided()])
+        return Summary(
+            [*map(self._windows_grid, self.directions), *lines, *self._undecided(), *self._sensitive()]
+        )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
         """Return the formatter of parameter values, with digits that tell neighbours apart, and the unit."""
@@ -239,7 +248,7 @@ class Bifurcation(Result, rows="direction column"):
     def _undecided(self) -> list[str]:
         """Return why trains that came to their end are undecided, a sentence for each reason."""
         undecided = (self.verdicts == "undecided") & (self.status == "ok")
-        known = undecided & np.isfinite(self.exponents)
+        known = undecided & ~np.isnan(self.exponents)
         settling = known & (self.exponents < -SIGNIFICANT * self.standard_errors)
         reasons = (
             (
@@ -257,6 +266,12 @@ class Bifurcation(Result, rows="direction column"):
             f"{int(some.sum())} of {count} undecided trains: {why}." for some, why in reasons if some.any()
         ]
 
+    def _sensitive(self) -> list[str]:
+        """Return how many periods hang on rounding, if any do."""
+        count = int(self.sensitive.sum())
+        whose = "1 period changes" if count == 1 else f"{count} periods change"
+        return [f"{whose} at a finer tolerance: long cycles hang on the last bits."] if count else []
+
     @property
     @derived("1", "part of the period between a firing and its point")
     def phase(self) -> float:
@@ -266,7 +281,10 @@ class Bifurcation(Result, rows="direction column"):
     @property
     @derived("", "verdict", "direction column", name="verdict")
     def verdicts(self) -> TextArray:
-        """Verdicts, shape (D, C): "period-q", "strange" or "undecided": `printhammer.chaos.strobe.verdict`.
+        """Verdicts, shape (D, C), as in `printhammer.chaos.strobe.verdict`.
+
+        "period-q", "strange", "undecided"; or "superstable": the armature comes to rest on the backstop, in
+        a cycle longer than 64 firings.
 
         Undecided are trains without a period whose exponent was not computed, or is not positive by three
         standard errors, and those whose run ended early.
@@ -275,6 +293,7 @@ class Bifurcation(Result, rows="direction column"):
         for q in np.unique(self.cycles[self.cycles > 0]).tolist():
             names[self.cycles == q] = f"period-{q}"
         names[(self.cycles == 0) & (self.exponents > SIGNIFICANT * self.standard_errors)] = "strange"
+        names[(self.cycles == 0) & (self.exponents == -np.inf)] = SUPERSTABLE
         return names
 
     @property

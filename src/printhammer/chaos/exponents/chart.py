@@ -29,6 +29,7 @@ from printhammer.chaos.exponents.lyapunov import (
     lyapunov,
 )
 from printhammer.chaos.strobe.train import Train
+from printhammer.chaos.strobe.verdict import FORGETS
 from printhammer.drive.base import Overlap
 from printhammer.drive.input import read_count
 from printhammer.drive.trains import Drive
@@ -89,11 +90,14 @@ class LyapunovChart(Result, rows="period"):
         undecided = sum("undecided" in pair for pair in pairs)
         chaotic = sum(pair == ("chaotic", "chaotic") for pair in pairs)
         tally = (
-            f"{len(pairs)} trains: both tests agree on {agree}, {chaotic} of them chaotic;"
-            f" they differ on {len(pairs) - agree - undecided}; on {undecided} one of them is undecided"
+            f"{len(pairs)} trains: the exponent and the 0-1 test agree on {agree}, {chaotic} of them chaotic;"
+            f" they disagree on {len(pairs) - agree - undecided}; on {undecided} one of them is undecided"
         )
         first, second = (
-            [f"{each:+.4g} ± {error:.2g}" for each, error in zip(values, errors, strict=True)]
+            [
+                "none" if each == -np.inf else f"{each:+.4g} ± {error:.2g}"
+                for each, error in zip(values, errors, strict=True)
+            ]
             for values, errors in zip(self.exponents.T, self.standard_errors.T, strict=True)
         )
         dimensions = zip(self.dimension.tolist(), self.dimension_error.tolist(), strict=True)
@@ -106,7 +110,9 @@ class LyapunovChart(Result, rows="period"):
             Cells("0-1 test", [verdict_text(each) for each in self.zero_one], left=True),
             Cells("verdict", [verdict_text(each) for each in self.verdict], left=True),
         ]
-        return Summary([Grid(columns, most=40), "", tally])
+        resting = int((self.exponents[:, 0] == -np.inf).sum())
+        forget = [f"{resting} trains have {FORGETS}"] if resting else []
+        return Summary([Grid(columns, most=40), "", tally, *forget])
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
 from printhammer.chaos.strobe.points import Strobe, strobe_of
-from printhammer.chaos.strobe.train import States, Train, exponents_of
-from printhammer.chaos.strobe.verdict import SIGNIFICANT, Verdict, verdict
+from printhammer.chaos.strobe.train import States, Train, exponents_of, forgets, run_trains
+from printhammer.chaos.strobe.verdict import FORGETS, SIGNIFICANT, Verdict, verdict
 from printhammer.derivatives.states import Exponent, standard_error
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -117,20 +117,26 @@ class Lyapunov(Result, rows="firing exponent"):
             each, error, second = (
                 float(values[k]) for values in (self.exponents, self.standard_errors, self.per_second)
             )
-            rows.append(
-                (f"exponent {k + 1}", f"{each:+.4g} ± {error:.2g} per firing, {second:+.4g} per second")
-            )
+            known = f"{each:+.4g} ± {error:.2g} per firing, {second:+.4g} per second"
+            rows.append((f"exponent {k + 1}", FORGETS if each == -math.inf else known))
         test = self.zero_one
-        agree = {True: "agree", False: styled("bad", "differ"), None: "do not both decide"}
+        agree = {
+            True: "the exponent and the 0-1 test agree",
+            False: styled("bad", "the exponent and the 0-1 test disagree"),
+            None: "the exponent and the 0-1 test do not both decide",
+        }
         kink = "the motion passes a touch without velocity, where it has no derivative"
         rows += [
-            ("sum", f"{self.total:+.6g} ± {self.total_error:.2g} per firing"),
+            (
+                "sum",
+                None if self.total == -math.inf else f"{self.total:+.6g} ± {self.total_error:.2g} per firing",
+            ),
             ("dimension", dimension_text(self.dimension, self.dimension_error)),
             ("0-1 test", "–" if test is None else f"{verdict_text(test.verdict)}: {test.phrase}"),
             ("because", (test.reason or None) if test is not None else None),
             ("verdict", verdict_text(self.verdict.name)),
             ("because", self.verdict.reason or None),
-            ("both tests", agree[self.agree]),
+            ("comparison", agree[self.agree]),
             ("remark", None if self.smooth else kink),
         ]
         return Summary([Facts(rows)])
@@ -344,6 +350,10 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
     points = _points(train, first, last, exponent, tolerance)
     factors = np.column_stack([exponent.factors, exponent.second_factors])
     judged = points.verdict
+    if judged is not None and judged.exponent == -math.inf and exponent.ok:
+        # Between two rests a run over long times may leave its cycle; the sum over a cycle is minus infinity.
+        none = np.full(len(exponent.factors), -math.inf)
+        exponent = replace(exponent, factors=none, second_factors=none)
     whole = whole_cycles(factors, cycle_of(None if judged is None else judged.period, len(factors)))
     total = whole.sum(axis=1)
     values, errors, total_error = np.full(2, np.nan), np.full(2, np.nan), math.nan
@@ -381,5 +391,9 @@ def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: 
     stopped = "" if exponent.ok else exponent.status
     distances = states.distances(train)
     ends_at = None if stopped else states.settled(train, distances)
-    judged = verdict(distances, (first, last), tolerance, exponent, stopped, ends_at)
+    if forgets(train.regime) and not stopped:
+        # A period at a time, where rounding does not grow with time.
+        _states, (judged,) = run_trains([train], firing, (first, last), Effort(tolerance, threads=1))
+    else:
+        judged = verdict(distances, (first, last), tolerance, exponent, stopped, ends_at)
     return strobe_of(train, firing, states, tolerance, judged)

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.orbits.settled import Settled, settled
-from printhammer.chaos.strobe.verdict import Verdict, period_of, repeats, verdict
+from printhammer.chaos.strobe.resting import exact_cycle, rests_of
+from printhammer.chaos.strobe.verdict import LARGEST_PERIOD, Verdict, period_of, repeats, verdict
 from printhammer.derivatives.states import Exponent
 from printhammer.drive.trains import Drive
 from printhammer.hammer.hammer import Hammer
@@ -34,6 +35,9 @@ NO_CURRENT: Final = AT_REST[2:]
 
 FROM_REST: Final[State] = (math.nan, math.nan, *AT_REST)
 """Row of a state that stands for a train that begins at rest, with nothing fired before."""
+
+LONG_CYCLE: Final = 5
+"""Shortest cycle, in firings, of which rests on the backstop are looked for. Arbitrary."""
 
 STRETCH: Final = 1
 """Firings that are run at a time where a train may be run piece by piece.
@@ -145,6 +149,20 @@ class States:
             return None
         return settled(train.regime.at_firings, self.points, period, _scales(train))
 
+    def resting(self, train: Train, distances: FloatArray, tolerance: float) -> tuple[int, int] | None:
+        """Return the cycle of a motion that comes to rest, in firings, and its rests; None for another one.
+
+        The cycle is 0 where the motion does not repeat; then at least two rests are asked for. Cycles of a
+        few firings are left out: rounding does not change them.
+        """
+        if not forgets(train.regime):
+            return None
+        count = period_of(distances) or exact_cycle(self.points)
+        if 0 < count < LONG_CYCLE:
+            return None
+        rests = rests_of(train.regime, self.points[-count:, :2], tolerance)
+        return (count, rests) if rests > (count == 0) else None
+
 
 def _scales(train: Train) -> FloatArray:
     width, speed = window_of(train.hammer, train.drive).half_widths
@@ -201,23 +219,52 @@ def run_trains(
     ends_at = effort.quiet.mapped(
         lambda i: None if stopped[i] else watched[i].settled(trains[i], distances[i]), range(total)
     )
+    resting = effort.quiet.mapped(
+        lambda i: None if stopped[i] else watched[i].resting(trains[i], distances[i], effort.tolerance),
+        range(total),
+    )
     open_cases = [
-        i for i in range(total) if not stopped[i] and (every_exponent or period_of(distances[i]) is None)
+        i
+        for i in range(total)
+        if not stopped[i] and resting[i] is None and (every_exponent or period_of(distances[i]) is None)
     ]
     onward = effort.within(2 * total - len(open_cases), 2 * total)
     exponents = exponents_of([trains[i] for i in open_cases], judged, onward)
     growth = dict(zip(open_cases, exponents, strict=True))
-    return states, [
-        verdict(
-            distances[i],
-            judged,
-            effort.tolerance,
-            growth.get(i),
-            stopped[i],
-            ends_at[i],
-        )
+    verdicts = [
+        verdict(distances[i], judged, effort.tolerance, growth.get(i), stopped[i], ends_at[i], resting[i])
         for i in range(total)
     ]
+    long = [i for i, each in enumerate(verdicts) if each.period is not None and each.rests]
+    for i, elsewhere in zip(long, _at_finer([trains[i] for i in long], judged, effort), strict=True):
+        verdicts[i] = replace(verdicts[i], elsewhere=elsewhere)
+    return states, list(verdicts)
+
+
+FINER: Final = (0.1, 0.01)
+"""Shares of the tolerance at which the period of a motion that comes to rest is computed again."""
+
+
+def _at_finer(
+    trains: Sequence[Train], judged: tuple[int, int], effort: Effort
+) -> list[tuple[tuple[float, str], ...]]:
+    """Return tolerances and periods of trains at a tenth and a hundredth of the tolerance.
+
+    Between two rests small errors grow; where they grow to the size of the motion its period is that of the
+    rounding.
+    """
+    firings = np.arange(judged[0], judged[1] + 1)
+    rows: list[tuple[tuple[float, str], ...]] = [() for _ in trains]
+    for share in FINER:
+        finer = effort.at(share * effort.tolerance)
+        states, _ = run_trains(
+            [replace(train, regime=train.regime.at_firings) for train in trains], firings, None, finer
+        )
+        for i, own in enumerate(states):
+            period = period_of(own.distances(trains[i]))
+            name = f"no period up to {LARGEST_PERIOD}" if period is None else f"period-{period}"
+            rows[i] = (*rows[i], (finer.tolerance, name))
+    return rows
 
 
 def _ensemble(

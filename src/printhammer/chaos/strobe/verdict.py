@@ -3,7 +3,9 @@
 A train of period T has the period q if its states q firings apart agree, and q is the smallest such number;
 where they do but still move, Newton's method has to confirm it, see `printhammer.chaos.orbits.settled`.
 It is strange if there is no such q and neighbouring motions part: the largest exponent of the strobe map is
-positive by three standard errors. Everything else is undecided, with the reason.
+positive by three standard errors. It is superstable if there is no such q and the armature comes to rest on
+its backstop again and again: whatever it did before is forgotten there, and it repeats a cycle longer than 64
+firings. Everything else is undecided, with the reason.
 """
 
 from __future__ import annotations
@@ -29,6 +31,11 @@ AGREEMENT: Final = 1e-6
 SIGNIFICANT: Final = 3.0
 """Number of standard errors by which the exponent of a strange train is positive."""
 
+SUPERSTABLE: Final = "superstable"
+"""Verdict on a motion that comes to rest on its backstop again and again, without a period up to 64."""
+
+FORGETS: Final = "no exponent: the motion comes to rest on the backstop and forgets its past"
+
 FIRST: Final = 1001
 """First firing that is judged unless told otherwise; the very first one is number 1."""
 
@@ -41,7 +48,7 @@ _STOPPED: Final = "the run ended before firing"
 class Verdict(Declared):
     """What kind of motion a train leads to, and the evidence."""
 
-    name: str = part('"period-1", "period-2", ..., "strange" or "undecided"')
+    name: str = part('"period-1", "period-2", ..., "strange", "superstable" or "undecided"')
     period: int | None = part("number of firings after which the states repeat")
     distance: float = part(
         "largest distance of states `nearest` firings apart, in half-widths of the window",
@@ -62,6 +69,15 @@ class Verdict(Declared):
         more="NaN where the states alone show it",
         default=math.nan,
     )
+    rests: int = part(
+        "number of rests on the backstop, in a cycle of a motion that repeats, else in the judged firings",
+        more="0 where the exponent was not computed, and no cycle is longer than 4 firings",
+        default=0,
+    )
+    elsewhere: tuple[tuple[float, str], ...] = part(
+        "tolerances and verdicts of the same train there, of a periodic motion that comes to rest",
+        default=(),
+    )
 
     @property
     def stopped(self) -> bool:
@@ -74,6 +90,16 @@ class Verdict(Declared):
         return self.name == "strange"
 
     @property
+    def hangs_on_rounding(self) -> bool:
+        """Whether the period differs at finer tolerances: it hangs on the last bits of a long cycle."""
+        return any(name != self.name for _tolerance, name in self.elsewhere)
+
+    @property
+    def superstable(self) -> bool:
+        """Whether the verdict is "superstable"."""
+        return self.name == SUPERSTABLE
+
+    @property
     def phrases(self) -> list[str]:
         """The evidence, a phrase each."""
         phrases = []
@@ -82,6 +108,8 @@ class Verdict(Declared):
             if not math.isnan(self.multiplier):
                 approached = "they approach an orbit that Newton's method finds"
                 phrases.append(f"{approached}, of largest multiplier {self.multiplier:.6g}")
+        elif self.superstable and self.distance == 0.0:
+            phrases.append(f"states {_firings(self.nearest or 0)} apart agree to the last bit")
         elif self.nearest is not None:
             phrases.append(
                 f"no period up to {LARGEST_PERIOD}: states {_firings(self.nearest)} apart come closest,"
@@ -91,8 +119,13 @@ class Verdict(Declared):
             phrases.append(
                 f"no period up to {LARGEST_PERIOD}: states that far apart lie on other branches of the pack"
             )
-        if not math.isnan(self.exponent):
+        if self.exponent == -math.inf:
+            phrases.append(FORGETS)
+        elif not math.isnan(self.exponent):
             phrases.append(f"largest exponent {self.exponent:+.4g} ± {self.standard_error:.2g} per firing")
+        if self.hangs_on_rounding:
+            others = ", ".join(f"{name} at {tolerance:g}" for tolerance, name in self.elsewhere)
+            phrases.append(f"the period hangs on the last bits: {others}")
         phrases.append(f"firings {self.first} to {self.last}, tolerance {self.tolerance:g}")
         return phrases
 
@@ -113,6 +146,8 @@ class Verdict(Declared):
             "tolerance": self.tolerance,
             "multiplier": _finite(self.multiplier),
             "reason": self.reason,
+            "rests": self.rests,
+            "at_other_tolerances": {f"{tolerance:g}": name for tolerance, name in self.elsewhere},
         }
 
     def __str__(self) -> str:
@@ -162,37 +197,53 @@ def verdict(
     exponent: Exponent | None,
     stopped: str = "",
     settled: Settled | None = None,
+    resting: tuple[int, int] | None = None,
 ) -> Verdict:
     """Judge a train by the distances from `repeats` between the first and the last of some firings.
 
     `exponent` is the largest one over these firings, None where it was not computed; `stopped` says how the
     run ended if that was before the last of them. `settled` is what became of the number after which the
-    states agree; without it that is the period.
+    states agree; without it that is the period. `resting` are the firings after which a motion that comes to
+    rest repeats, 0 if unknown, and the number of rests seen.
     """
     period = None if stopped else period_of(distances)
     closest = period
     if period is None and np.isfinite(distances).any():
         closest = int(np.argmin(distances)) + 1
-    strange, reason = False, ""
+    judged, reason = "undecided", ""
+    rests = 0 if exponent is None else int((exponent.factors == -math.inf).sum())
+    if resting is not None:
+        rests = resting[1]
     if stopped:
         reason = f"{_STOPPED} {firings[1]}: {stopped}"
     elif period is not None and settled is not None:
         period, reason = settled.period, settled.reason
         closest = period or closest
+    elif period is None and resting is not None:
+        judged, closest = SUPERSTABLE, resting[0] or closest
     elif period is None:
-        strange, reason = _strange(exponent)
+        judged, reason = _without_period(exponent)
+    distance = math.nan if closest is None else 0.0
+    if closest is not None and closest <= len(distances):
+        distance = float(distances[closest - 1])
+    known = math.nan, math.nan
+    if resting is not None:
+        known = -math.inf, math.inf
+    elif exponent is not None:
+        known = exponent.value, exponent.standard_error
     return Verdict(
-        name="strange" if strange else ("undecided" if period is None else f"period-{period}"),
+        name=judged if period is None else f"period-{period}",
         period=period,
-        distance=math.nan if closest is None else float(distances[closest - 1]),
+        distance=distance,
         nearest=closest,
-        exponent=math.nan if exponent is None else exponent.value,
-        standard_error=math.nan if exponent is None else exponent.standard_error,
+        exponent=known[0],
+        standard_error=known[1],
         first=firings[0],
         last=firings[1],
         tolerance=tolerance,
         reason=reason,
         multiplier=math.nan if settled is None or stopped else settled.multiplier,
+        rests=rests,
     )
 
 
@@ -201,17 +252,22 @@ def is_positive(exponent: Exponent) -> bool:
     return bool(exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error)
 
 
-def _strange(exponent: Exponent | None) -> tuple[bool, str]:
-    """Return whether neighbouring motions part, or why one cannot tell."""
+def _without_period(exponent: Exponent | None) -> tuple[str, str]:
+    """Return the verdict on a train without a period up to 64, and the reason of an undecided one."""
+    name = "undecided"
     if exponent is None:
-        return False, "no period, and the exponent was not computed"
+        return name, "no period, and the exponent was not computed"
     if not exponent.ok:
-        return False, f"no period, and the tangent flow ended early: {exponent.status}"
+        return name, f"no period, and the tangent flow ended early: {exponent.status}"
+    if exponent.value == -math.inf:
+        if int((exponent.factors == -math.inf).sum()) > 1:
+            return SUPERSTABLE, ""
+        return name, "no period, and the motion comes to rest on the backstop only once; more firings tell"
     if not exponent.smooth:
-        return False, "no period, and no exponent, since the motion passes a touch without velocity"
+        return name, "no period, and no exponent, since the motion passes a touch without velocity"
     if is_positive(exponent):
-        return True, ""
-    return False, (
+        return "strange", ""
+    return name, (
         f"no period up to {LARGEST_PERIOD}, and the largest exponent is not positive by"
         f" {SIGNIFICANT:g} standard errors"
     )

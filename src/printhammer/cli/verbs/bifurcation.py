@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 _RANGE: Final = ("0.8 ms", "1.35 ms")
 _PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
-_JUDGED: Final = 200
-"""Firings that are classified, if there are enough: as many as `printhammer.strobe` needs."""
 _of = partial(opt.text, panel=_PARAMETER)
 
 
@@ -82,8 +80,6 @@ def bifurcation(
         firing["period"] = None
     axis = _axis(hammer, parameter, (lowest, highest), values, firing)
     passed |= {"firings": firings, "exponents": exponents}
-    # With few firings at first, trains that settle slowly pass for undecided.
-    passed.setdefault("transient", max(firings - _JUDGED, firings // 3))
     interrupted = False
     try:
         with job.counting("trains") as tell:

@@ -27,10 +27,11 @@ SHADES: Final = {
     "period-4": "#56b4e9",
     "other period": "#cc79a7",
     "strange": "#4d4d4d",
-    "no period": "#c4c4c4",
+    "superstable": "#8a6d3b",
+    "undecided": "#c4c4c4",
     "run ended early": "#7a1f1f",
 }
-"""Colour of the band of a verdict; "no period" is what is not known to be strange."""
+"""Colour of the band of a verdict."""
 
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
 """Colours of points that one direction alone leads to; none is that of a band."""
@@ -222,8 +223,6 @@ def _bands(strip: Axes, diagram: Bifurcation, across: Scale) -> None:
 def _kind(verdict: str, stopped: bool) -> str:
     if stopped:
         return "run ended early"
-    if verdict == "undecided":
-        return "no period"
     return verdict if verdict in SHADES else "other period"
 
 
