@@ -9,7 +9,7 @@ from tests.errors import refused
 from tests.hammers import STOP
 
 import printhammer as ph
-from printhammer.run.simulate import CYCLE
+from printhammer.run.window import CYCLE
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.printing.dots.nominal import WAIT, pulse_of
+from printhammer.printing.dots.nominal import pulse_of
 from printhammer.results import Declared, part, scalar
 from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
@@ -48,7 +48,6 @@ _LEAST: Final = 8  # Samples of the window
 _MOST: Final = 200_000  # Samples of a record
 _SPAN: Final = 1.5  # Of the converter, in parts of the largest value around the touch
 _FLOWING: Final = 0.02  # Current at the touch below which it counts as over, in parts of its largest
-_DOUBLINGS: Final = 6
 _MOST_BEFORE: Final = 0.5  # Most that is looked at before the touch, in parts of the flight time
 _AROUND: Final = 0.2  # Largest shift within a window, in parts of the contact
 _FINEST: Final = 400  # Steps of the shifts in a contact
@@ -191,13 +190,9 @@ class ImpactEstimator:
 
     def _dot(self) -> tuple[float, float]:
         """Return flight time and time of contact of the nominal hammer, s."""
-        span = WAIT
-        for _ in range(_DOUBLINGS):
-            run = simulate(self.hammer, PulseTrain(self.pulse), duration=span, points=2)
-            dot: Any = run.dots[0]
-            if dot.flight_time is not None and dot.contact_time is not None:
-                return float(dot.flight_time), float(dot.contact_time)
-            span *= 2.0
+        dot: Any = simulate(self.hammer, PulseTrain(self.pulse), points=2).dots[0]
+        if dot.flight_time is not None and dot.contact_time is not None:
+            return float(dot.flight_time), float(dot.contact_time)
         raise InputError(
             f"{self.hammer.path}: a single pulse makes no dot",
             file=self.hammer.path,

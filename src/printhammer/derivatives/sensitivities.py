@@ -298,7 +298,7 @@ def sensitivities(
     """
     check_tolerance(tolerance)
     wanted, left_out = _constants(hammer, drive, constants)
-    end = end_of_run(drive, duration)
+    end = end_of_run(hammer, drive, duration)
     problem = Problem(hammer, drive, initial_state(hammer, state), 0.0, tolerance)
     initial = np.zeros((3, len(wanted)))
     if state is None:

@@ -175,7 +175,7 @@ def plot_damping(study: DampingStudy) -> Figure:
     none = f"not even {study.grid[0]:g} Hz"
     panels = (
         ("Safe rate  [Hz]", study.safe_rate, none),
-        ("Settle-out  [ms]", 1e3 * study.settle_out, "not in 20 ms"),
+        ("Settle-out  [ms]", 1e3 * study.settle_out, "does not settle"),
         ("Wear: impulse  [mN s a dot]", 1e3 * study.impulse, ""),
     )
     for ax, (name, values, missing) in zip(axes, panels, strict=True):

@@ -23,6 +23,7 @@ from printhammer.results import Facts, Summary
 from printhammer.results.provenance import provenance
 from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import waveform_of
+from printhammer.run.window import CYCLE, wait_of
 from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ TIMES: Final = 512
 """Default number of times of a map; arbitrary."""
 
 TAIL: Final = 1e-3
-"""Time after the last firing, s, shown at the lowest rate; arbitrary."""
+"""Least time after the last firing, s, shown at the lowest rate; arbitrary."""
 
 MOST_CELLS: Final = 200_000_000
 """Largest number of displacements in a map; arbitrary, to refuse typing errors."""
@@ -71,7 +72,8 @@ def frequency_map(
         Number of firings at each rate.
     times : array or int, optional
         Times from the first firing, s or text with units, ascending, or their number, spread evenly from the
-        first firing to 1 ms after the last one at the lowest rate; by default 512.
+        first firing to 1 ms after the last one at the lowest rate, of a slow device to the end of its
+        window; by default 512.
     waveform : Waveform, optional
         Waveform of every firing; by default that of the hammer.
     overlap : str, optional
@@ -90,7 +92,7 @@ def frequency_map(
     fired = waveform_of(hammer, waveform)
     grid = _rates(rates)
     count = read_count(pulses, "pulses")
-    moments = _times(times, (count - 1) / float(grid[0]) + TAIL)
+    moments = _times(times, (count - 1) / float(grid[0]) + tail_of(hammer, fired))
     if grid.size * moments.size > MOST_CELLS:
         raise InputError(
             f"{grid.size} rates x {moments.size} times",
@@ -98,7 +100,7 @@ def frequency_map(
             expected=f"at most {MOST_CELLS} displacements in a map",
         )
     drives = PulseTrains.at_rates(fired, grid, count, overlap)
-    ends = np.maximum(moments[-1], (count - 1) / grid + TAIL)
+    ends = np.maximum(moments[-1], (count - 1) / grid + wait_of(hammer, fired))
     runs = Ensemble(hammer, drives, ends, tolerance=effort.tolerance)
     result = runs.run(dots=True, times=moments, **effort.running)
     dots, x = result.dots, result.x
@@ -122,6 +124,15 @@ def frequency_map(
         **provenance(hammer=hammer, waveform=fired, overlap=overlap, tolerance=effort.tolerance),
     }
     return map_dataset(grid, moments, variables, attributes, {"status": {"codes": codes}})
+
+
+def tail_of(hammer: Hammer, waveform: Waveform) -> float:
+    """Return how long a map goes on after the last firing at its lowest rate, s.
+
+    What the last firing of a slow device does is to be seen.
+    """
+    wait = wait_of(hammer, waveform)
+    return wait if wait > CYCLE else TAIL
 
 
 def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArray, FloatArray]:

@@ -22,7 +22,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.kernel.model.laws import Laws
 from printhammer.kernel.model.modes import MODE_NAMES, OK, STATUS_NAMES
 from printhammer.results import Result, column, part
-from printhammer.run.dot_table import DotTable, ExtraDots
+from printhammer.run.contacts import DotTable, ExtraDots
 from printhammer.run.ensemble_group import MOST_COLUMNS, Fired, Group, Job
 from printhammer.run.motion import Motion
 from printhammer.run.problem import MAX_STEPS, TOLERANCE, check_tolerance, laws_of

@@ -20,11 +20,9 @@ from printhammer.results import Declared, part, scalar
 from printhammer.run.motion import Motion
 from printhammer.run.problem import TOLERANCE, Problem, Stretch, check_tolerance
 from printhammer.run.start import initial_state, read_state, state_beyond
+from printhammer.run.window import end_of
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray
-
-CYCLE: Final = 4e-3
-"""Time after the last firing, s, at which a run ends unless told otherwise."""
 
 Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
 SCHEMES: Final = get_args(Scheme)
@@ -56,8 +54,8 @@ def simulate(
     drive : Drive
         The drive.
     duration : float or str, optional
-        End of the run, s, or text with a unit; by default 4 ms after the last firing, and required for a
-        drive that does not end.
+        End of the run, s, or text with a unit; by default the window of the device after the last firing
+        (`printhammer.run.window`), and required for a drive that does not end.
     state : sequence of float or str, optional
         Displacement, m, and velocity, m/s, or text with units, at time 0; by default the rest state. In the
         pack with the mode and the memory, as in `printhammer.run.ensemble.Strobes`; under a voltage then with
@@ -85,7 +83,7 @@ def simulate(
     if scheme not in SCHEMES:
         raise InputError.of("scheme", scheme, f"one of {', '.join(SCHEMES)}")
     check_tolerance(tolerance)
-    end = end_of_run(drive, duration)
+    end = end_of_run(hammer, drive, duration)
     numbers = None if state is None else read_state(state)
     beyond = state_beyond(hammer, numbers, drive.quantity)
     start = initial_state(hammer, None if numbers is None else numbers[:2])
@@ -124,10 +122,8 @@ def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) 
     return end
 
 
-def end_of_run(drive: Drive, duration: float | str | None) -> float:
-    """Return the end of a run, s: `duration`, or 4 ms after the last firing.
-
-    Under a driver, whose devices may be slow, 4 ms after the supply is off for the last time.
+def end_of_run(hammer: Hammer, drive: Drive, duration: float | str | None) -> float:
+    """Return the end of a run, s: `duration`, or the window of the device after the last firing.
 
     Raises
     ------
@@ -137,7 +133,7 @@ def end_of_run(drive: Drive, duration: float | str | None) -> float:
     if duration is None:
         if not math.isfinite(drive.end):
             raise InputError("duration is missing, and the drive does not end", key="duration")
-        return (drive.end if drive.waveform.replaces else float(drive.times[-1])) + CYCLE
+        return end_of(hammer, drive)
     if isinstance(duration, str):
         from printhammer.units import parse
 

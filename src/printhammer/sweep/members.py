@@ -20,7 +20,8 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import RATE
 from printhammer.results import Declared, part, scalar
-from printhammer.run.simulate import CYCLE
+from printhammer.run.waits import fired_by, waits_of
+from printhammer.run.window import end_of
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.sweep.axes import COUNTS, Axis
 
@@ -93,10 +94,10 @@ class Maker:
         drive = self._drive(row, hammer)
         end = self.base.duration
         if end is None:
-            end = float(drive.times[-1]) + CYCLE
+            end = end_of(hammer, drive)
         return Member(hammer, drive, end, self._state(row, hammer))
 
-    def members(self, rows: FloatArray) -> tuple[IntArray, Members]:
+    def members(self, rows: FloatArray, threads: int | None = None) -> tuple[IntArray, Members]:
         """Return the indices of the rows that yield valid members, and these members."""
         which: list[int] = []
         hammers: list[Hammer] = []
@@ -119,7 +120,7 @@ class Maker:
         if self.base.duration is not None:
             ends = np.full(len(chosen), self.base.duration)
         else:
-            ends = firings_of(drives).last + CYCLE
+            ends = firings_of(drives).last + waits_of(hammers, fired_by(drives), threads)
         return chosen, Members(hammers, drives, ends, np.array(states).reshape(-1, 2))
 
     def _trains(self, rows: FloatArray) -> PulseTrains | None:

@@ -153,7 +153,9 @@ class SpecTable(_Table):
         allow_inf_nan=False,
         description="error in one step",
     )
-    duration: OneQuantity = Field(None, description="end of each run; by default 4 ms after its last firing")
+    duration: OneQuantity = Field(
+        None, description="end of each run; by default 4 ms after its last firing, of a slow device later"
+    )
     chunk: int | None = Field(None, ge=1, description="members of a block of work")
     drive: dict[str, Any] | str = Field(description="the tables of a drive file, or its path")
     state: StateTable = Field(StateTable(), description="initial state")

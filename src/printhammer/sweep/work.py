@@ -62,7 +62,8 @@ def run_chunk(
     results = outputs.empty(len(rows))
     results["status"][:] = NO_HAMMER
     results["reached"][:] = np.nan
-    which, members = Maker(base).members(rows)
+    with _MAKING:
+        which, members = Maker(base).members(rows, threads)
     if not which.size:
         return results
     ensemble = Ensemble(

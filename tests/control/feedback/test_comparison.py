@@ -18,10 +18,10 @@ from printhammer.control.feedback.loop import FRONT_ERROR, SCALE_ERROR
 from printhammer.control.feedback.plant import driver_of
 from printhammer.drive.file import read_drive
 from printhammer.printing.dots.judging import Limits
+from printhammer.printing.dots.pieces import simulate_pieces
 from printhammer.printing.dots.strategy import eight_slot_patterns, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.variability import Perturbation, perturbed
-from printhammer.run.pieces import simulate_pieces
 
 CURRENT = 2.0
 RATE = 1600.0

@@ -8,8 +8,8 @@ from tests.errors import refused
 from tests.hammers import crude
 
 import printhammer as ph
+from printhammer.printing.dots.pieces import simulate_pieces
 from printhammer.printing.dots.strategy import slots_of
-from printhammer.run.pieces import simulate_pieces
 
 PITCH = 4e-4
 

@@ -28,7 +28,9 @@ _record = partial(opt.file, panel=_FILES)
     "run",
     "printhammer run hendriks-1983 --at '0 us, 700 us' --units inch",
     {
-        "duration": opt.quantity("s", "TIME", "End time of the run (default: 4 ms after the last firing)."),
+        "duration": opt.quantity(
+            "s", "TIME", "End time of the run (default: 4 ms after the last firing, later for a slow device)."
+        ),
         "tolerance": opt.TOLERANCE,
         "scheme": opt.choice(
             "default|trapezoid|runge-kutta-4",

@@ -24,7 +24,7 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
-from printhammer.printing.dots.nominal import WAIT, Nominal
+from printhammer.printing.dots.nominal import Nominal
 from printhammer.printing.dots.strategy import Strategy, name_of, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
@@ -39,6 +39,7 @@ from printhammer.results.summary import (
 from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
+from printhammer.run.window import wait_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -255,7 +256,7 @@ def _checked_gaps(asked: npt.ArrayLike) -> FloatArray:
 def _observed(hammer: Hammer, strategy: FeedbackStrategy, rate: float, tolerance: float) -> ObservedRun:
     loop = strategy.loops(hammer, [slots_of([mark == "1" for mark in BURST])], rate)[0]
     drive = loop.drive(strategy.controller.driver.edge)
-    duration = max(float(loop.due[-1]), float(drive.times[-1])) + 0.5 * WAIT
+    duration = max(float(loop.due[-1]), float(drive.times[-1])) + 0.5 * wait_of(hammer)
     motion = simulate(hammer, drive, duration=duration, tolerance=tolerance)
     times, shown = (np.concatenate(parts) for parts in zip(*loop.seen, strict=True))
     return ObservedRun(BURST, motion, times, shown, loop.due)

@@ -32,7 +32,6 @@ from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Judgement, judge
-from printhammer.printing.dots.nominal import WAIT
 from printhammer.printing.dots.strategy import cycle_with_lead_in, slot_times, slots_of
 from printhammer.run.effort import Effort
 from printhammer.run.ensemble import DotTable, Ensemble
@@ -239,7 +238,9 @@ class Press:
             pulses = [of_width(task.pulse, part * task.width) for _at, part in parts]
             drives.append(PulseSequence(pulses, at=[at for at, _part in parts]))
         hammers = [hammer for hammer in self.hammers for _ in rungs]
-        ((dots, _ok),) = yield [Order(hammers, drives * count, WAIT + max(rung.later for rung in rungs))]
+        ((dots, _ok),) = yield [
+            Order(hammers, drives * count, task.window + max(rung.later for rung in rungs))
+        ]
         times, forces = (
             np.concatenate(
                 [each.reshape(count, len(rungs), -1)[:, k, : rung.dots] for k, rung in enumerate(rungs)],
@@ -260,7 +261,7 @@ class Press:
             if id(own) not in drives:
                 pulses = pulses_of(Settings(*own), task.gaps, task.reach, slots, self.rate)
                 drives[id(own)] = sequence(pulses, task.pulse, known)
-        end = float(due[-1]) + WAIT
+        end = float(due[-1]) + task.window
         ((dots, ok),) = yield [Order(self.hammers, [drives[id(own)] for own in settings], end)]
         shape = len(self.hammers), len(slots)
         wanted, times = np.ones(shape, np.bool_), np.broadcast_to(due, shape)

@@ -26,7 +26,7 @@ from printhammer.printing.dots.nominal import Nominal
 from printhammer.results import Declared, scalar
 from printhammer.run.energy import stored_energy
 from printhammer.run.ensemble import Ensemble
-from printhammer.run.simulate import CYCLE
+from printhammer.run.window import wait_of
 from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
@@ -100,10 +100,11 @@ def _given_back(hammer: Hammer, most: float) -> float:
     assert front is not None
     assert hammer.waveform is not None
     speeds = np.sqrt(2.0 * most / hammer.mass * np.linspace(0.0, 1.0, _SPEEDS + 1)[1:])
-    never = PulseTrain(hammer.waveform, at=[2.0 * CYCLE])
-    grid = np.linspace(0.0, CYCLE, _STROBES)
+    longest = wait_of(hammer)
+    never = PulseTrain(hammer.waveform, at=[2.0 * longest])
+    grid = np.linspace(0.0, longest, _STROBES)
     states = np.stack([np.full(_SPEEDS, bottom), -speeds], axis=1)
-    strobes = Ensemble(hammer, never, CYCLE, states=states).run(strobes=[grid] * _SPEEDS).strobes
+    strobes = Ensemble(hammer, never, longest, states=states).run(strobes=[grid] * _SPEEDS).strobes
     assert strobes is not None
     places = np.linspace(bottom, front, _POINTS)
     stored = np.array([stored_energy(hammer, place) for place in places.tolist()])

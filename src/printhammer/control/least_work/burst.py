@@ -50,7 +50,7 @@ from printhammer.run.energy import CoilWork, Ledger, coil_power, stored_energy
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.motion import Motion
 from printhammer.run.problem import TOLERANCE
-from printhammer.run.simulate import CYCLE, simulate
+from printhammer.run.simulate import simulate
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
 from printhammer.units import from_si
 
@@ -480,7 +480,7 @@ def least_work(
     plan.land()
     effort.report(count + 1, count + 1)
     drive = plan.drive()
-    motion = simulate(hammer, drive, duration=drive.end + CYCLE, tolerance=TOLERANCE, ledger=True)
+    motion = simulate(hammer, drive, duration=drive.end + alone.end, tolerance=TOLERANCE, ledger=True)
     return LeastWork(
         hammer=hammer,
         drive=drive,

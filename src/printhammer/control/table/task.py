@@ -22,15 +22,18 @@ from printhammer.printing.dots.settling import settled_from, touches
 from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
+from printhammer.run.window import FLIGHTS, wait_of
 from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, in parts of the way to the pack
 QUIET: Final = 2e-4
-_LONGEST: Final = 20e-3  # Time in which the hammer has to settle after a single pulse, s
+_LONGEST: Final = 20e-3  # Least time in which the hammer has to settle after a single pulse, s
+_WINDOWS: Final = 2.0  # The same in windows of its runs
 _SAMPLE: Final = 2e-6  # Between the instants at which this is looked at, s
 # By how much the pulse before a brake pulse may be late or wider than the hammer's own, s
 _WIDE: Final = 50e-6
-_TAIL: Final = 1e-3  # How long runs go on after the last slot, s: until the last contact is over
+_TAIL: Final = 1e-3  # Least time that runs go on after the last slot, s: until the last contact is over
+_CONTACT: Final = 1.5  # The same in times of the single pulse until it leaves the pack
 _PIECE: Final = 4096  # Number of runs of one ensemble, which bounds the memory
 
 
@@ -46,15 +49,16 @@ class Single:
 def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
     """Fire a hammer once from rest."""
     known = nominal(hammer, pulse, tolerance=tolerance)
-    times = np.arange(0.0, _LONGEST, _SAMPLE)
-    motion = simulate(hammer, PulseTrain(pulse), duration=_LONGEST, times=times, tolerance=tolerance)
+    longest = max(_LONGEST, _WINDOWS * wait_of(hammer, pulse))
+    times = np.arange(0.0, longest, _SAMPLE)
+    motion = simulate(hammer, PulseTrain(pulse), duration=longest, times=times, tolerance=tolerance)
     dot = next(contact for contact in motion.contacts if contact.surface == "pack")
     rest, front = rest_state(hammer), hammer.front
     assert front is not None
     place = settled_from(np.abs(motion.x - rest) > QUIET * (front - rest))
     if dot.t_out is None or not touches(motion) or not motion.ok or place == len(motion.x):
         raise InputError(
-            f"{hammer.path}: the hammer is not at rest {1e3 * _LONGEST:g} ms after a single pulse",
+            f"{hammer.path}: the hammer is not at rest {1e3 * longest:g} ms after a single pulse",
             file=hammer.path,
             key="hammer",
             expected="one that settles on its backstop",
@@ -107,6 +111,16 @@ class Task:
         """
         return float(max(self.single.left, self.width + _WIDE + self.faded))
 
+    @cached_property
+    def window(self) -> float:
+        """How long runs to a whole line go on after the last firing, s."""
+        return wait_of(self.hammers[0], self.pulse)
+
+    @property
+    def tail(self) -> float:
+        """How long the short runs of the search go on, s: until the last contact is over."""
+        return max(_TAIL, FLIGHTS * self.single.nominal.flight_time, _CONTACT * self.single.left)
+
     def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:
         """Return how long after the slot of the dot before a dot may be fired first, s.
 
@@ -125,7 +139,7 @@ class Task:
         """Run drives, and compare all dots with that of the single pulse.
 
         The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN beyond the last
-        one; a run goes on for `_TAIL` after `ends` (drives,), s.
+        one; a run goes on for `tail` after `ends` (drives,), s.
 
         Returns
         -------
@@ -140,7 +154,7 @@ class Task:
         for start in range(0, len(drives), _PIECE):
             rows = slice(start, start + _PIECE)
             ensemble = Ensemble(
-                hammer, list(drives[rows]), ends[rows] + _TAIL, tolerance=self.effort.tolerance
+                hammer, list(drives[rows]), ends[rows] + self.tail, tolerance=self.effort.tolerance
             )
             result = ensemble.run(dots=True, threads=self.effort.threads)
             dots = result.dots

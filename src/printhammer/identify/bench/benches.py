@@ -32,8 +32,9 @@ from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_
 from printhammer.parts.backstop._hertz import damping_from_restitution
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.results import Declared, part
-from printhammer.run.simulate import CYCLE, simulate
+from printhammer.run.simulate import simulate
 from printhammer.run.supply import typical_current
+from printhammer.run.window import CYCLE, wait_of
 from printhammer.support.arrays import FloatArray
 
 DISPLACEMENTS: Final = 31
@@ -220,7 +221,7 @@ def motion(
             key="waveform",
             expected="one",
         )
-    first, last, rate, length = _record(sensor, duration, before)
+    first, last, rate, length = _record(sensor, duration, before, wait_of(hammer))
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
     t = np.arange(first, last + 1) / rate
     fine = np.arange(last * each + 1) / (rate * each)
@@ -277,7 +278,7 @@ BENCHES: Final[dict[str, Callable[..., Bench]]] = {
 
 
 def _record(
-    sensor: Sensor, duration: float | str | None, before: float | str
+    sensor: Sensor, duration: float | str | None, before: float | str, least: float = CYCLE
 ) -> tuple[int, int, float, float]:
     """Return the first and the last sample of a record, their rate, Hz, and the duration, s."""
     from printhammer.drive.input import read_number, read_positive
@@ -285,7 +286,7 @@ def _record(
     rate = sensor.sampling_rate
     if rate is None:
         raise InputError("the sensor has no sampling rate", key="sensor", expected="one for a record")
-    length = CYCLE if duration is None else read_positive(duration, "s", "duration")
+    length = least if duration is None else read_positive(duration, "s", "duration")
     early = read_number(before, "s", "before")
     if early < 0.0:
         raise InputError.of("before", before, "0 s or more", said=" is expected to be")

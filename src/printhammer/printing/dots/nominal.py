@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, Unpack
+from typing import Unpack
 
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
@@ -14,14 +14,8 @@ from printhammer.run.effort import DEFAULT, Effort, InThreads, computation
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
-
-WAIT: Final = 4e-3
-"""Time after the last firing of a run, s, within which its dot and extra contacts are waited for."""
-
-
-def wait_of(waveform: Waveform) -> float:
-    """Return how long a run goes on after its last firing, s: under a driver also while that is on."""
-    return WAIT + (waveform.support if waveform.replaces else 0.0)
+from printhammer.run.waits import waits_of
+from printhammer.run.window import wait_of
 
 
 class SinglePulse(Declared):
@@ -56,7 +50,9 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
             key="pack",
             expected="one that a dot is made on",
         )
-    motion = simulate(hammer, PulseTrain(pulse), duration=wait_of(pulse), points=2, tolerance=tolerance)
+    motion = simulate(
+        hammer, PulseTrain(pulse), duration=wait_of(hammer, pulse), points=2, tolerance=tolerance
+    )
     if not motion.ok:
         raise InputError(
             f"{hammer.path}: the run of a single pulse ends early: {motion.message}",
@@ -93,8 +89,8 @@ def single_pulses(
         return []
     pulses = [pulse_of(hammer) for hammer in hammers] if waveforms is None else waveforms
     drives = [PulseTrain(pulse) for pulse in pulses]
-    wait = max(wait_of(pulse) for pulse in pulses)
-    result = Ensemble(list(hammers), drives, wait, tolerance=effort.tolerance).run(
+    waits = waits_of(hammers, pulses, effort.threads)
+    result = Ensemble(list(hammers), drives, waits, tolerance=effort.tolerance).run(
         dots=True, threads=effort.threads
     )
     dots = result.dots

@@ -14,19 +14,21 @@ from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import pulse_of
+from printhammer.printing.dots.pieces import PiecewiseMotion
 from printhammer.results import Declared, part, scalar
 from printhammer.run.contacts import Contact
 from printhammer.run.motion import Motion
-from printhammer.run.pieces import PiecewiseMotion
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
+from printhammer.run.window import wait_of
 from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
 """Distance from rest, in parts of the stroke, within which the armature counts as settled."""
 
-CYCLE: Final = 20e-3  # Duration of the run, s
+CYCLE: Final = 20e-3  # Least duration of the run, s
 
+_WINDOWS: Final = 2.0  # The same in windows
 _SPACING: Final = 1e-6
 _BISECTIONS: Final = 40
 
@@ -63,7 +65,7 @@ class Settling(Declared):
     settle_out: float | None = scalar(
         "s",
         "time from the firing until the armature stays within `SETTLED` of the stroke from its rest",
-        more="None where it does not within `CYCLE`",
+        more="None where it does not within `CYCLE` or the window of its runs, see `printhammer.run.window`",
     )
     rebounds: int = part("number of rebounds from the backstop higher than `SETTLED` of the stroke")
     highest: float = part("height of the highest rebound, in parts of the stroke; 0 without any")
@@ -84,10 +86,9 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
             key="backstop",
             expected="one to settle on",
         )
-    rest = rest_state(hammer)
-    motion = simulate(
-        hammer, PulseTrain(pulse_of(hammer, waveform)), duration=CYCLE, points=2, tolerance=tolerance
-    )
+    rest, pulse = rest_state(hammer), pulse_of(hammer, waveform)
+    duration = max(CYCLE, _WINDOWS * wait_of(hammer, pulse))
+    motion = simulate(hammer, PulseTrain(pulse), duration=duration, points=2, tolerance=tolerance)
     top = motion.peak_after(0)
     stroke = (rest if top is None else top[1]) - hammer.position
     limit = SETTLED * max(stroke, 0.0)

@@ -9,13 +9,16 @@ import numpy as np
 
 from printhammer.drive.batch import firings_of, joined
 from printhammer.drive.trains import Drive
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Judgement, Limits, judge
-from printhammer.printing.dots.nominal import WAIT, SinglePulse
+from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.strategy import FIRST_SLOT, Strategy, checked_drives, open_loop
 from printhammer.results import Declared, column, part
 from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.ensemble import DotTable, Ensemble, ExtraDots
+from printhammer.run.waits import waits_of
+from printhammer.run.window import longest_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 
@@ -72,7 +75,8 @@ def attempt(
 
     Each member has a status: a run that could not go on is no exception, and does not pass.
     """
-    drives = joined([checked_drives(strategy, case.hammer, patterns, case.rate) for case in cases])
+    own = [checked_drives(strategy, case.hammer, patterns, case.rate) for case in cases]
+    drives = joined(own)
     every = list(patterns) * len(cases)
     slots = np.full((len(every), max(len(pattern) for pattern in patterns)), -1)
     for row, pattern in zip(slots, every, strict=True):
@@ -80,7 +84,9 @@ def attempt(
     rates = np.repeat([case.rate for case in cases], len(patterns))
     due = FIRST_SLOT + slots / rates[:, np.newaxis]
     # A drive may fire its last dot ahead of the slot, or after it.
-    ends = np.maximum(firings_of(drives).last, due.max(axis=1)) + WAIT
+    fired = [fired_of(strategy, case.hammer, each[0]) for case, each in zip(cases, own, strict=True)]
+    waits = waits_of([case.hammer for case in cases], fired, effort.threads)
+    ends = np.maximum(firings_of(drives).last, due.max(axis=1)) + np.repeat(waits, len(patterns))
     hammers = [case.hammer for case in cases for _ in patterns]
     result = Ensemble(hammers, drives, ends, tolerance=effort.tolerance).run(
         dots=True, extra=extra, **effort.running
@@ -102,3 +108,9 @@ def attempt(
         statuses=tuple(result.status_names),
         extra=result.extra,
     )
+
+
+def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
+    """Return the waveform that sets the window of runs: the strategy's, the hammer's, or the drive's."""
+    own = getattr(strategy, "waveform", None)
+    return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)

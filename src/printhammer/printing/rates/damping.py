@@ -167,7 +167,7 @@ class DampingStudy(Result):
         "settle-out time",
         "material",
         more="from the firing until the armature stays within a hundredth of the stroke from rest; NaN where"
-        " it does not within 20 ms",
+        " it does not within 20 ms or two windows of its runs",
     )
     rebounds: FloatArray = column("1", "rebounds higher than a hundredth of the stroke", "material")
     highest: FloatArray = column("1", "highest rebound, in parts of the stroke", "material")

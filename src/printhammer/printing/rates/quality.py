@@ -14,9 +14,10 @@ from printhammer.drive.trains import Drive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import DOT_MATRIX_SPREAD, ENGRAVED_SPREAD, FAULTS, Limits, judge
-from printhammer.printing.dots.nominal import Nominal, wait_of
+from printhammer.printing.dots.nominal import Nominal
 from printhammer.printing.dots.nominal import nominal as single_pulse
 from printhammer.printing.dots.paper import Paper
+from printhammer.printing.dots.pieces import PiecewiseMotion, simulate_pieces
 from printhammer.printing.dots.settling import Wear, wear_of
 from printhammer.printing.dots.strategy import (
     LEAD_IN,
@@ -28,6 +29,7 @@ from printhammer.printing.dots.strategy import (
     slot_times,
     slots_of,
 )
+from printhammer.printing.dots.trial import fired_of
 from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.results.summary import (
     Facts,
@@ -39,9 +41,9 @@ from printhammer.run.contacts import Dot
 from printhammer.run.energy import Ledger, squared_current
 from printhammer.run.ensemble import DotTable
 from printhammer.run.motion import Motion
-from printhammer.run.pieces import PiecewiseMotion, simulate_pieces
 from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import simulate
+from printhammer.run.window import wait_of
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
@@ -324,7 +326,7 @@ def quality(
     way = strategy if along is None else along(places)
     drive = checked_drives(way, hammer, [slots], slot_rate)[0]
     due = slot_times(slots, slot_rate)
-    end = max(float(due[-1]), float(drive.times[-1])) + wait_of(drive.waveform)
+    end = max(float(due[-1]), float(drive.times[-1])) + wait_of(hammer, fired_of(strategy, hammer, drive))
     if places is None:
         motion: Motion | PiecewiseMotion = simulate(
             hammer, drive, duration=end, points=2, tolerance=tolerance

@@ -9,8 +9,7 @@ import numpy as np
 
 from printhammer.drive.batch import PulseTrains
 from printhammer.errors import InputError
-from printhammer.maps.frequency import TAIL
-from printhammer.printing.dots.nominal import wait_of
+from printhammer.maps.frequency import tail_of
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.run.start import initial_state
 from printhammer.studio import bounds
@@ -141,9 +140,7 @@ def map_frame(
 
 
 def _end(state: State) -> float:
-    # A driver's device may be slow: what its last firing does is to be seen.
-    tail = wait_of(state.fired) if state.fired.replaces else TAIL
-    return (len(state.slots) - 1) / state.low + tail
+    return (len(state.slots) - 1) / state.low + tail_of(state.changed, state.fired)
 
 
 @lru_cache(maxsize=64)

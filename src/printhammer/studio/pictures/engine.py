@@ -51,7 +51,7 @@ def motion_frame(
         The state describes no hammer or drive that could be run.
     """
     hammer, drive = state.changed, state.drive
-    motion = limited_run(hammer, drive, end_of_run(drive, None), bounds.MOST_STEPS)
+    motion = limited_run(hammer, drive, end_of_run(hammer, drive, None), bounds.MOST_STEPS)
     times = points_of(motion.step_times)
     places, speeds, values, voltage, force = motion.curves_at(times)
     by_voltage = drive.quantity == "voltage"

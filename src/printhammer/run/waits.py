@@ -1,0 +1,72 @@
+"""Windows of many devices (`printhammer.run.window`), their single pulses run as ensembles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from printhammer.drive.batch import PulseTrains
+from printhammer.drive.trains import Drive, PulseTrain
+from printhammer.drive.waveforms.shapes import Waveform
+from printhammer.hammer.hammer import Hammer
+from printhammer.run.ensemble import Ensemble
+from printhammer.run.window import (
+    MOST_STEPS,
+    TOLERANCE,
+    Single,
+    has_window,
+    is_enough,
+    last_wait,
+    least_wait,
+    longest_of,
+)
+from printhammer.support.arrays import FloatArray
+
+
+def waits_of(
+    hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
+) -> FloatArray:
+    """Return how long runs go on after their last firings, s, as `wait_of`, in the lanes of ensembles.
+
+    One hammer and one waveform for each run, shape (runs,); equal objects are fired once.
+    """
+    places: dict[tuple[int, int], int] = {}
+    pairs: list[tuple[Hammer, Waveform]] = []
+    which = []
+    for hammer, waveform in zip(hammers, waveforms, strict=True):
+        key = id(hammer), id(waveform)
+        if key not in places:
+            places[key] = len(pairs)
+            pairs.append((hammer, waveform))
+        which.append(places[key])
+    waits = np.array([least_wait(waveform) for _hammer, waveform in pairs])
+    last = np.full(len(pairs), np.nan)
+    left = [i for i, pair in enumerate(pairs) if has_window(*pair)]
+    while left:
+        drives = {id(pairs[i][1]): PulseTrain(pairs[i][1]) for i in left}
+        result = Ensemble(
+            [pairs[i][0] for i in left],
+            [drives[id(pairs[i][1])] for i in left],
+            waits[left],
+            tolerance=TOLERANCE,
+            max_steps=MOST_STEPS,
+        ).run(dots=True, strobes=[[waits[i]] for i in left], threads=threads)
+        assert result.dots is not None
+        assert result.strobes is not None
+        columns = result.ok, result.dots.flight_time[:, 0], result.strobes.x[:, 0], result.strobes.v[:, 0]
+        seen = [Single(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
+        left = [i for i, each in zip(left, seen, strict=True) if not is_enough(pairs[i][0], each, waits[i])]
+        for i in left:
+            last[i] = last_wait(*pairs[i]) if math.isnan(last[i]) else last[i]
+        left = [i for i in left if waits[i] < last[i]]
+        waits[left] *= 2.0
+    return np.asarray(waits[np.array(which, dtype=np.int64)])
+
+
+def fired_by(drives: Sequence[Drive]) -> list[Waveform]:
+    """Return the longest waveform of each of several drives."""
+    if isinstance(drives, PulseTrains):
+        return [drives.pulses[number].waveform for number in drives.pulse_of.tolist()]
+    return [longest_of(drive) for drive in drives]

@@ -1,0 +1,137 @@
+"""The window of a run: the last dot of a slow device is struck, whatever verb runs it."""
+
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests import hammers
+
+import printhammer as ph
+from printhammer.drive.waveforms.shapes import HalfSine
+from printhammer.parts.backstop.rigid import RigidBackstop
+from printhammer.parts.pack.dashpot import DashpotPack
+from printhammer.parts.spring.linear import PreloadSpring
+from printhammer.printing.dots.nominal import nominal, single_pulses
+from printhammer.printing.dots.trial import Case, attempt
+from printhammer.run.waits import waits_of
+from printhammer.run.window import CYCLE, FLIGHTS, least_wait, wait_of
+from printhammer.sweep.members import Base, Maker
+
+
+def device(flight: float, way: float = 1e-3, held: float = 1.0, pull: float = 0.5) -> ph.Hammer:
+    """A mass that a half sine of force throws onto a pack: about so long a flight, s, over a way, m.
+
+    The spring holds it with a force, N. While it flies the spring takes back half a `pull` of the way: the
+    weaker, the later the return, the stronger, the slower the touch.
+    """
+    mass = held * flight * flight / (pull * way)
+    width = 0.3 * flight
+    speed = way * (1.0 + 0.5 * pull) / (flight - 0.5 * width)
+    return ph.Hammer.build(
+        mass,
+        spring=PreloadSpring(preload=-held, stiffness=0.1 * held / way),
+        pack=DashpotPack(stiffness=200.0 * held / way, damping=0.5 * mass / flight, front=way),
+        backstop=RigidBackstop(position=0.0, restitution=0.3),
+        waveform=HalfSine(
+            amplitude=0.5 * math.pi * (mass * speed / width + held), width=width, quantity="force"
+        ),
+    )
+
+
+def test_the_hammer_of_the_paper_keeps_its_four_milliseconds() -> None:
+    hammer = ph.load("hendriks-1983")
+    assert wait_of(hammer) == CYCLE == 4e-3
+    units = [hammer.replace({"mass": factor * hammer.mass}) for factor in (0.8, 1.0, 1.2, 1.5)]
+    assert waits_of(units, [hammer.waveform] * len(units)).tolist() == [CYCLE] * len(units)
+
+
+def test_a_slow_device_is_waited_for_until_it_has_struck_and_settled() -> None:
+    relay, printer = ph.load("relay-5v"), ph.load("impact-wire")
+    single = nominal(relay)
+    wait = wait_of(relay)
+    assert wait >= least_wait(relay.waveform) == CYCLE + relay.waveform.width
+    assert wait >= FLIGHTS * single.flight_time
+    motion = ph.simulate(relay, ph.PulseTrain(relay.waveform))
+    assert motion.end == wait
+    assert abs(motion.x[-1] - relay.rest) < 0.05 * (relay.front - relay.rest)
+    many = single_pulses([relay, printer])
+    assert [each.flight_time for each in many if each] == pytest.approx(
+        [single.flight_time, nominal(printer).flight_time], rel=1e-6
+    )
+    assert waits_of([relay, printer], [relay.waveform, printer.waveform]).tolist() == [wait, wait_of(printer)]
+
+
+def test_the_relay_strikes_at_every_firing_on_its_map() -> None:
+    relay = ph.load("relay-5v")
+    chart = ph.frequency_map(relay, [20.0], pulses=3, times=64)
+    assert chart["struck"].values.all()
+    # It flies 5.6 ms, and the map shows the touch of the last firing.
+    touch = float(chart["fired_at"].values[0, -1] + chart["flight_time"].values[0, -1])
+    assert touch == pytest.approx(0.1056, abs=1e-4)
+    assert float(chart["time"].values[-1]) > touch
+
+
+def test_a_device_that_does_not_strike_or_settle_is_not_waited_for_without_end() -> None:
+    bouncing = device(1e-3).replace({"backstop.restitution": 1.0, "pack.front": 0.1})
+    push = bouncing.waveform.scaled(4.0)
+    assert CYCLE < wait_of(bouncing, push) < 1.1
+    assert wait_of(hammers.made_of(spring=PreloadSpring(preload=0.0, stiffness=100.0)), push) == CYCLE
+
+
+def struck_everywhere(hammer: ph.Hammer) -> dict[str, list[int]]:
+    """The dots of three firings, far apart, as every verb has them."""
+    rate = 1.0 / (3.0 * wait_of(hammer))
+    train = ph.PulseTrain(hammer.waveform, rate=rate, pulses=3)
+    trial = attempt([Case(hammer, nominal(hammer), rate)], [(0, 1, 2)], limits=ph.Limits(), threads=1)
+    chart = ph.frequency_map(hammer, [rate], pulses=3, times=16, threads=1)
+    report = ph.quality(hammer, rate, pattern="111")
+    safe = ph.safe_rate(hammer, first=rate, last=rate, step=rate, cycle=False, threads=1)
+    base = Base(
+        hammer=hammer,
+        drive={"train": {"rate": f"{rate!r} Hz", "pulses": 3}},
+        waveform=None,
+        folder=Path(),
+        state=(None, None),
+        duration=None,
+        tolerance=2e-11,
+        axes=(),
+    )
+    _which, members = Maker(base).members(np.zeros((1, 0)), 1)
+    assert members.ends[0] == Maker(base).member([]).end
+    swept = ph.Ensemble(members.hammers, members.drives, members.ends).run(dots=True, threads=1).dots
+    assert swept is not None
+    return {
+        "run": [int(dot.struck) for dot in ph.simulate(hammer, train, points=2).dots],
+        "print": trial.dots.struck[0].astype(int).tolist(),
+        "report": [1 - int(lost) for lost in report.lost],
+        "map": chart["struck"].values[0].astype(int).tolist(),
+        "sweep": swept.struck[0].astype(int).tolist(),
+        "safe rate": [1, 1, 1 - int(safe.lost.sum())],
+    }
+
+
+def devices(count: int, seed: int = 33) -> list[ph.Hammer]:
+    """Random devices with flights from 0.1 to 60 ms, evenly over the logarithm."""
+    random = np.random.default_rng(seed)
+
+    def between(low: float, high: float) -> float:
+        return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+    return [
+        device(between(1e-4, 60e-3), between(1e-4, 1e-2), between(0.1, 20.0), between(0.05, 1.6))
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.slow
+def test_random_devices_strike_the_same_dots_everywhere() -> None:
+    flights = []
+    begun = time.perf_counter()
+    for hammer in devices(300):
+        flights.append(nominal(hammer).flight_time)
+        assert all(struck == [1, 1, 1] for struck in struck_everywhere(hammer).values())
+        if time.perf_counter() - begun > 60.0:
+            break
+    assert len(flights) >= 20
