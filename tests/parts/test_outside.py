@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -119,6 +120,7 @@ def test_a_package_brings_a_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
             "spring_energy = 3\ndef other(c, x):",
             "spring_energy",
         ),
+        ("    travel = x - c[2]\n", "    travel = x - c[2]\n    print(travel)\n", "spring_force"),
     ],
 )
 def test_a_law_that_is_none_is_a_sentence(tmp_path: Path, old: str, new: str, key: str | None) -> None:
@@ -128,6 +130,14 @@ def test_a_law_that_is_none_is_a_sentence(tmp_path: Path, old: str, new: str, ke
         load_parts(path)
     assert path.name in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_law_in_a_cell_of_a_notebook_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = ModuleType("cell")
+    monkeypatch.setitem(sys.modules, "cell", cell)
+    exec(CUBIC.replace('"hardening"', '"of a cell"'), vars(cell))
+    with refused("CubicSpring", "cell"):
+        vars(cell)["CubicSpring"](stiffness=1.0, cubic=1.0)
 
 
 def test_a_wrong_law_is_a_sentence_in_python_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

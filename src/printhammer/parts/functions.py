@@ -31,11 +31,19 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
     Raises
     ------
     InputError
-        A function has other arguments or is not callable, or a force is missing; the message names the
-        module.
+        A function has other arguments, is not callable or prints, a force is missing, or the law is defined
+        at a prompt or in a cell of a notebook; the message names the module.
     """
     module = sys.modules.get(part.__module__)
-    where = getattr(module, "__file__", None) or part.__module__
+    where = getattr(module, "__file__", None)
+    if where is None:
+        raise InputError.of(
+            part.__qualname__,
+            part.__module__,
+            "a law in a file of its own, whose source the compiler can read; in a notebook the first line"
+            " `%%writefile my_law.py` of a cell writes one, and `import my_law` registers it",
+            written=f"a law of the module {part.__module__!r}",
+        )
     prefix = f"{part.role}_"
     for name, model in vars(absent).items():
         if not name.startswith(prefix) or not hasattr(module, name):
@@ -46,6 +54,9 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
             raise InputError(
                 f"{where}: {has}", file=where, key=name, expected=f"the function {name}({', '.join(wanted)})"
             )
+        if "print" in getattr(law, "__code__", _takes.__code__).co_names:
+            # Machine code runs without the interpreter's lock, for which a print would wait.
+            raise InputError.of(name, "print", "a law that prints nothing", file=where)
     forces = _FORCES[part.role]
     if complete and forces and not any(hasattr(module, name) for name in forces):
         raise InputError(
