@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from tests.errors import refused
@@ -283,3 +284,20 @@ def test_tables_that_change_meanwhile_are_told(
     Store(tmp_path / "out.zarr", before.layout(), "now").close()
     with refused("hammer_fingerprint"):
         ph.sweep(spec, tmp_path / "out.zarr")
+
+
+def test_a_name_in_csv_gives_a_table_of_the_store_beside_it(
+    tmp_path: Path, spec_file: Callable[..., Path]
+) -> None:
+    stored = ph.sweep(spec_file(count=2), tmp_path / "r.csv")
+    table = pd.read_csv(tmp_path / "r.csv")
+    assert len(table) == stored["status"].size == 4
+    assert table["rate [Hz]"].tolist() == np.repeat(stored["rate"].values, 2).tolist()
+    for k in range(3):
+        expected = stored["peak_force"].isel(firing=k).values.ravel()
+        np.testing.assert_array_equal(table[f"peak_force_{k + 1} [N]"], expected)
+    np.testing.assert_array_equal(table["lost_dots"], stored["lost_dots"].values.ravel())
+    (tmp_path / "other.csv").write_text("of somebody else", encoding="utf-8")
+    with refused("out", str(tmp_path / "other.csv")):
+        ph.sweep(spec_file(count=2), tmp_path / "other.csv")
+    assert (tmp_path / "other.csv").read_text(encoding="utf-8") == "of somebody else"

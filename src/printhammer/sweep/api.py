@@ -8,7 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from printhammer.results.files import need_for
+import numpy as np
+
+from printhammer.errors import InputError
+from printhammer.results.files import frame_of, need_for, write_csv
 from printhammer.results.store import Store, open_store
 from printhammer.support.threads import thread_count
 from printhammer.sweep.plan import make_plan
@@ -16,6 +19,7 @@ from printhammer.sweep.spec import read_spec
 from printhammer.sweep.work import Index, run_local
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
     from printhammer.sweep.work import Results
@@ -43,7 +47,8 @@ def sweep(
     spec : path or mapping
         Spec file, or its contents as a mapping; see the guide on sweeps.
     out : path
-        Folder of the store (Zarr v3), new, to be resumed, or complete.
+        Folder of the store (Zarr v3), new, to be resumed, or complete. A name that ends in .csv: a table with
+        a row for each member and a column for each firing, made of the store beside it that ends in .zarr.
     threads : int, optional
         Threads on this machine; by default as many as there are cores.
     dask : str or distributed.Client, optional
@@ -64,6 +69,11 @@ def sweep(
         no scheduler answers at the address.
     """
     thread_count(threads)
+    table = Path(out) if Path(out).suffix.lower() == ".csv" else None
+    if table is not None:
+        out = table.with_suffix(".zarr")
+        if table.exists() and not Path(out).exists():
+            raise InputError.of("out", str(table), "a file that does not exist yet, or whose store does")
     need_for(out, ".zarr")
     plan = make_plan(read_spec(spec))
     with ExitStack() as stack:
@@ -98,7 +108,21 @@ def sweep(
             run_dask(plan, todo, write, tell, client)
         tell(0.0)
         store.finish(_now())
-    return open_store(out)
+    result = open_store(out)
+    if table is not None:
+        write_csv(_member_table(result), table)
+    return result
+
+
+def _member_table(result: xr.Dataset) -> pd.DataFrame:
+    """Return a row for each member; arrays over firings or times have a column for each of these."""
+    wide = result[["status"]]
+    for name, variable in result.data_vars.items():
+        further = [dim for dim in variable.dims if dim not in wide["status"].dims]
+        for place in np.ndindex(*(result.sizes[dim] for dim in further)):
+            column = variable.isel(dict(zip(further, place, strict=True))).drop_vars(further, errors="ignore")
+            wide["_".join([str(name), *(str(k + 1) for k in place)])] = column
+    return frame_of(wide, {})
 
 
 def _now() -> str:

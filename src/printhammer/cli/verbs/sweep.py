@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 def sweep(
     job: Job,
     spec: Path | None = opt.argument("SPEC", "Spec file of the sweep (TOML).", type=Path),
-    out: Path | None = opt.folder("Result store (Zarr): a new store, or one to resume.", writes=False),
+    out: Path | None = opt.folder(
+        "Result store (Zarr), a new store or one to resume; a name in .csv: a table as well.", writes=False
+    ),
     threads: int | None = opt.THREADS,
     dask: str | None = opt.text("ADDRESS", "Address of the scheduler of a dask cluster that does the work."),
     check: bool = opt.switch("Show the plan and the disk space it needs, without running it."),
