@@ -47,6 +47,14 @@ KNOWN = [
     ("-3e-3 N", "N", -0.003),
     (".5 A", "A", 0.5),
     ("5. A", "A", 5.0),
+    ("3000 rpm", "Hz", 50.0),
+    ("77 degF", "degC", 25.0),
+    ("-40 degF", "degC", -40.0),
+    ("2 kp", "N", 19.6133),
+    ("3 Newton", "N", 3.0),
+    ("12 Volt", "V", 12.0),
+    ("0.1 Ampere", "A", 0.1),
+    ("10 A/V", "A/V", 10.0),
 ]
 
 
@@ -75,7 +83,7 @@ REFUSED = [
     ("1e308 km", "m", "is not a finite number"),
     ("20 degC", "m", "'degC' is a temperature, expected a length (m)"),
     ("293 K", "degC", "'K' is a difference of temperatures, expected a temperature (degC)"),
-    ("68 degF", "degC", "'degF' is not known"),
+    ("68 degF", "K", "'degF' is a temperature, expected a difference of temperatures (K)"),
     ("3 furlong", "m", "'furlong' is not known"),
     ("3 nan", "m", "'nan' is not known"),
     ("3 2 m", "m", "is not known"),

@@ -58,6 +58,9 @@ DIMENSIONS: dict[str, str] = {
 }
 """Names of the dimensions that the program uses, by their SI unit; for messages."""
 
+_ZEROS = {"degF": 32, "fahrenheit": 32}
+"""Numbers of a unit at which the quantity in SI is 0; 0 for all others."""
+
 _UNKNOWN = "the unit {!r} is not known, expected one such as 'us', 'lbf' or 'N s/m^2.5'"
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
 _FACTOR = re.compile(
@@ -116,7 +119,7 @@ def all_to_si(values: Sequence[float], unit: str, si_unit: str) -> list[float]:
 
 def from_si(value: float, si_unit: str, unit: str) -> float:
     """Convert a number in `si_unit` to `unit`; arguments and errors otherwise as for `to_si`."""
-    return _scaled(value, 1 / _factor(unit, si_unit), si_unit)
+    return _scaled(value, 1 / _factor(unit, si_unit), si_unit) + _ZEROS.get(unit, 0)
 
 
 def parse(text: str, si_unit: str) -> float:
@@ -181,7 +184,8 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
         number = float(value)
         if math.isfinite(number):
             # What is in SI already needs no exact product.
-            return number + 0.0 if factor == 1 else float(Fraction(repr(number)) * factor)
+            zero = _ZEROS.get(unit.strip(), 0)
+            return number + 0.0 if factor == 1 else float((Fraction(repr(number)) - zero) * factor)
     except OverflowError:
         pass
     raise InputError(f"{value!r} {unit} is not a finite number", value=value)
