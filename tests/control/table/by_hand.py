@@ -3,9 +3,11 @@
 from typing import Any
 
 import numpy as np
+import pytest
 from tests.hammers import CRUDE
 
 import printhammer as ph
+from printhammer.control.table import tuning
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.drive import (
     REST,
@@ -14,6 +16,7 @@ from printhammer.control.table.drive import (
     number_of,
     shared_numbers,
 )
+from printhammer.control.table.task import Task
 
 
 def by_hand(
@@ -43,3 +46,18 @@ def by_hand(
         **{name: array[:, shared] for name, array in values.items()},
     }
     return CompensationTable(**{**settings, **changes})
+
+
+def task_of(hammer: ph.Hammer, rate: float) -> Task:
+    """What a table of one gap for a hammer is to be like: `tune` as far as the choice of ways."""
+    asked: list[Task] = []
+
+    def stop(task: Task, *_: Any, **__: Any) -> Any:
+        asked.append(task)
+        raise RuntimeError
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tuning, "chosen", stop)
+        with pytest.raises(RuntimeError):
+            ph.tune(hammer, rate=rate, history=1)
+    return asked[0]

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.control.table.by_hand import task_of
 from tests.control.table.test_tuning import RATE, SLOTS, quick
 
 import printhammer as ph
@@ -21,17 +22,7 @@ PERIOD = 1.0 / RATE
 @pytest.fixture(scope="module")
 def task() -> Task:
     """What a table for the hammer of these tests is to be like."""
-    asked: list[Task] = []
-
-    def stop(task: Task, *_: Any, **__: Any) -> Any:
-        asked.append(task)
-        raise RuntimeError
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuning, "chosen", stop)
-        with pytest.raises(RuntimeError):
-            ph.tune(quick(), rate=RATE, history=1)
-    return asked[0]
+    return task_of(quick(), RATE)
 
 
 @pytest.fixture(scope="module")

@@ -29,6 +29,7 @@ from printhammer.control.table.drive import (
 )
 from printhammer.control.table.task import Task
 from printhammer.control.table.ways import solve
+from printhammer.derivatives.rows import DOTS, row_multipliers
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
@@ -91,10 +92,13 @@ class Draft:
     def places(self, cells: Cells) -> tuple[IntArray, IntArray]:
         """Return rows and columns of some entries."""
         columns = [number_of(history, self.task.reach) for _row, history in cells]
-        return np.array([row for row, _history in cells]), np.array(columns)
+        return np.array([row for row, _history in cells], np.int64), np.array(columns, np.int64)
 
     def judge(self, level: Sequence[History] | None = None) -> None:
-        """Put down how far off histories are at all rates; by default all of them."""
+        """Evaluate how far off histories are at all rates; by default all of them.
+
+        Then the deviation of a history of equal gaps is infinite if an error in rows of them does not shrink.
+        """
         lengths = range(1, self.task.gaps + 1)
         levels = [histories_of_length(self.task, n) for n in lengths] if level is None else [level]
         for same in levels:
@@ -103,6 +107,27 @@ class Draft:
             off = self.last_dots(cells, self.timing[:, *places].T, np.zeros((1, 2)), whole=True)
             size = off.max(axis=(1, 2))
             self.deviation[places] = np.where(np.isnan(size), np.inf, size)
+        if level is None:
+            self._judge_rows()
+
+    def _judge_rows(self) -> None:
+        task = self.task
+        known: dict[tuple[float, float, float], Waveform] = {}
+        cells = [
+            (row, (gap,) * task.gaps)
+            for row, rate in enumerate(self.rates.tolist())
+            for gap in range(1, task.reach + 1)
+            if gap / rate <= task.single.settled
+        ]
+        drives = []
+        for row, history in cells:
+            settings, slots = Settings(*self.values[:4, row]), range(0, history[0] * DOTS, history[0])
+            pulses = pulses_of(settings, task.gaps, task.reach, slots, float(self.rates[row]))
+            drives.append(sequence(pulses, task.pulse, known))
+        growth = row_multipliers([task.hammers[0]] * len(cells), drives, task.effort)
+        if cells:
+            rows, columns = self.places([cells[k] for k in np.flatnonzero(~(np.abs(growth) < 1.0)).tolist()])
+            self.deviation[rows, columns] = np.inf
 
     def last_dots(
         self,

@@ -145,11 +145,12 @@ def tune(
     A dot made like a dot from rest leaves the hammer as every such dot does. So its pulse is a function of
     the time since the dot before, as long as that one was made right; longer histories put right what is
     left. For each history, width and advance are found by Newton's method so that force and arrival of the
-    last dot of patterns with that history are those of the single pulse. Mostly there is more than one way
-    to do it: before a rebound or after it, with one or another brake pulse that takes some of the rebound
-    away, or without. The one is taken in which a row of such dots stays nearest to the single pulse on
-    hammers with 3 % more and less current and 10 um more and less travel, counting what this hammer itself
-    does eight times. No dot is fired before the armature has left the pack of the one before.
+    last dot of patterns with that history are those of the single pulse. Mostly there is more than one way to
+    do it: before a rebound or after it, with one or another brake pulse that takes some of the rebound away,
+    or without. The one is taken in which a row of such dots stays nearest to the single pulse on hammers with
+    3 % more and less current and 10 um more and less travel, counting what this hammer itself does eight
+    times. Only ways count in which a small error in a long row shrinks from dot to dot. No dot is fired
+    before the armature has left the pack of the one before.
 
     Parameters
     ----------
@@ -228,7 +229,7 @@ def tune(
     if lost.size:
         speed = float(grid[lost[0]])
         raise InputError(
-            (f"rate = {speed:g} Hz: no pulse prints every dot when others come {1e3 / speed:.4g} ms before"),
+            (f"rate = {speed:g} Hz: no pulse prints every dot of rows {1e3 / speed:.4g} ms apart"),
             key="rate",
             value=speed,
             expected="a lower rate",

@@ -12,6 +12,7 @@ import numpy as np
 
 from printhammer.control.table.drive import Pulses, sequence
 from printhammer.control.table.task import Task
+from printhammer.derivatives.rows import DOTS, row_multipliers
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
@@ -104,6 +105,10 @@ _STEPS: Final = (1e-6, 0.5e-6)  # Differences of firing time and width from whic
 # Deviation of the second dot, in parts of the limits, above which a way does not make it right
 _RIGHT: Final = 0.02
 _WRONG: Final = 1.0  # What such a way costs more, so that any that makes it right comes first
+STABLE: Final = 0.97
+"""Largest absolute multiplier of a row, from dot to dot, of a way: within the unit circle, with room for
+interpolation and ticks."""
+
 _FAR_OFF: Final = 5.0  # Deviation, in parts of the limits, beyond which a row is no worse in a mean square
 _ROUNDING: Final = 1e-12
 
@@ -197,8 +202,8 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     That is the largest deviation of any dot of a row of `ROW`, on the hammers that differ a little from the
     one the table is made for; what that one itself does counts `NOMINAL` times. Where a variability is stated
     it is the root of the mean square of the largest deviations on its sigma points and on that hammer. A way
-    that cannot make even the second dot right is put behind others. Infinite where a dot is lost, or the
-    pulses do not fit between each other.
+    that cannot make even the second dot right is put behind others. Infinite where a dot is lost, the pulses
+    do not fit between each other, or an error in a long row grows: where its multiplier is beyond `STABLE`.
     """
     cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
@@ -213,7 +218,16 @@ def costs(task: Task, ways: Ways) -> FloatArray:
         else:
             worst = np.maximum.reduce([NOMINAL * largest_of(own), *spread])
         cost[some] = worst + np.where(largest_of(own[:, 1]) > _RIGHT, _WRONG, 0.0)
+        made = np.flatnonzero(np.isfinite(cost))
+        cost[made[~is_stable(task, ways.take(made))]] = np.inf
     return cost
+
+
+def is_stable(task: Task, ways: Ways) -> BoolArray:
+    """Return in which ways an error in a long row shrinks from dot to dot, (ways,)."""
+    hammers = [task.hammers[0]] * ways.size
+    growth = row_multipliers(hammers, rows_of(task, ways, DOTS), task.effort, closed=False)
+    return np.abs(growth) <= STABLE
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:
