@@ -19,6 +19,7 @@ ROOMS = (
     "cli",
     "derivatives",
     "drive",
+    "figures",
     "hammer",
     "maps",
     "parts",

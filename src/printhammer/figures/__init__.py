@@ -1,10 +1,10 @@
-"""The figures of the paper and of any motion, one function each, for any hammer.
+"""Figures of the paper and of any motion, one function each, for any hammer.
 
 >>> from printhammer.figures import FIGURES, save
 >>> figure = FIGURES[3].draw(hammer)
 >>> save(figure, "build", "figure3")
 
-matplotlib is imported when a figure is drawn, not here.
+matplotlib is imported on drawing, not by this module.
 """
 
 from __future__ import annotations
@@ -26,31 +26,31 @@ __all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure of the paper."""
+    """Figure of the paper."""
 
     number: int
-    """Its number in the paper."""
+    """Number in the paper."""
     place: str
-    """Module in `printhammer.figures.paper` and name of the function that draws it, with a dot between."""
+    """Module in `printhammer.figures.paper` and name of the function, separated by a dot."""
     title: str
-    """A few words."""
+    """Title in a few words."""
     caption: str
-    """What is to be seen, one or two sentences."""
+    """Description of the picture in one or two sentences."""
 
     @property
     def function(self) -> Callable[..., Figure]:
-        """The function that draws it: a hammer and options to a matplotlib figure."""
+        """Function that draws the figure, from a hammer and options."""
         module, _, name = self.place.partition(".")
         function: Callable[..., Figure] = getattr(import_module(f"{__name__}.paper.{module}"), name)
         return function
 
     def draw(self, hammer: Hammer, **options: Any) -> Figure:
-        """Draw it for a hammer.
+        """Draw the figure for a hammer.
 
         Raises
         ------
         InputError
-            The hammer lacks what the figure shows, or an option is not usable.
+            The hammer lacks a part that the figure needs, or an option is invalid.
         """
         return self.function(hammer, **options)
 
@@ -129,4 +129,4 @@ FIGURES: Final[dict[int, PaperFigure]] = {
         ),
     )
 }
-"""The figures of the paper by number."""
+"""Figures of the paper by number."""

@@ -1,4 +1,4 @@
-"""A fit: data and law, residuals, their distribution, and how the constants go together."""
+"""Fits: data and law, residuals, their distribution, and correlation of the constants."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ _KINDS: Final = {
     "impact speed": "velocity",
     "rebound speed": "velocity",
 }
-"""How each quantity of a table is shown; others are pure numbers."""
+"""Scale of each quantity of a table; other quantities are pure numbers."""
 
 _MANY: Final = 400
-"""From so many data on, points are drawn small."""
+"""Number of data from which points are drawn small; arbitrary."""
 
 _LEGEND: Final = 8
 _NAMED: Final = 6
@@ -45,8 +45,8 @@ _NAMED: Final = 6
 def plot(fit: Fit) -> Figure:
     """Draw a fit.
 
-    Data with the law, residuals below; on the right the correlation of the constants and the residuals
-    against those of a normal distribution. Outliers that were left out are ringed.
+    Left: data with the law, residuals below; right: correlation of the constants, and residuals against
+    normal quantiles. Rejected outliers are ringed.
     """
     if not len(fit.data):
         raise InputError(
@@ -99,7 +99,7 @@ def _data(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
 
 
 def _is_curve(values: FloatArray) -> bool:
-    """Tell whether values in the order of the abscissa make one curve, not several in turns."""
+    """Whether values in the order of the abscissa form one curve, not several interleaved ones."""
     return float(np.abs(np.diff(values)).sum()) <= 4.0 * float(np.ptp(values)) if len(values) > 1 else False
 
 
@@ -131,7 +131,7 @@ def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
 
 
 def _spread(fit: Fit) -> FloatArray:
-    """Return the standard deviation of each datum over the residual scale."""
+    """Return the standard deviation of each datum relative to the residual scale."""
     used = ~fit.outliers
     spread = 1.0 / np.sqrt(fit.weights)
     return np.asarray(spread / np.sqrt(np.mean(spread[used] ** 2)))
@@ -165,7 +165,7 @@ def _correlation(ax: Axes, fit: Fit) -> None:
 
 
 def _short(key: str) -> str:
-    """Return a key as it fits beside a matrix."""
+    """Abbreviate a key to fit beside a matrix."""
     plain = key if " " in key else key.rpartition(".")[2]
     for section in ("magnet.", "spring.", "backstop."):
         plain = plain.replace(section, "")
@@ -173,7 +173,7 @@ def _short(key: str) -> str:
 
 
 def _quantiles(ax: Axes, fit: Fit) -> None:
-    """Draw sorted residuals, each over its own standard deviation, against normal quantiles."""
+    """Draw sorted residuals, relative to their standard deviations, against normal quantiles."""
     from scipy.stats import norm
 
     used = ~fit.outliers

@@ -1,9 +1,9 @@
-"""The printed page: what came on paper, what was wanted, how far the dots are off, and the worst place.
+"""Printed page: the dots on paper, the requested dots, placement errors, and the worst place.
 
-Ink on paper: round dots of given optical densities, drawn into an array.
+Ink on paper is rendered into an array: round dots of given optical densities.
 
-Where dots overlap, their densities add. The rim of a dot is soft over a tenth of its diameter, or a pixel and
-a half where that is more.
+Densities of overlapping dots add. The rim of a dot is soft over a tenth of its diameter, or 1.5 pixels if
+that is more.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 PAPER: Final = (252, 250, 243)
 INK: Final = (24, 24, 38)
-"""Colours, red, green, blue, of paper and of ink that lets no light through."""
+"""RGB colours of paper and of fully opaque ink."""
 
 MOST_PIXELS: Final = 24_000_000
-"""Size above which a sheet is drawn more coarsely."""
+"""Number of pixels above which a sheet is rendered more coarsely; arbitrary."""
 
 _SOFT: Final = 0.1
 _PIXELS: Final = 1.5
@@ -42,26 +42,26 @@ _TOGETHER: Final = 1_000_000
 
 @dataclass(frozen=True)
 class Sheet:
-    """A part of the paper."""
+    """Rectangle of the paper."""
 
     left: float
     right: float
     top: float
     bottom: float
-    """Its edges, m: across, and downward."""
+    """Edges, m: across, and downward."""
 
     @property
     def width(self) -> float:
-        """From left to right, m."""
+        """Width, m."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """From top to bottom, m."""
+        """Height, m."""
         return self.bottom - self.top
 
     def pixels(self, finest: float) -> tuple[float, int, int]:
-        """Return size, m, of a pixel, not below the finest, and number of rows and columns of pixels."""
+        """Return the pixel size, m, at least `finest`, and the numbers of rows and columns of pixels."""
         size = max(finest, (self.width * self.height / MOST_PIXELS) ** 0.5)
         return size, max(1, round(self.height / size)), max(1, round(self.width / size))
 
@@ -69,10 +69,10 @@ class Sheet:
 def inked(
     sheet: Sheet, across: FloatArray, down: FloatArray, density: FloatArray, diameter: float, finest: float
 ) -> FloatArray:
-    """Return the optical density on a sheet from top left, shape (rows, columns).
+    """Return the optical density on a sheet from the top left, shape (rows, columns).
 
-    Dots have middles, m, densities and one diameter, m; those off the sheet are left out as far as they are
-    off it. Pixels are not smaller than the finest, m.
+    Dots have centres, m, densities and one common diameter, m; they are clipped at the edges of the sheet.
+    Pixels are at least `finest`, m.
     """
     size, rows, columns = sheet.pixels(finest)
     radius = 0.5 * diameter / size
@@ -80,7 +80,7 @@ def inked(
     reach = int(np.ceil(radius + soft)) + 1
     x, y = (across - sheet.left) / size - 0.5, (down - sheet.top) / size - 0.5
     on = (x > -reach) & (x < columns + reach) & (y > -reach) & (y < rows + reach)
-    # A border as wide as a dot reaches twice saves telling which of its pixels lie on the sheet.
+    # A border of twice the radius of a dot avoids clipping each dot.
     border = 2 * reach + 1
     x, y, ink = x[on] + border, y[on] + border, density[on]
     wide = columns + 2 * border
@@ -100,7 +100,7 @@ def inked(
 
 
 def coloured(density: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-    """Return the picture of paper with ink of some densities, shape (rows, columns, 3)."""
+    """Return the RGB picture of paper with ink of the given densities, shape (rows, columns, 3)."""
     back = np.exp(-math.log(10.0) * np.asarray(density, np.float32))[..., np.newaxis]
     ink, paper = np.array(INK, np.float32), np.array(PAPER, np.float32)
     return np.asarray(ink + back * (paper - ink) + np.float32(0.5), np.uint8)
@@ -108,10 +108,10 @@ def coloured(density: npt.ArrayLike) -> npt.NDArray[np.uint8]:
 
 View = Literal["page", "zoom", "sheet"]
 VIEWS: Final = get_args(View)
-"""The page with all that there is to see; its worst place alone; the paper alone, at its true size."""
+"""Views: the full page, its worst place, or the sheet of paper at true size."""
 
 ZOOM_SHAPE: Final = 3.5
-"""How many times wider than the height of the wires the worst place is."""
+"""Width of the worst place in units of the height of the wires."""
 
 _WIDTH: Final = 7.6
 _SIDE: Final = 0.2
@@ -137,14 +137,14 @@ _MICRONS: Final = Scale("Placement error", "m", "um")
 def plot(page: Page, view: View = "page") -> Figure:
     """Draw a page.
 
-    In the difference a dot has the colour of its placement error, and crosses are lost dots. In the worst
-    place rings are where dots are wanted, and crosses lost dots.
+    In the difference a dot has the colour of its placement error, and crosses mark lost dots. In the worst
+    place rings mark requested dots, and crosses lost dots.
 
     Parameters
     ----------
     view : str, optional
-        "page": from the top, what was printed, what was wanted, the difference, and the worst place; "zoom":
-        the worst place alone; "sheet": the paper alone, at its true size.
+        "page": from the top, the print, the request, the difference, and the worst place; "zoom": the worst
+        place alone; "sheet": the paper alone, at true size.
     """
     if view == "sheet":
         return _sheet_alone(page)
@@ -153,7 +153,7 @@ def plot(page: Page, view: View = "page") -> Figure:
     if view != "page":
         raise InputError.of("view", view, f"one of {', '.join(VIEWS)}")
     sheet, place = whole_sheet(page), zoomed_sheet(page)
-    # Side by side where the paper is upright, else one below the other.
+    # Side by side if the paper is upright, else one below the other.
     beside = sheet.height > _UPRIGHT * sheet.width
     wide = _WIDTH - 2.0 * _SIDE
     each = (wide - 2.0 * _BESIDE) / 3.0 if beside else wide
@@ -188,7 +188,7 @@ def plot(page: Page, view: View = "page") -> Figure:
 
 
 def whole_sheet(page: Page) -> Sheet:
-    """Return the paper of a page: all its print lines, with a margin about them."""
+    """Return the paper of a page: all its print lines, with a margin."""
     head, pattern = page.head, page.pattern
     margin = 2.0 * head.wire_diameter
     across = (pattern.slots - 1) * head.pitch
@@ -197,12 +197,12 @@ def whole_sheet(page: Page) -> Sheet:
 
 
 def zoom_slots(page: Page) -> int:
-    """Return the slots of the worst place that are shown."""
+    """Return the number of slots shown of the worst place."""
     return max(1, round(ZOOM_SHAPE * page.head.wires * page.head.wire_pitch / page.head.pitch))
 
 
 def zoomed_sheet(page: Page) -> Sheet:
-    """Return the paper about the worst place of a page."""
+    """Return the paper around the worst place of a page."""
     head, slots = page.head, zoom_slots(page)
     line, first = page.worst_place(slots)
     top = line * head.line_pitch
@@ -217,7 +217,7 @@ def zoomed_sheet(page: Page) -> Sheet:
 
 
 def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
-    """Return axes for a sheet: their height, their top above the bottom of the figure, their left, in."""
+    """Return axes for a sheet, placed by height, top (above the bottom of the figure) and left, in."""
     width, whole = figure.get_size_inches()
     wide = height * sheet.width / sheet.height
     ax = figure.add_axes((left / width, (top - height) / whole, wide / width, height / whole))
@@ -244,7 +244,7 @@ def _zoom_title(page: Page) -> str:
 
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places and densities of all that is on the paper, extra contacts among it."""
+    """Return positions and densities of all dots on the paper, including extra contacts."""
     printed, extra = (*page.places, page.density), (*page.extra_places, page.extra_density)
     across, down, density = (
         np.concatenate([values[page.printed], more]) for values, more in zip(printed, extra, strict=True)
@@ -253,7 +253,7 @@ def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _paper(ax: Axes, sheet: Sheet, page: Page, dots: tuple[FloatArray, ...], finest: float) -> None:
-    """Draw a sheet with dots: places across and down, m, and densities; pixels not below the finest, m."""
+    """Draw a sheet with dots: positions across and down, m, densities; pixels at least `finest`, m."""
     across, down, density = dots
     picture = coloured(inked(sheet, across, down, density, page.head.wire_diameter, finest))
     extent = (sheet.left, sheet.right, sheet.bottom, sheet.top)
@@ -273,7 +273,7 @@ def _discs(
 
 
 def _in_points(ax: Axes, length: float) -> float:
-    """Return how long a length on the paper, m, is drawn, points."""
+    """Convert a length on the paper, m, to points of the drawing."""
     figure = ax.get_figure(root=True)
     assert figure is not None
     width, _height = figure.get_size_inches()
@@ -282,12 +282,12 @@ def _in_points(ax: Axes, length: float) -> float:
 
 
 def _differences(figure: Figure, ax: Axes, page: Page, above: float) -> None:
-    """Draw where dots are off, and a scale above the panel, by some inches more than need be."""
+    """Draw the placement errors, and a scale above the panel."""
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
     on, head, (across, down) = page.printed, page.head, page.places
     error = _MICRONS.shown(page.placement_error[on])
-    # At least as wide as the limits, so that nothing shines that is nothing.
+    # The scale covers at least the limits, so that negligible errors stay dark.
     bound = float(_MICRONS.shown(page.limits.arrival * page.speed))
     widest = max(float(np.abs(error).max(initial=0.0)), bound)
     colours = LinearSegmentedColormap.from_list("off", [style.BLUE, _NEUTRAL, style.ORANGE])
@@ -328,7 +328,7 @@ def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
 
 
 def _sign(figure: Figure, page: Page) -> None:
-    """Write below the figure how good the page is."""
+    """Write the quality of the page below the figure."""
     sign(figure, page.hammer)
     _width, whole = figure.get_size_inches()
     left = _SIDE / _WIDTH
@@ -336,7 +336,7 @@ def _sign(figure: Figure, page: Page) -> None:
 
 
 def summary(page: Page) -> str:
-    """Return in a line how good a page is."""
+    """Return the quality of a page in one line."""
     lost, extra = int(page.lost.sum()), int(page.extra_contacts.sum())
     said = [f"{page.line.size} dots wanted", f"{int(page.printed.sum())} printed", f"{lost} lost"]
     if not page.run.all():

@@ -1,4 +1,4 @@
-"""Which function draws which result: all that `Result.plot` knows of pictures."""
+"""Registry of the functions that draw results, used by `Result.plot`."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ PLOTS: Final = {
     "ToleranceYield": "quality.plot_tolerance",
     "ZeroOne": "chaos.exponents.plot_zero_one",
 }
-"""Module and function, by the name of the class of the result; a second picture has a name after a dot."""
+"""Module and function, by the class name of the result; an additional picture has a name after a dot."""
 
 
 def plot(result: object, picture: str = "", **options: Any) -> Figure:
-    """Draw a result; `picture` names a second one, such as "run" for the entry "Feedback.run".
+    """Draw a result; `picture` selects an additional picture, such as "run" for the entry "Feedback.run".
 
     Raises
     ------
     AttributeError
-        There is no such picture of results of that class.
+        The class of the result has no such picture.
     """
     name = ".".join(filter(None, (type(result).__name__, picture)))
     if name not in PLOTS:

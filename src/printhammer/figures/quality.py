@@ -1,8 +1,8 @@
-"""Quality as pictures: force and arrival of every dot, and how both deviate as the rate grows.
+"""Print quality: force and arrival of every dot, and their deviations against the rate.
 
-The damping study as a chart: for every material its safe rate, settle-out time and wear, in rows.
+Damping study: safe rate, settle-out time and wear of every material, in rows.
 
-Tolerance yield: how the safe rates of a production are spread, and what makes a hammer fail.
+Tolerance yield: distribution of the safe rates of a production, and the constants that decide.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ _ROOM: Final = 1.25
 
 @styled
 def plot(quality: Quality) -> Figure:
-    """Draw where the dots of a pattern lie in force and arrival, and one after the other.
+    """Draw the dots of a pattern in the plane of force and arrival, and in sequence.
 
-    Left: every dot, its force over that of the single pulse against how late it arrives, the limits as a box.
-    Right: both against the slot, at most 64 slots, those with the worst dot among them.
+    Left: force of every dot relative to the single pulse, against its delay, with the limits as a box. Right:
+    both against the slot, at most 64 slots that include the worst dot.
     """
     figure = new_figure(3.6, 7.6)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.35))
@@ -84,10 +84,10 @@ def plot(quality: Quality) -> Figure:
 
 @styled
 def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
-    """Draw how force and arrival deviate against the rate, and up to which rate all patterns pass.
+    """Draw the deviations of force and arrival against the rate, and the safe rate.
 
-    Bands from the least to the largest deviation of any dot of any pattern; grey: within limits. Several safe
-    rates, such as of different strategies, are drawn over each other.
+    Bands extend from the smallest to the largest deviation of any dot of any pattern; grey: within limits.
+    Several safe rates, such as of different strategies, are overlaid.
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)
@@ -121,7 +121,7 @@ def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
 
 
 def _box(ax: Axes, limits: Limits, late: FloatArray, share: FloatArray) -> None:
-    """Draw the limits as a box, and choose the view so that box and dots are seen."""
+    """Draw the limits as a box, and set axes limits that include box and dots."""
     from matplotlib.patches import Rectangle
 
     x, y = _US * limits.arrival, 100.0 * limits.force
@@ -139,7 +139,7 @@ def _reach(values: FloatArray, bound: float) -> float:
 
 
 def _window(quality: Quality) -> int:
-    """Return the first slot shown, so that the worst dot is in the middle."""
+    """Return the first slot shown, with the worst dot in the middle."""
     if len(quality.wanted) <= _MOST_SLOTS:
         return 0
     bounds = np.maximum([quality.limits.force, quality.limits.arrival], 1e-300)
@@ -147,7 +147,7 @@ def _window(quality: Quality) -> int:
         np.abs(quality.force / quality.nominal.force - 1.0) / bounds[0],
         np.abs(quality.arrival_deviation) / bounds[1],
     )
-    # Lost dots, whose deviations are NaN, and extra contacts are worse than any deviation.
+    # Lost dots, whose deviations are NaN, and extra contacts rank worse than any deviation.
     worst = int(np.argmax(np.where(np.isnan(off) | (quality.extra_contacts > 0), np.inf, off)))
     middle = int(quality.slot[worst]) - _MOST_SLOTS // 2
     return max(quality.judged_from, min(middle, len(quality.wanted) - _MOST_SLOTS))
@@ -164,9 +164,9 @@ _BAR: Final = 0.66
 def plot_damping(study: DampingStudy) -> Figure:
     """Draw a damping study.
 
-    A row a material. Bars: safe rate, settle-out time, change of momentum at the backstop, all at the same
-    print force. Hollow: that takes more current than is allowed. Dashed: the hammer as it is. What is not
-    known is said instead of a bar.
+    One row per material. Bars: safe rate, settle-out time, and impulse at the backstop, all at the same print
+    force. Hollow: the current exceeds the limit. Dashed: the hammer without change. A text replaces a missing
+    bar.
     """
     count = len(study.materials)
     figure = new_figure(1.3 + _ROW * count, 7.6)
@@ -226,9 +226,9 @@ def _panel(ax: Axes, study: DampingStudy, values: FloatArray, otherwise: list[st
 def plot_tolerance(batch: ToleranceYield, *, bars: int = 8) -> Figure:
     """Draw a tolerance yield, with the constants that matter most.
 
-    Left: the part of the hammers that print every pattern well up to a rate, or, of one rate, the
-    single-pulse dots of those that pass and of those that do not. Right: the rank correlation of each
-    constant with the safe rate, or with passing; grey: what chance does.
+    Left: fraction of hammers that print every pattern within limits, against the rate; or, for a single rate,
+    the single-pulse dots of passing and failing hammers. Right: rank correlation of each constant with the
+    safe rate, or with passing; grey: range of chance.
     """
     figure = new_figure(3.6, 7.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))

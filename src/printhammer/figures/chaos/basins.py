@@ -1,8 +1,8 @@
-"""Basins in the plane of the initial states, each in a colour, with the attractors drawn in.
+"""Basins in the plane of the initial states, with the attractors.
 
-Stable and unstable manifolds of saddles in the plane of displacement and velocity.
+`plot_manifolds` draws stable and unstable manifolds of saddles.
 
-The quench map: where the second dot is lost and how high the hammer comes; else how hard it prints.
+`plot_quench` draws the quench map: second peak of lost dots, print force of the others.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 COLOURS: Final = {"stable": BLUE, "unstable": ORANGE}
 _LIGHT: Final = {"stable": "white", "unstable": INK}
-"""Over the colours of basins."""
+"""Colours of manifolds over basins."""
 
 
 @styled
 def plot_manifolds(manifolds: Manifolds) -> Figure:
-    """Draw the manifolds of one saddle, and the saddle in the middle."""
+    """Draw the manifolds of a saddle, and the saddle itself."""
     figure, ax = new_panel(5.0)
     largest = np.nanmax(np.abs(manifolds.x)) if len(manifolds.x) else 1.0
     way, speed = scale("displacement", float(largest)), scale("velocity")
@@ -52,7 +52,7 @@ def plot_manifolds(manifolds: Manifolds) -> Figure:
 def draw(
     ax: Axes, manifolds: Manifolds, way: Scale, speed: Scale, colours: dict[str, str] = _LIGHT
 ) -> list[Line2D]:
-    """Draw manifolds and their saddle in axes as they are; return a handle of each kind and of the saddle."""
+    """Draw manifolds and their saddle into existing axes; return one legend handle for each kind."""
     from matplotlib.patheffects import withStroke
 
     from printhammer.chaos.orbits.manifolds import KINDS
@@ -82,10 +82,10 @@ def draw(
 
 
 SHADES: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00", "#999933")
-"""Colours of the basins, of M. Okabe and K. Ito (2008); further ones begin anew, lighter."""
+"""Colours of the basins, by M. Okabe and K. Ito (2008); further basins repeat them, lighter."""
 
 OTHERS: Final = {0: ("undecided", "#ffffff"), -1: ("run ended early", "#1a1a1a"), -2: ("no state", "#d9d9d9")}
-"""Names and colours of the cells that lead to no known attractor, by label."""
+"""Names and colours of the cells that reach no known attractor, by label."""
 
 _MARKS: Final = "os^Dvph*"
 _LIGHTER: Final = 0.5
@@ -94,7 +94,7 @@ _FEW: Final = 4
 
 
 def shade(number: int) -> str:
-    """Return the colour of the basin of an attractor, numbered from 1 on."""
+    """Return the colour of the basin of an attractor, counted from 1."""
     turn, place = divmod(number - 1, len(SHADES))
     parts = [int(SHADES[place][k : k + 2], 16) for k in (1, 3, 5)]
     for _ in range(min(turn, 2)):
@@ -104,9 +104,9 @@ def shade(number: int) -> str:
 
 @styled
 def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifolds] = ()) -> Figure:
-    """Draw basins, and in them the attractors where they lie in the plane, marked at the firings.
+    """Draw basins, and the attractors that lie in their plane, at the firings.
 
-    Over them `manifolds` of saddles, white the stable ones, which bound basins, and dark the unstable ones.
+    `manifolds` of saddles are drawn on top: stable ones, which bound basins, in white, unstable ones dark.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
@@ -172,7 +172,7 @@ def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifol
 
 PRINTED: Final = "viridis"
 LOST: Final = "bone"
-"""Colours of the force of printed dots, and of the second peak where the dot is lost; both monotonous."""
+"""Colour maps of the force of printed dots, and of the second peak of lost dots; both monotonic."""
 
 _FAILED: Final = "#d55e00"
 _FEW_QUENCH: Final = 0.01
@@ -182,7 +182,7 @@ _FEW_QUENCH: Final = 0.01
 def plot_quench(quenches: QuenchMap) -> Figure:
     """Draw a quench map.
 
-    Crosses: the two cases of Fig. 6 of the paper, where they lie in the plane.
+    Crosses mark the two cases of Fig. 6 of the paper, if they lie in the plane.
     """
     figure, ax = new_panel(4.6)
     across = Scale("Second firing after the first", "s", "ms")
@@ -200,7 +200,7 @@ def plot_quench(quenches: QuenchMap) -> Figure:
         bar.set_label("Printed: force over that of the first alone", fontsize=SMALL)
     if quenches.lost.any():
         mesh = ax.pcolormesh(x, y, lost, cmap=LOST, vmin=0.0, vmax=1.0, rasterized=True)
-        # Beyond 1 where the second firing falls into the contact of the first dot.
+        # The ratio exceeds 1 if the second firing falls into the contact of the first dot.
         bar = figure.colorbar(mesh, ax=ax, pad=0.02, fraction=0.05, extend="max")
         bar.set_label("Lost: second peak, parts of the way to the pack", fontsize=SMALL)
     width = getattr(quenches.waveform, "width", None)
@@ -217,7 +217,7 @@ def plot_quench(quenches: QuenchMap) -> Figure:
         crosses = {"marker": "x", "mew": 1.4, "label": "the two cases of Fig. 6", "gid": "Fig. 6"}
         if shown:
             dots(ax, across.shown(shown), level, 6.0, "white", **crosses)
-        # White on grey, as the marks are white on the map.
+        # White on grey, since the marks on the map are white.
         box = {
             "frameon": True,
             "facecolor": MUTED,

@@ -1,4 +1,4 @@
-"""A bifurcation diagram: the states at the firings against a parameter, and the verdicts below."""
+"""Bifurcation diagrams: states at the firings against a parameter, with bands of verdicts below."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ SHADES: Final = {
 """Colour of the band of a verdict."""
 
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
-"""Colours of points that one direction alone leads to; none is that of a band."""
+"""Colours of points reached from one direction only; distinct from those of the bands."""
 
 _POINT: Final = 0.7
 _MOST: Final = 3_000_000
-"""Number of points above which they are drawn smaller."""
+"""Number of points above which they are drawn smaller; arbitrary."""
 _SPARSE: Final = 150
-"""Number of values up to which points are drawn larger."""
+"""Number of values up to which points are drawn larger; arbitrary."""
 _FEW: Final = 1e-3
 
 
@@ -54,20 +54,20 @@ def plot(
 ) -> Figure:
     """Draw a bifurcation diagram.
 
-    Black: points to which all directions lead; orange and violet: points to which only rising or
-    falling values do. The bands below tell the verdicts.
+    Black points are reached from all directions, orange and violet ones by rising or falling values only. The
+    bands below show the verdicts.
 
     Parameters
     ----------
     show : str, optional
         "x": displacements at the firings; "v": velocities.
     orbits : iterable, optional
-        Drawn over in green: periodic orbits of `printhammer.orbits`, filled circles for stable and open ones
-        for unstable ones, and branches of `printhammer.continuation`, drawn out for stable and dotted for
-        unstable orbits; also collections of them.
+        Orbits to draw on top in green: periodic orbits of `printhammer.orbits` (filled circles if stable,
+        else open ones), branches of `printhammer.continuation` (solid if stable, else dotted), and
+        collections of both.
     limits : tuple of float, optional
-        Least and largest displacement or velocity shown, SI; by default all but one in a thousand at
-        either end are shown, and the others counted.
+        Range of displacement or velocity shown, SI; by default it excludes one point in a thousand at each
+        end, and the number of excluded points is stated.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def plot(
 
 
 def parameter_scale(diagram: Bifurcation) -> Scale:
-    """Return how the parameter is shown."""
+    """Return the scale of the parameter axis."""
     note = diagram.regime.quantity(diagram.parameter)
     unit, meaning = note.si, note.meaning
     if diagram.parameter == PERIOD:
@@ -127,7 +127,7 @@ def parameter_scale(diagram: Bifurcation) -> Scale:
 
 
 def _most(states: FloatArray) -> tuple[float, float]:
-    """Return limits that hold all but a few of the states."""
+    """Return limits that include all but a few of the states."""
     known = states[np.isfinite(states)]
     low, high = (float(end) for end in np.quantile(known, [_FEW, 1.0 - _FEW]))
     room = 0.06 * (high - low) or 0.01 * abs(high) or 1.0
@@ -146,13 +146,13 @@ def _points(ax: Axes, diagram: Bifurcation, states: FloatArray, across: Scale, u
         for chosen, color, zorder in kinds:
             y = up.shown(states[way][chosen])
             gid = f"points {name}" if chosen is apart else "points"
-            # Hundreds of thousands of points would make a vector picture useless.
+            # Rasterise: hundreds of thousands of points would make a vector picture useless.
             how = {"alpha": 0.6, "rasterized": True, "zorder": zorder, "gid": gid}
             dots(ax, np.repeat(values[chosen], y.shape[1]), y.reshape(-1), size, color, **how)
 
 
 def _each(orbits: Iterable[Any]) -> Iterable[Any]:
-    """Return orbits and branches one by one, whatever collections they come in."""
+    """Iterate over orbits and branches in nested collections."""
     for entry in [orbits] if hasattr(orbits, "multipliers") else orbits:
         if hasattr(entry, "multipliers"):
             yield entry
@@ -161,7 +161,7 @@ def _each(orbits: Iterable[Any]) -> Iterable[Any]:
 
 
 def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale, up: Scale) -> None:
-    """Draw a periodic orbit as circles, or a branch of them as curves."""
+    """Draw a periodic orbit as circles, or a branch as curves."""
     states = up.shown(getattr(orbit, show))
     if states.ndim == 2:
         if orbit.parameter != diagram.parameter or orbit.phase != diagram.phase:
@@ -191,7 +191,7 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
 def _crossed(
     values: FloatArray, states: FloatArray, size: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Put points on a branch where, by a straight line, the absolute value of the multiplier passes 1."""
+    """Insert points on a branch where the linearly interpolated multiplier crosses the unit circle."""
     at = np.flatnonzero((size[1:] < 1.0) != (size[:-1] < 1.0))
     share = (1.0 - size[at]) / (size[at + 1] - size[at])
     middle = values[at] + share * (values[at + 1] - values[at])
@@ -227,7 +227,7 @@ def _kind(verdict: str, stopped: bool) -> str:
 
 
 def _key(strip: Axes, diagram: Bifurcation) -> None:
-    """Write below what the colours mean: of the bands that are there, and of points of one direction."""
+    """Draw the legend of the bands present, and of the points reached from one direction."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

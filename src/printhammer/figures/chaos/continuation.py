@@ -1,4 +1,4 @@
-"""Branches of periodic orbits along a constant: stable solid, unstable dashed, branch points marked."""
+"""Branches of periodic orbits against a constant: stable solid, unstable dashed, branch points marked."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ def plot(
     grazings: bool = True,
     limits: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw branches against their constant.
+    """Draw branches against their parameter.
 
-    A colour for each number of firings.
+    The colour shows the orbit period in firings.
 
     Parameters
     ----------
     branches : Branch or Branches
         From `printhammer.continuation` or `printhammer.regimes`.
     show : str, optional
-        What is drawn upward: "x", "v", "flight_time", "impact_speed" or "peak_force".
+        Quantity of the vertical axis: "x", "v", "flight_time", "impact_speed" or "peak_force".
     grazings : bool, optional
         Whether grazings are marked beside folds, period doublings and the like.
     limits : tuple of float, optional
-        Ends of the upward axis, SI.
+        Limits of the vertical axis, SI.
     """
     drawn: list[Branch] = list(getattr(branches, "found", [branches]))
     if not drawn:
@@ -88,14 +88,14 @@ def plot(
 
 
 def axis_of(name: str, si: str) -> tuple[str, float]:
-    """Return what is written on the axis of a constant, and the factor by which its values are multiplied."""
+    """Return the axis label of a parameter, and the factor that converts its values."""
     unit, factor = _AXIS.get(si, (si, 1.0))
     title = name[:1].upper() + name[1:] if "." not in name else name
     return f"{title}  [{unit}]" if unit else title, factor
 
 
 def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> None:
-    """Draw the lines of one branch; factors by which the constant and the quantity are multiplied."""
+    """Draw the lines of a branch; `factors` convert parameter and quantity."""
     values, table, stable = _with_points(branch, show)
     colour = colour_of(branch.firings)
     begin = 0
@@ -113,7 +113,7 @@ def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> N
 
 
 def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, list[bool]]:
-    """Return constant and quantity with the branch points put in, and the stability of each piece of line."""
+    """Return parameter and quantity with the branch points inserted, and the stability of each line piece."""
     table = getattr(branch, show)
     values, rows, stable = [branch.values[0]], [table[0]], []
     inside: dict[int, list[Any]] = {}
@@ -126,7 +126,7 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
             rows.append(_at_event(branch, event, table))
             stable.append(bool(branch.stable[i]))
         if show in ("x", "v") and branch.phases[i] != branch.phases[i + 1]:
-            # The state at another section: nothing jumps but what is looked at.
+            # The section changes here: only the quantity shown jumps.
             values.append(branch.values[i])
             rows.append(np.full_like(table[i], np.nan))
             stable.append(bool(branch.stable[i]))
@@ -137,7 +137,7 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
 
 
 def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
-    """Return a quantity where something happens on a branch, by the arc length between two of its points."""
+    """Return a quantity at an event of a branch, interpolated in the arc length."""
     i, nodes = event.after, branch.curve.nodes
     span = nodes[i + 1].arc - nodes[i].arc
     share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5
@@ -147,7 +147,7 @@ def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
 def _mark(
     ax: Axes, branches: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
 ) -> list[str]:
-    """Mark what happens on the way; return which kinds there are."""
+    """Mark the events of branches; return the kinds present."""
     kinds: list[str] = []
     for branch in branches:
         table = getattr(branch, show)
@@ -165,7 +165,7 @@ def _mark(
 
 
 def colour_of(firings: int) -> str:
-    """Return the colour of orbits of so many firings."""
+    """Return the colour of orbits of a given period in firings."""
     return _COLOURS.get(firings, style.INK)
 
 
@@ -185,7 +185,7 @@ def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
 
 
 def _remarks(branches: Sequence[Branch]) -> list[str]:
-    """Return what a reader must know of ends that are none of the bounds."""
+    """Return remarks on branches that end before the bounds."""
     reasons = {
         "length": "where the number of steps was used up",
         "lost": "where Newton's method does not converge",

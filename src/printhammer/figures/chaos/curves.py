@@ -1,6 +1,6 @@
-"""A curve of bifurcations in the plane of two constants, with attractors of trains from rest beneath.
+"""Bifurcation curves in the plane of two constants, over the attractors of trains from rest.
 
-The designer's chart: curves on which an orbit loses its stability, and what trains from rest settle to.
+`plot_chart` is the designer's chart: stability limits of an orbit, and attractors of trains from rest.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ _REGION: Final = "#cfe3f1"
 def plot_chart(chart: StabilityChart) -> Figure:
     """Draw a stability chart.
 
-    The first constant to the right, the second upward. Shaded: where the train from rest settles to the
-    orbit's period; grey: where its run stopped.
+    Horizontal: first constant; vertical: second. Shaded: the train from rest settles to the orbit's period;
+    grey: its run stopped early.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -84,7 +84,7 @@ def plot_chart(chart: StabilityChart) -> Figure:
 
 
 def edges(axis: np.ndarray) -> np.ndarray:
-    """Return the edges of the cells around values that are evenly spaced."""
+    """Return the cell edges around evenly spaced values."""
     half = 0.5 * (axis[1] - axis[0]) if len(axis) > 1 else 0.5 * abs(axis[0])
     return np.append(axis - half, axis[-1] + half)
 
@@ -96,17 +96,17 @@ _NONE: Final = "#f1f1f1"
 
 @styled
 def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
-    """Draw a bifurcation curve, the first constant to the right, the second upward.
+    """Draw a bifurcation curve, the first constant horizontal, the second vertical.
 
-    Heavy where stability is lost, and dashed where a period doubling is subcritical; points of codimension
-    two are marked and named.
+    The curve is heavy where stability is lost, and dashed where a period doubling is subcritical; points of
+    codimension two are marked and named.
 
     Parameters
     ----------
     curve : BifurcationCurve
         From `printhammer.bifurcation_curve`.
     attractors : bool, optional
-        Whether the plane is coloured by what trains from rest settle to, where that is known: see `grid` of
+        Whether to colour the plane by the attractors of trains from rest, if computed: see `grid` of
         `printhammer.bifurcation_curve`.
     """
     from matplotlib.lines import Line2D
@@ -144,7 +144,7 @@ def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
 
 
 def _shade(ax: Axes, curve: BifurcationCurve, factors: tuple[float, ...]) -> list[Patch]:
-    """Colour the plane by the period to which trains from rest settle; return what the legend says of it."""
+    """Colour the plane by the period of trains from rest; return the legend entries."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 

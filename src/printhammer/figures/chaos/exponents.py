@@ -1,10 +1,10 @@
 """Lyapunov exponents: running estimates of one train, many trains side by side, and the 0-1 test.
 
-Correlation sums and their local slopes against the distance, with the plateau.
+`plot_correlation`: correlation sums and their local slopes against the distance, with the plateau.
 
-Distributions of finite-time exponents: histograms over stretches of several lengths.
+`plot_finite_time`: histograms of finite-time exponents over stretches of several lengths.
 
-Recurrence plots with what is counted in them.
+`plot_recurrence`: recurrence plot with its quantities.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ if TYPE_CHECKING:
 
 _COLOURS: Final = (style.BLUE, style.ORANGE)
 _SIGMAS: Final = 3.0
-"""Standard errors that a band or bar reaches to either side: as many as decide on a sign."""
+"""Half-width of bands and bars in standard errors, the same as for the sign of an exponent."""
 
 
 @styled
 def plot(spectrum: Lyapunov) -> Figure:
     """Draw the running estimates of both exponents against the number of firings.
 
-    Bands reach three standard errors to either side.
+    Bands are three standard errors wide on either side.
     """
     figure = new_figure(4.6)
     upper, lower = figure.subplots(2, 1, sharex=True)
@@ -68,7 +68,7 @@ def plot(spectrum: Lyapunov) -> Figure:
     upper.axhline(0.0, color=style.MUTED, lw=style.HAIR, zorder=1.0, gid="zero")
     lower.set_xlabel("Number of firings averaged over")
     lower.set_xscale("log")
-    # Also where no estimate is finite.
+    # Set the limits even if no estimate is finite.
     lower.set_xlim(max(0.9 * float(counts[0]), 0.5), 1.1 * float(counts[-1]))
     heading(upper, _title(spectrum))
     remarks = [] if spectrum.ok else [f"The run ended early: {spectrum.status}."]
@@ -95,7 +95,7 @@ def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colou
     reach = _SIGMAS * errors[sure]
     band = (means[sure] - reach, means[sure] + reach)
     ax.fill_between(counts[sure], *band, color=colour, alpha=0.18, lw=0.0, zorder=2.0, gid="band")
-    # The first few firings say nothing; they do not set the limits.
+    # The first few firings have no meaning and do not set the limits.
     settled = sure & (counts >= counts[-1] // 20)
     if settled.any():
         low = float((means - _SIGMAS * np.where(sure, errors, 0.0))[settled].min())
@@ -109,8 +109,8 @@ def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colou
 def plot_chart(chart: LyapunovChart) -> Figure:
     """Draw both exponents and the K of the 0-1 test against the time between firings.
 
-    Bars reach three standard errors to either side, open marks are trains on which exponent and 0-1 test do
-    not both decide, or do not agree.
+    Bars are three standard errors on either side; open marks are trains for which the exponent and the 0-1
+    test disagree or one is undecided.
     """
     figure = new_figure(6.0)
     grid = figure.add_gridspec(3, 1, height_ratios=(3.0, 2.0, 2.0), hspace=0.04)
@@ -173,7 +173,7 @@ def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
 
 @styled
 def plot_zero_one(test: ZeroOne) -> Figure:
-    """Draw what the 0-1 test looks at: the path, its mean square displacement, and the correlations.
+    """Draw the data of the 0-1 test: path, mean square displacement, and correlations.
 
     Path and displacement are those of the angle with the median correlation, ringed at the right.
     """
@@ -203,7 +203,7 @@ def plot_zero_one(test: ZeroOne) -> Figure:
 
 @styled
 def plot_correlation(correlation: CorrelationDimension) -> Figure:
-    """Draw the correlation sums, below them their local slopes, and the dimension if there is a plateau."""
+    """Draw the correlation sums, their local slopes below, and the dimension if there is a plateau."""
     figure = new_figure(5.0)
     above, below = figure.subplots(2, 1, sharex=True)
     some = correlation.sums > 0.0
@@ -225,7 +225,7 @@ _BINS: Final = 60
 
 @styled
 def plot_finite_time(finite: FiniteTime) -> Figure:
-    """Draw the densities of the exponents of stretches of each length, and that of the whole train."""
+    """Draw the densities of finite-time exponents for each length, and the exponent of the whole train."""
     figure, ax = new_panel(4.2)
     ends = min(row.min() for row in finite.values), max(row.max() for row in finite.values)
     bins = np.linspace(*ends, _BINS + 1).tolist() if ends[0] < ends[1] else _BINS
@@ -253,9 +253,9 @@ _NAMES: Final = {
 
 @styled
 def plot_recurrence(recurrence: Recurrence) -> Figure:
-    """Draw a recurrence plot: a point where two states lie within the threshold of each other.
+    """Draw a recurrence plot: a point for each pair of states closer than the threshold.
 
-    The quantities stand beside the plot.
+    The quantities are listed beside the plot.
     """
     from matplotlib.colors import ListedColormap
 
@@ -268,7 +268,7 @@ def plot_recurrence(recurrence: Recurrence) -> Figure:
         vmin=0,
         vmax=1,
         extent=(0.5, count + 0.5, 0.5, count + 0.5),
-        # Averaged where there are more points than pixels, so that no line vanishes.
+        # Average if there are more points than pixels, so that no line vanishes.
         interpolation="antialiased",
         interpolation_stage="rgba",
     )

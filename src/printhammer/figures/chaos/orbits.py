@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS: Final = 600
-"""Strobe points below the orbits, after a third as many firings that are left out."""
+"""Number of strobe points below the orbits; a third as many firings are discarded first."""
 
 _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D", style.YELLOW))
 """Marker and colour of orbits of 1, 2, 3 and 4 firings."""
@@ -48,8 +48,8 @@ _LINES: Final = ("-", "--", "-.", ":")
 def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) -> Figure:
     """Draw orbits at their firings over the strobe points of the train from rest, and some against time.
 
-    Stable orbits are filled marks, all others open ones; the first few are drawn against time below. Orbits
-    of more firings than `longest` are left out.
+    Stable orbits are filled marks, all others open; the first few are drawn against time below. Orbits with a
+    period above `longest` firings are omitted.
     """
     shown = [orbit for orbit in orbits if longest is None or orbit.firings <= longest]
     traced = shown[:_TRACES]
@@ -68,7 +68,7 @@ def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) ->
 
 @styled
 def plot_orbit(orbit: Orbit) -> Figure:
-    """Draw one orbit: its curve in the plane of displacement and velocity, and displacement against time.
+    """Draw an orbit in the plane of displacement and velocity, and against time.
 
     Marks are the states at the firings.
     """
@@ -94,7 +94,7 @@ def plot_orbit(orbit: Orbit) -> Figure:
 
 
 def _strobe_points(regime: Regime, points: int) -> FloatArray:
-    """Return strobe points of the train from rest, shape (n, 2); none where the hammer has no rest state."""
+    """Return strobe points of the train from rest, shape (n, 2); empty without a rest state."""
     if points < 1:
         return np.zeros((0, 2))
     own: dict[str, Any] = (
@@ -164,7 +164,7 @@ def _style(orbit: Orbit) -> tuple[str, str]:
 
 
 def _traces(ax: Axes, orbits: list[Orbit]) -> None:
-    """Draw displacement against time from the first firing of each orbit on."""
+    """Draw displacement against time, from the first firing of each orbit."""
     motions = [orbit.motion() for orbit in orbits]
     hammer = orbits[0].regime.hammer
     way = scale("displacement", max(float(np.abs(motion.x).max()) for motion in motions))
@@ -196,18 +196,18 @@ def _traces(ax: Axes, orbits: list[Orbit]) -> None:
 
 
 def _from_firing(orbit: Orbit, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return times since the first firing, s, and displacements, m, of a period that begins at it."""
+    """Return times since the first firing, s, and displacements, m, over one period."""
     since = motion.t - motion.start + orbit.phase * orbit.regime.period
     if orbit.phase == 0.0:
         return since, motion.x
     late = int(np.searchsorted(since, (1.0 - 1e-9) * orbit.period))
-    # The last point is the first one again.
+    # The last point repeats the first one.
     times = np.concatenate([since[late:-1] - orbit.period, since[:late]])
     return times, np.concatenate([motion.x[late:-1], motion.x[:late]])
 
 
 def _room(ax: Axes, x: FloatArray, v: FloatArray) -> None:
-    """End the axes a little outside of all points."""
+    """Set the axes limits with a small margin around all points."""
     for values, put in ((x, ax.set_xlim), (v, ax.set_ylim)):
         low, high = float(values.min()), float(values.max())
         room = _ROOM * (high - low) or 1e-2 * abs(high) or 1e-9
@@ -215,6 +215,6 @@ def _room(ax: Axes, x: FloatArray, v: FloatArray) -> None:
 
 
 def _number(multiplier: complex) -> str:
-    """Return a multiplier as text; without an imaginary part where it has none."""
+    """Format a Floquet multiplier, without an imaginary part if it is real."""
     real = f"{multiplier.real:.4g}"
     return real if multiplier.imag == 0.0 else f"{real} {multiplier.imag:+.4g} i"

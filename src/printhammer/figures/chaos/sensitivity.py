@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")
-"""Quantities drawn unless told otherwise."""
+"""Default quantities."""
 
 _COLUMNS: Final = 2
 _BAR: Final = 0.62
@@ -32,13 +32,13 @@ def plot(
 ) -> Figure:
     """Draw the largest sensitivities of one dot, or of the whole run.
 
-    A bar is the relative change of the quantity for a relative change of the constant: with a bar of 2, one
-    per cent of the constant makes two per cent of the quantity. Constants that are zero have none.
+    A bar is the relative change of the quantity per relative change of the constant: a bar of 2 means that 1
+    % of the constant changes the quantity by 2 %. Constants that are zero have no bar.
 
     Parameters
     ----------
     dot : int, optional
-        Number of the firing, from 0; by default the first that struck.
+        Index of the firing, from 0; by default the first printed dot.
     quantities : sequence of str, optional
         Quantities of a dot or of the run, one panel each.
     bars : int, optional
@@ -67,7 +67,7 @@ def plot(
 
 
 def _dot(table: Sensitivities, dot: int | None, quantities: Sequence[str]) -> int:
-    """Return the number of the dot to draw."""
+    """Return the index of the dot to draw."""
     struck = [k for k in range(len(table.dots)) if k not in table.lost]
     if all(name in table.run_quantities for name in quantities):
         return 0
@@ -94,7 +94,7 @@ def _sensitivities(table: Sensitivities, name: str, dot: int) -> FloatArray:
 
 
 def _panel(ax: Axes, table: Sensitivities, values: FloatArray, bars: int) -> None:
-    """Draw one quantity; what is zero to the digits shown is left out."""
+    """Draw one quantity, without the bars that round to zero."""
     sizes = np.where(np.isfinite(values), np.abs(values), 0.0)
     order = [int(k) for k in np.argsort(-sizes, kind="stable")[:bars] if sizes[k] >= 5e-4]
     if not order:
@@ -109,7 +109,7 @@ def _panel(ax: Axes, table: Sensitivities, values: FloatArray, bars: int) -> Non
         text = f"{value:+.3g}".replace("-", "−")
         beside(ax, text, (value, height), (shift, 0.0), f"{side} center", color=style.INK)
     ax.axvline(0.0, color=style.INK, lw=style.HAIR)
-    # Room for the numbers at the ends of the bars.
+    # Leave room for the numbers at the ends of the bars.
     least = min(float(values[k]) for k in order)
     most = max(float(values[k]) for k in order)
     ax.set_xlim(min(least, 0.0) - 0.32 * longest, max(most, 0.0) + 0.32 * longest)

@@ -1,8 +1,8 @@
 """Strobe points in the plane of displacement and velocity: one train, or a panel of several.
 
-Impact maps: velocity at touch against the time since the last firing.
+`plot_section`: impact maps, velocity at touch against the time since the last firing.
 
-Impact trains: histogram, return map and autocorrelation of the intervals between impacts.
+`plot_train`: histogram, return map and autocorrelation of the intervals between impacts.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from printhammer.chaos import ImpactTrain, Section, Strobe
 
 _FEW: Final = 20
-"""Points that an inset needs."""
+"""Smallest number of points for an inset; arbitrary."""
 _CYCLE: Final = 8
 """Largest period whose points are ringed."""
 
 _SMALL: Final = 0.04
-"""Share of the window that an attractor without a period fills at most to be drawn larger in an inset."""
+"""Fraction of the window below which an attractor without a period is enlarged in an inset; arbitrary."""
 _PLACES: Final = ((0.55, 0.36), (0.06, 0.36), (0.06, 0.06), (0.55, 0.06))
 _INSET: Final = (0.38, 0.42)
 """Lower left corners and size of insets, fractions of the axes."""
@@ -55,14 +55,14 @@ RING: Final[dict[str, Any]] = {
     "mfc": "none",
     "mec": style.ORANGE,
 }
-"""How the last points of a periodic train are marked."""
+"""Style of the rings around the last points of a periodic train."""
 
 
 @styled
 def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
     """Draw strobe points: velocity against displacement, the backstop, and the verdict.
 
-    Rings are the last points of a periodic train. To fit, the axes end close about the points, instead of at
+    Rings mark the last points of a periodic train. With `fit`, the axes limits follow the points instead of
     the window of Fig. 11.
     """
     figure, ax = new_panel(4.6)
@@ -81,7 +81,7 @@ def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
 
 
 def _close(strobe: Strobe) -> Window:
-    """Return a window close about the points; that of the hammer where there are none."""
+    """Return a window that fits the points; that of the hammer if there are none."""
     known = np.isfinite(strobe.x)
     if not known.any():
         return strobe.window
@@ -94,7 +94,7 @@ def _close(strobe: Strobe) -> Window:
 
 
 def scales_of(window: Window) -> tuple[Scale, Scale]:
-    """Return how displacements and velocities of a window are shown."""
+    """Return the scales of displacement and velocity for a window."""
     return scale("displacement", max(abs(end) for end in window.x)), scale("velocity")
 
 
@@ -109,10 +109,10 @@ def panel(
     named: bool = True,
     printed: str = "",
 ) -> None:
-    """Draw the points of one train into axes that end with a window; points outside are counted in a corner.
+    """Draw the points of a train into axes limited by a window; a corner states the number outside.
 
-    `size` is that of a point, points; `named` has strobe time and verdict written inside, and `printed`, the
-    verdict of the paper, above that on the points where it is another.
+    `size` is the diameter of a point, points; `named` writes strobe time and verdict inside; `printed`, the
+    verdict of the paper, is added if it differs.
     """
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))
@@ -139,9 +139,9 @@ def panel(
 
 
 def _enlarged(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale, size: float) -> None:
-    """Draw the attractor of a train without a period once more, larger, where it fills little of the panel.
+    """Draw an inset that enlarges the attractor of a train without a period, if it is small.
 
-    The first half of the points may be a transient, and does not count.
+    The first half of the points is ignored, since it may be a transient.
     """
     judged = strobe.verdict
     later = slice(len(strobe.x) // 2, None)
@@ -169,7 +169,7 @@ def _enlarged(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale
 
 
 def shown_period(period: float) -> str:
-    """Return a strobe time, s, as it is written in a figure: with two decimals if that is all there is."""
+    """Format a strobe time, s, with two decimals if that is exact."""
     number = from_si(period, "s", "ms")
     short = f"{number:.2f}"
     return f"{short if math.isclose(float(short), number, rel_tol=1e-9) else f'{number:.6g}'} ms"
@@ -179,7 +179,7 @@ def shown_period(period: float) -> str:
 def plot_section(section: Section) -> Figure:
     """Draw the touches of a surface: velocity against the time since the last firing.
 
-    The whole period is shown.
+    The time axis covers the whole period.
     """
     figure, ax = new_panel(4.2)
     time, speed = scale("time", section.period), scale("velocity")
@@ -202,8 +202,8 @@ def plot_section(section: Section) -> Figure:
 def plot_train(train: ImpactTrain) -> Figure:
     """Draw the statistics of an impact train.
 
-    Histogram of the intervals, each interval against the one before, and their autocorrelation; what
-    independent intervals would not exceed in 19 of 20 lags lies between the broken lines.
+    Histogram of the intervals, each interval against the one before, and their autocorrelation; the broken
+    lines enclose 19 of 20 lags of independent intervals.
     """
     figure = new_figure(2.9)
     bars, returns, lags = figure.subplots(1, 3)

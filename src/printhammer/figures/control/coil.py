@@ -1,8 +1,8 @@
-"""Dead time and pulses of the same blow against rail and temperature.
+"""Dead time, and pulses of equal impact speed, against rail voltage and temperature.
 
-Thermal duty: the largest rate of a coil against the ambient temperature.
+`plot_duty`: highest rate of a coil against the ambient temperature.
 
-Errors of times of impact that are estimated from the coil.
+`plot_impact_time`: errors of impact times estimated from the coil.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 @styled
 def plot_dead_time(table: DeadTime) -> Figure:
-    """Draw times from switching on to impact and widths against the rail, a line for each temperature.
+    """Draw dead time and pulse width against the rail voltage, a line for each temperature.
 
-    Thin and dashed: with the hammer's own pulse. Bold: with the pulses that give the same blow.
+    Thin and dashed: nominal pulse. Bold: pulses of equal impact speed.
     """
     figure = new_figure(5.2)
     grid = figure.add_gridspec(2, 1)
@@ -62,7 +62,7 @@ _COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)
 
 @styled
 def plot_duty(duty: ThermalDuty) -> Figure:
-    """Draw the rate that a coil stands for ever, which falls to zero at its limit."""
+    """Draw the highest continuous rate of a coil, which falls to zero at its temperature limit."""
     figure, ax = new_panel(3.4)
     ax.plot(duty.ambient, duty.rate, "o", color=style.BLUE, ms=4.5)
     reach = np.array([min(float(duty.ambient.min()), 0.0), duty.limit])
@@ -76,7 +76,7 @@ def plot_duty(duty: ThermalDuty) -> Figure:
 
 @styled
 def plot_limit(limit: ThermalLimit) -> Figure:
-    """Draw stated rates, and the lines to the one limit at which all of them end."""
+    """Draw stated rates, and the lines to their common temperature limit."""
     figure, ax = new_panel(3.4)
     for number, rail in enumerate(np.unique(limit.voltage).tolist()):
         rows = limit.voltage == rail
@@ -106,9 +106,9 @@ _MICRO: Final = 1e6
 
 @styled
 def plot_impact_time(study: ImpactTime) -> Figure:
-    """Draw standard deviation and size of the bias against the noise, a line for each rate and converter.
+    """Draw standard deviation and magnitude of the bias against the noise, for each rate and converter.
 
-    Orange: on the nominal hammer. Blue: over units, whose differences no averaging takes away.
+    Orange: nominal hammer. Blue: units, whose differences do not average out.
     """
     figure = new_figure(5.2)
     grid = figure.add_gridspec(2, 1)

@@ -1,6 +1,6 @@
-"""Feedback beside other ways to drive: how far dots are off, the second of two by the gap, and one run.
+"""Feedback compared with other drives: deviations of dots, the second of two dots, and one run.
 
-Bursts of least work: motion, current and energies of one, and what they cost against the rate.
+Bursts of least work: motion, current and energies, and their cost against the rate.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ _REACH: Final = 4.0
 
 @styled
 def plot(feedback: Feedback) -> Figure:
-    """Draw a comparison of feedback with other ways to drive.
+    """Draw a comparison of feedback with other drives.
 
-    Above: how many dots of all patterns are off by how much, lost ones not among them; what is farther off
-    than the axis reaches is counted at its ends. Below: the second of two dots, by the time between their
-    slots. Between the dashed lines a dot is within limits.
+    Above: histogram of deviations of all patterns, without lost dots; deviations beyond the axis are counted
+    at its ends. Below: the second of two dots, against the time between their slots. Dots between the dashed
+    lines are within limits.
     """
     figure = new_figure(5.6)
     grid = figure.add_gridspec(2, 2)
@@ -58,7 +58,7 @@ def plot(feedback: Feedback) -> Figure:
     heading(above[0], f"All dots of the patterns of eight slots at {feedback.rate:.6g} Hz")
     heading(above[1], "what is farther off: at the ends", loc="right")
     heading(below[0], "The second of two dots")
-    # Room for the legend above the bars.
+    # Leave room for the legend above the bars.
     room = 1.1 + 0.14 * len(feedback.strategies)
     highest = above[1].get_ylim()[1]
     above[1].set_ylim(0.0, room * highest)
@@ -76,14 +76,14 @@ def plot(feedback: Feedback) -> Figure:
 
 
 def _look(feedback: Feedback, number: int) -> tuple[str, str]:
-    """Return colour and marker of a strategy: feedback is the last."""
+    """Return colour and marker of a strategy; feedback is the last."""
     if number == len(feedback.strategies) - 1:
         return style.BLUE, "o"
     return _COLOURS[number % len(_COLOURS)], _MARKS[number % len(_MARKS)]
 
 
 def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
-    """Count dots by how far they are off."""
+    """Draw a histogram of the deviations of dots."""
     reach = _REACH * limit
     edges = np.linspace(-reach, reach, _BINS + 1)
     for number, name in enumerate(feedback.strategies):
@@ -106,7 +106,7 @@ def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -
 
 
 def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
-    """Draw how far the second of two dots is off."""
+    """Draw the deviation of the second of two dots against the gap."""
     gaps = from_si(1.0, "s", "ms") * feedback.gaps
     reach = _REACH * limit
     for number, name in enumerate(feedback.strategies):
@@ -123,8 +123,8 @@ def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> N
 def plot_run(feedback: Feedback) -> Figure:
     """Draw the run of a comparison.
 
-    Displacement, the samples that the controller looked at, the times at which touches are wanted (short
-    lines at the front of the pack); below, the current and its bounds.
+    Above: displacement, the samples used by the controller, and the target times of touches (short lines at
+    the front of the pack); below: the current and its limits.
     """
     figure = new_figure(4.6)
     panel, strip = with_strip(figure, 2.6)
@@ -156,8 +156,8 @@ _AFTER: Final = 0.08
 def plot_burst(burst: LeastWork) -> Figure:
     """Draw a burst of least work.
 
-    Above: displacement, current, and the power of the coil, filled where it gives and where it takes back.
-    Below: the work of the coil and the losses, in parts of what the pack absorbs.
+    Above: displacement, current, and the power of the coil, filled with different colours for power supplied
+    and recovered. Below: the work of the coil and the losses, relative to the energy absorbed by the pack.
     """
     figure = new_figure(6.6)
     grid = figure.add_gridspec(4, 1, height_ratios=(2.6, 1.2, 1.4, 1.3))
@@ -229,9 +229,9 @@ def _ledger(ax: Axes, burst: LeastWork) -> None:
 
 @styled
 def plot_rates(bursts: LeastWorkRates) -> Figure:
-    """Draw net and positive work, and the least positive work of any current, against the rate.
+    """Draw net and positive work, and the lower bound of the positive work, against the rate.
 
-    Crosses at the bottom: rates at which no current was found.
+    Crosses at the bottom mark rates at which no current was found.
     """
     figure, ax = new_panel(3.6)
     across = Scale("Rate", "Hz", "Hz")

@@ -1,6 +1,6 @@
-"""Compensation tables, and what they gain and lose beside open loop.
+"""Compensation tables, and their gains and losses relative to open loop.
 
-What a hammer prints before, while and after it learns its table.
+`plot_learning`: dots before, during and after learning.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _BINS: Final = 41
 
 @styled
 def plot(table: CompensationTable) -> Figure:
-    """Draw a table: as maps of history by history at one or few rates, else against the rate."""
+    """Draw a table: maps over histories at one or few rates, else curves against the rate."""
     figure = _few_rates(table) if table.rates.size < _FEW else _many_rates(table)
     foot(figure, f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A")
     return figure
 
 
 def _few_rates(table: CompensationTable) -> Figure:
-    """Draw advance and width with a cell for each history, the last gap down."""
+    """Draw advance and width with a cell for each history, the last gap vertical."""
     figure = new_figure(1.2 + 2.1 * table.rates.size)
     axes = figure.subplots(table.rates.size, 2, squeeze=False)
     side, across = table.reach + 1, (table.reach + 1) ** (table.gaps - 1)
@@ -101,9 +101,9 @@ def _many_rates(table: CompensationTable) -> Figure:
 
 @styled
 def plot_report(report: TableReport) -> Figure:
-    """Draw what a table gains and loses: shares of good dots for each hammer, and force and arrival.
+    """Draw the gains and losses of a table: fractions of good dots for each hammer, force and arrival.
 
-    Bars: dots within the limits, over all rates and patterns. Histograms: dots of the de Bruijn cycle at the
+    Bars: dots within limits, over all rates and patterns. Histograms: dots of the de Bruijn cycle at the
     first rate; grey bands are the limits.
     """
     figure = new_figure(5.6)
@@ -135,7 +135,7 @@ def plot_report(report: TableReport) -> Figure:
 
 
 def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
-    """Draw how far dots are off, what is beyond three limits in the outermost bins."""
+    """Draw a histogram of deviations; the outermost bins hold those beyond three limits."""
     edges = np.linspace(-3.0 * limit, 3.0 * limit, _BINS + 1)
     ax.axvspan(-limit, limit, color=style.FAINT, lw=0.0, zorder=0)
     for row, colour, look in zip(values, (style.ORANGE, style.BLUE), ("--", "-"), strict=True):
@@ -147,19 +147,19 @@ def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
     ax.set_ylabel("Dots of the cycle")
 
 
-_FIRST: Final = LEAD_IN + 128  # First slot that is drawn: from here on dots and gaps are mixed
-_SLOTS: Final = 88  # Number of slots of the cycle that are drawn
+_FIRST: Final = LEAD_IN + 128  # First slot drawn: from here on dots and gaps are mixed
+_SLOTS: Final = 88  # Number of slots drawn
 _HEIGHT: Final = 0.42  # Height of a line, in
-_SIZE: Final = 20.0  # Area of a dot of the nominal force
-_CONTRAST: Final = 4.0  # How much more than the force the area of a dot differs
-_SMALLEST: Final = 0.1  # Least area, in parts of that of the nominal force
+_SIZE: Final = 20.0  # Area of a dot of nominal force
+_CONTRAST: Final = 4.0  # Exaggeration of the force in the area of a dot
+_SMALLEST: Final = 0.1  # Smallest area, as a fraction of that of nominal force
 
 
 @styled
 def plot_learning(learning: Learning) -> Figure:
-    """Draw a line at each stage: each dot where it strikes, its area four times as far off as its force.
+    """Draw a line for each stage: each dot at its position, with its force deviation exaggerated in its area.
 
-    Dots beyond the limits are orange, and a lost dot is a cross at its slot.
+    Dots beyond the limits are orange; a lost dot is a cross at its slot.
     """
     stages = learning.dots.size
     figure = new_figure(1.1 + _HEIGHT * stages)

@@ -1,1 +1,1 @@
-"""What the figures share: style, scales, marks, files."""
+"""Elements shared by the figures: style, scales, marks, files."""

@@ -1,4 +1,4 @@
-"""What the figures draw: drives, ranges and the points of a curve."""
+"""Data of the curves: drives, ranges and points."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
 
 SETTLED: Final = 0.01
-"""Part of the stroke within which the armature counts as settled in a figure."""
+"""Fraction of the stroke within which the armature counts as settled in a figure; arbitrary."""
 
 _POINTS: Final = 2400
 _PER_PIECE: Final = 60
@@ -33,9 +33,9 @@ def waveform_of(hammer: Hammer) -> Waveform:
 
 
 def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str | None = None) -> Motion:
-    """Return the motion of a hammer whose waveform is fired at given times, s.
+    """Simulate a hammer whose waveform is fired at given times, s.
 
-    The run ends at `duration`, s, or text with a unit; by default as that of `printhammer.simulate`.
+    The run ends at `duration`, s, or text with a unit; the default is that of `printhammer.simulate`.
     """
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.simulate import simulate
@@ -44,13 +44,13 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
 
 
 def places(hammer: Hammer) -> dict[str, float]:
-    """Return the positions that a hammer has of "backstop", "pack" and "platen", m, in this order."""
+    """Return the positions of "backstop", "pack" and "platen" of a hammer, m, as far as it has them."""
     own = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
     return {name: place for name, place in own.items() if place is not None}
 
 
 def times_of(motion: Motion, start: float | None = None, end: float | None = None) -> FloatArray:
-    """Return times, s, at which a curve of a motion is drawn: even ones, all steps and all extrema."""
+    """Return the plot times of a motion, s: uniform times, all steps and all extrema."""
     start = motion.start if start is None else max(start, motion.start)
     end = motion.end if end is None else min(end, motion.end)
     steps = motion.step_times
@@ -65,7 +65,7 @@ def times_of(motion: Motion, start: float | None = None, end: float | None = Non
 
 
 def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return displacement, m, and velocity, m/s, along a motion, with both ends of every jump."""
+    """Return displacement, m, and velocity, m/s, along a motion, with both sides of every jump."""
     x, v = motion.at(times)
     jumps = [
         (contact.t_in, contact.v_in)
@@ -81,7 +81,7 @@ def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def settled_at(motion: Motion) -> float:
-    """Return the time, s, from which on the armature stays where it ends, up to `SETTLED` of the stroke."""
+    """Return the time, s, from which the armature stays within `SETTLED` of the stroke of its end."""
     times = times_of(motion)
     x, _v = motion.at(times)
     room = SETTLED * float(np.ptp(x))
@@ -90,18 +90,18 @@ def settled_at(motion: Motion) -> float:
 
 
 def shown_until(motion: Motion) -> float:
-    """Return a round time, s, at which a picture of a motion that settles can end."""
+    """Return a rounded end time, s, for the picture of a motion that settles."""
     step = 10.0 ** math.floor(math.log10(motion.end)) / 4.0
     return float(min(motion.end, step * math.ceil(1.1 * settled_at(motion) / step)))
 
 
 def reach(hammer: Hammer) -> tuple[float, float]:
-    """Return the displacements, m, between which the static forces of a hammer are drawn.
+    """Return the range of displacements, m, over which static forces are drawn.
 
     Raises
     ------
     InputError
-        The hammer has nothing that gives a scale: neither platen nor pack, nor a range of its magnet's law.
+        The hammer has neither platen nor pack nor a range of its magnet's law to set the scale.
     """
     from printhammer.hammer.static_force import StaticForce
 

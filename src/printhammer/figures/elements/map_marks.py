@@ -1,4 +1,4 @@
-"""What the pictures of frequency-time maps share: scales, firings, lost dots, the colour bar."""
+"""Elements of pictures of frequency-time maps: scales, firings, lost dots, the colour bar."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS: Final = "viridis"
-"""Perceptually uniform, and told apart by the colour-blind (N. Smith and S. van der Walt, 2015)."""
+"""Colour map: perceptually uniform and suited to the colour-blind (N. Smith and S. van der Walt, 2015)."""
 
 LINES: Final = "white"
-"""Of the firings."""
+"""Colour of the firing lines."""
 
 LOST: Final = "lost dots"
-"""The gid of the marks of lost dots."""
+"""SVG id (gid) of the marks of lost dots."""
 
 FEW: Final = 50
 """Number of rates below which firings and lost dots are marked row by row."""
 
 UNKNOWN: Final = "#e4e4e4"
-"""Where the displacement is not known."""
+"""Colour of cells without a displacement."""
 
 LOWEST, HIGHEST, RATES, TIMES = 500.0, 2500.0, 640, 1024
-"""Range of the rates in the paper's figures as drawn here, Hz, and the numbers of rates and times."""
+"""Range of rates in the paper's figures as drawn here, Hz, and the numbers of rates and times."""
 
 _KILO: Final = 1e3
 _LOST: Final = 2.0
@@ -48,12 +48,12 @@ _LOST: Final = 2.0
 def chart_of(
     hammer: Hammer, rates: npt.ArrayLike | None = None, times: npt.ArrayLike | None = TIMES
 ) -> xr.Dataset:
-    """Return the map of a hammer that a figure shows.
+    """Return the map of a hammer for a figure.
 
     Raises
     ------
     InputError
-        The hammer has no waveform or no rest state, or the rates are not usable.
+        The hammer has no waveform or no rest state, or the rates are invalid.
     """
     from printhammer.maps.frequency import frequency_map
 
@@ -61,7 +61,7 @@ def chart_of(
 
 
 def drawable(chart: xr.Dataset) -> xr.Dataset:
-    """Return a map that has an axis of time."""
+    """Return a map if it has at least two times; raise InputError otherwise."""
     if chart["time"].size < 2:
         raise InputError(
             f"the map has {chart['time'].size} times", key="times", expected="at least 2 to draw it"
@@ -70,7 +70,7 @@ def drawable(chart: xr.Dataset) -> xr.Dataset:
 
 
 def edges(centres: FloatArray) -> FloatArray:
-    """Return the borders of cells about ascending centres, one more than there are."""
+    """Return the borders of cells around ascending centres, one more than there are centres."""
     if len(centres) == 1:
         return np.asarray([0.98 * centres[0], 1.02 * centres[0]], dtype=np.float64)
     middle = 0.5 * (centres[1:] + centres[:-1])
@@ -80,7 +80,7 @@ def edges(centres: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Scales:
-    """How the displacements, times and rates of maps are shown, and in which colours."""
+    """Scales and colours of displacement, time and rate in maps."""
 
     way: Scale
     time: Scale
@@ -89,7 +89,7 @@ class Scales:
 
 
 def scales_of(*charts: xr.Dataset) -> Scales:
-    """Return the scales that suit all of some maps, the scale of the colours from end to end."""
+    """Return common scales for several maps; the colour scale covers all of them."""
     from matplotlib.colors import Normalize
 
     low, high = limits_of(*charts)
@@ -110,9 +110,9 @@ def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
 
 
 def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
-    """Draw the displacement of a map in colours, time to the right and rate upward; cells as pixels.
+    """Draw the displacement of a map in colours, time horizontal and rate vertical.
 
-    Firings and lost dots are drawn over it, see `firing_lines`.
+    Firings and lost dots are drawn on top, see `firing_lines`.
     """
     from matplotlib import colormaps
 
@@ -136,9 +136,9 @@ def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
 
 
 def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw a thin line along each firing, and a strong one where its dot is lost.
+    """Draw a thin line along each firing, and a strong line along its lost dots.
 
-    Where the map has fewer than 50 rates, the lines are upright marks in the row of each rate instead.
+    For maps with fewer than 50 rates the lines are vertical marks in the row of each rate.
     """
     if "fired_at" not in chart:
         return
@@ -150,7 +150,7 @@ def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
     lost: list[tuple[FloatArray, FloatArray]] = []
     for firing in range(fired.shape[1]):
         at = time.shown(fired[:, firing])
-        # A line leans as the firing times do, from one border of the cell to the other; a mark does not.
+        # A line follows the firing times from one border of the cell to the other; a mark is vertical.
         slopes = np.zeros_like(at) if few or firing == 0 else -at / rates
         across, up = _strokes(at, slopes, rates, rows) if few else (at, rates)
         gid = f"firing {firing + 1}"
@@ -171,7 +171,7 @@ def _strokes(
     borders: FloatArray,
     rows: npt.NDArray[np.intp] | slice = slice(None),
 ) -> tuple[FloatArray, FloatArray]:
-    """Return strokes through the cells of some rows, from the lower border to the upper one, NaN between."""
+    """Return strokes through the cells of rows, from lower to upper border, separated by NaN."""
     centre, place, slope = rates[rows], at[rows], slopes[rows]
     ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
     across = place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])
@@ -179,7 +179,7 @@ def _strokes(
 
 
 def key(ax: Axes, chart: xr.Dataset) -> None:
-    """Write above a picture what its lines are."""
+    """Draw the legend of the lines above a picture."""
     from matplotlib.lines import Line2D
     from matplotlib.patheffects import Stroke
 
@@ -196,7 +196,7 @@ def key(ax: Axes, chart: xr.Dataset) -> None:
 
 
 def colour_bar(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw the scale of the colours from the lowest place to the highest, with marks; white: not reached."""
+    """Draw the colour bar from the lowest to the highest position; white marks values not reached."""
     from matplotlib import colormaps
 
     way = scales.way
@@ -226,7 +226,7 @@ def colour_bar(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
 
 
 def failures(chart: xr.Dataset) -> str:
-    """Say how many runs of a map did not reach their end, and why; empty if all did."""
+    """Describe the number of runs of a map that stopped early, and why; empty if all completed."""
     failed = {name: len(rates) for name, rates in failed_rates(chart).items()}
     if not failed:
         return ""
@@ -235,7 +235,7 @@ def failures(chart: xr.Dataset) -> str:
 
 
 def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
-    """Write below a figure where its map comes from, and remarks above it."""
+    """Write the origin of the map below a figure, and remarks above it."""
     origin = [str(chart.attrs.get("hammer", chart.attrs.get("source", "")))]
     origin.append(str(chart.attrs.get("hammer_fingerprint", ""))[:8])
     constants = str(chart.attrs.get("hammer_constants", ""))

@@ -1,6 +1,6 @@
-"""Marks on figures: where backstop, pack and platen are, which way time runs, when the coil is fired.
+"""Marks on figures: positions of backstop, pack and platen, direction of time, firings.
 
-Where on a panel there is room for a label or an insert: away from the curves.
+`freest` finds free space for a label or an insert on a panel.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
 
 CURVE: Final = "curve:"
-"""Beginning of the label of every line that counts as a curve."""
+"""Prefix of the label of every line that counts as a curve."""
 
 _SPACING: Final = 0.004
 
 
 def occupied(ax: Axes) -> FloatArray:
-    """Return points on the curves of a panel, fractions of the axes, shape (n, 2).
+    """Return points on the curves of a panel, in fractions of the axes, shape (n, 2).
 
-    They are so close that no label fits between two of them.
+    The points are dense enough that no label fits between two of them.
     """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     every = [np.empty((0, 2))]
@@ -63,10 +63,10 @@ def occupied(ax: Axes) -> FloatArray:
 def freest(
     points: FloatArray, size: tuple[float, float], corners: Iterable[tuple[float, float]]
 ) -> tuple[tuple[float, float], int]:
-    """Return the first of several places for a box that no point lies in, or the one with the fewest points.
+    """Return the first position of a box that covers no points, or the position that covers the fewest.
 
-    Points, shape (n, 2), width and height of the box, and its lower left corner at each place, best place
-    first, are fractions of the axes. With the corner comes the number of points covered there.
+    `points`, shape (n, 2), `size` (width and height) and `corners` (lower left, best first) are fractions of
+    the axes. The number of covered points is returned with the corner.
     """
     width, height = size
     best: tuple[float, float] = (0.0, 0.0)
@@ -83,23 +83,23 @@ def freest(
 
 
 HALO: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
-"""Background of text that may lie on a line."""
+"""Background of text that may overlap a line."""
 
 ALONG_X: Final = ("data", "axes fraction")
 ALONG_Y: Final = ("axes fraction", "data")
-"""Places given along one axis in its units, along the other in fractions of the axes."""
+"""Coordinates: fraction of the axes along x, data units along y."""
 
 _LINE_NAME: Final = (0.095, 0.06)
-"""Width and height of a name on a horizontal line, of the axes."""
+"""Width and height of a name on a horizontal line, fractions of the axes."""
 
 _BELOW: Final = 30.0
-"""From a panel down to a legend below its numbers and name, points."""
+"""Distance from a panel to a legend below its tick labels and axis label, points."""
 
 
 def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:
-    """Draw lines at backstop, pack and platen, the vertical ones with their names.
+    """Draw lines at backstop, pack and platen, with names on vertical lines.
 
-    The displacement is along `side` of the axes, whose limits are set before.
+    Displacement is along `side` of the axes, whose limits must be set already.
     """
     low, high = ax.get_ylim() if side == "y" else ax.get_xlim()
     for name, place in places(hammer).items():
@@ -113,7 +113,7 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
 
 
 def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
-    """Write the names of the places on their horizontal lines, at the right or where no curve is."""
+    """Write the names on horizontal position lines, at the right or away from curves."""
     low, high = ax.get_ylim()
     points = occupied(ax)
     for name, place in places(hammer).items():
@@ -140,13 +140,13 @@ def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
 
 
 def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
-    """Write a small remark at a place in fractions of the axes."""
+    """Write a small remark at a position in fractions of the axes."""
     style = {"fontsize": SMALL, "color": MUTED, "va": "top", "ha": "left", "zorder": 5.0, **options}
     return ax.text(*at, text, transform=ax.transAxes, **style)
 
 
 def inside(ax: Axes, text: str, x: float, y: float, color: str) -> None:
-    """Write tiny in the middle of a cell at a place in data units."""
+    """Write tiny text in the middle of a cell, in data units."""
     ax.text(x, y, text, ha="center", va="center", fontsize=TINY, color=color)
 
 
@@ -158,44 +158,44 @@ def beside(
     side: str = "left baseline",
     **options: Any,
 ) -> None:
-    """Write small beside a point, some points from it; `side` says what of the text lies there."""
+    """Write small text next to a point, shifted by some points; `side` is its alignment."""
     ha, va = side.split()
     how = {"fontsize": TINY, "color": MUTED, "textcoords": "offset points", "ha": ha, "va": va, **options}
     ax.annotate(text, at, shift, **how)
 
 
 def heading(ax: Axes, text: str, **options: Any) -> None:
-    """Write small above a panel, from the left."""
+    """Write a small left-aligned heading above a panel."""
     ax.set_title(text, **{"loc": "left", "fontsize": SMALL, **options})
 
 
 def dots(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, size: float, color: str, **options: Any) -> None:
-    """Draw points as dots without a rim, or as another `marker`, of a size in points."""
+    """Draw points without an edge, as dots or another `marker`; `size` in points."""
     ax.plot(x, y, **{"ls": "none", "marker": "o", "ms": size, "mew": 0.0, "color": color, **options})
 
 
 def dashed(line: Callable[..., Any], *levels: float, **options: Any) -> None:
-    """Draw thin dashed lines at levels by `axhline` or `axvline` of some axes."""
+    """Draw thin dashed lines at levels with `axhline` or `axvline` (`line`)."""
     for level in levels:
         line(level, **{"color": MUTED, "lw": HAIR, "ls": (0, (4, 3)), **options})
 
 
 def legend_above(ax: Axes, handles: Sequence[Artist], **options: Any) -> None:
-    """Write a legend in one line above the axes, from the left."""
+    """Draw a one-line legend above the axes, left-aligned."""
     where: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
     ax.legend(handles=handles, fontsize=SMALL, ncols=len(handles), **{"frameon": False, **where, **options})
 
 
 def legend_in_columns(ax: Axes, handles: Sequence[Artist], columns: int, size: float = SMALL) -> None:
-    """Write a legend in columns above the middle of the axes, in letters of a size in points."""
+    """Draw a legend in columns centred above the axes, with font size in points."""
     where: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     ax.legend(handles=handles, ncols=columns, fontsize=size, frameon=False, **where)
 
 
 def legend_below(ax: Axes, *entries: Any, **options: Any) -> None:
-    """Write a legend below a panel that has a name on its axis; options are those of `Axes.legend`.
+    """Draw a legend below a panel with an axis label; options are those of `Axes.legend`.
 
-    What stands at the foot of the figure comes below it, as it does not with a legend of the figure.
+    Unlike a legend of the figure, it leaves room for the text at the foot of the figure.
     """
     from matplotlib.transforms import ScaledTranslation
 
@@ -226,10 +226,10 @@ def arrows(
     size: float = 9.0,
     first: float = 0.5,
 ) -> None:
-    """Put so many arrow heads on a curve in data units, evenly by its length on paper, along its points.
+    """Draw evenly spaced arrow heads along a curve in data units.
 
-    The limits of the axes are set before; `size` is in points, `first` the place of the first head in units
-    of the distance between them.
+    The limits of the axes must be set already; `size` is in points, `first` the position of the first head in
+    units of their spacing.
     """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     root = ax.get_figure(root=True)
@@ -244,7 +244,7 @@ def arrows(
         at = (k + first) / count * length[-1]
         row = int(np.clip(np.searchsorted(length, at), 1, len(x) - 1))
         back = row - 1
-        # A head needs a direction: reach back until the chord is long enough to have one.
+        # A head needs a direction: extend the chord backwards until it is long enough.
         while back > 0 and length[row] - length[back] < 0.02:
             back -= 1
         ax.annotate(
@@ -264,7 +264,7 @@ def arrows(
 
 
 def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, foot: float = 0.022) -> None:
-    """Mark firing times, s, by small triangles inside the lower edge of the axes."""
+    """Mark firing times, s, by small triangles at the lower edge of the axes."""
     at = [float(shown.shown(t)) for t in times]
     how = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5.0, "gid": "firings"}
     dots(ax, at, [foot] * len(at), 4.5, color, marker="^", **how)
@@ -273,9 +273,9 @@ def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, f
 def drive_strip(
     ax: Axes, motions: Sequence[Motion], times: Sequence[FloatArray], until: float, colours: Sequence[str]
 ) -> None:
-    """Draw the currents, or the forces, of the drives of motions in the slim strip below a panel.
+    """Draw the currents, or forces, of the drives of motions in the slim strip below a panel.
 
-    Each at its times, s, in its colour; if they differ in what is driven, the first decides.
+    Each drive has its times, s, and its colour; the quantity is that of the first drive.
     """
     quantity = motions[0].driven
     time, value = scale("time", until), scale(quantity)
@@ -295,6 +295,6 @@ def drive_strip(
 
 
 def curve(ax: Axes, x: FloatArray, y: FloatArray, gid: str, color: str = BLUE, **options: Any) -> None:
-    """Draw a curve with a name by which it is found again."""
+    """Draw a curve with an SVG id (gid)."""
     (line,) = ax.plot(x, y, color=color, label=CURVE + gid, **{"lw": LINE, **options})
     line.set_gid(gid)

@@ -1,4 +1,4 @@
-"""The kind of all figures: one of matplotlib's that a notebook shows, although pyplot does not know it."""
+"""Class of all figures: a matplotlib figure that notebooks display without pyplot."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ if TYPE_CHECKING:
 
 
 class Picture(Figure):
-    """A figure that shows itself as the last line of a cell.
+    """Figure that displays itself as the last value of a notebook cell.
 
-    Notebooks show what pyplot made, and what tells them how. Where the inline backend of matplotlib is at
-    work, it goes first, and the picture appears once.
+    The PNG repr is used by notebooks; with the inline backend of matplotlib active, that backend takes
+    precedence, and the picture appears once.
     """
 
     settings: Mapping[str, Any] = {}
-    """Settings of matplotlib with which it is shown."""
+    """Matplotlib settings for rendering."""
 
     def _repr_png_(self) -> bytes:
-        """Return what a notebook shows."""
+        """Return the PNG for notebooks."""
         buffer = BytesIO()
-        settings: Any = dict(self.settings)  # matplotlib's own type lists every setting by name
+        settings: Any = dict(self.settings)  # The type stub of matplotlib lists every setting by name.
         with rc_context(settings):
             self.savefig(buffer, format="png", dpi=self.dpi)
         return buffer.getvalue()

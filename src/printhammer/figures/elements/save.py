@@ -1,4 +1,4 @@
-"""Figures as files: SVG and PDF for print, PNG for the screen; the same figure gives the same bytes."""
+"""Figures as files: SVG and PDF for print, PNG for the screen; equal figures yield equal bytes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 FORMATS: Final = ("svg", "pdf", "png")
 
 DOTS_PER_INCH: Final = 200.0
-"""Of a PNG, unless told otherwise."""
+"""Default resolution of a PNG, dots per inch."""
 
 _METADATA: Final[dict[str, dict[str, Any]]] = {
-    # Neither dates nor versions, which would make equal figures differ.
+    # No dates or versions, which would make equal figures differ.
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
     "png": {"Software": None},
@@ -27,7 +27,7 @@ _METADATA: Final[dict[str, dict[str, Any]]] = {
 
 
 def picture(figure: Figure, kind: str, *, dpi: float = DOTS_PER_INCH) -> bytes:
-    """Return the contents of a file with a figure, of one of `FORMATS`."""
+    """Return the bytes of a figure in one of `FORMATS`."""
     buffer = BytesIO()
     with in_style():
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
@@ -42,14 +42,14 @@ def save(
     formats: Sequence[str] = FORMATS,
     dpi: float = DOTS_PER_INCH,
 ) -> list[Path]:
-    """Write a figure into a folder, made if it is missing; return the files in the order of the formats.
+    """Write a figure into a folder, created if missing; return the files in the order of the formats.
 
-    The name is without suffix; dots per inch are those of the PNG.
+    `name` has no suffix; `dpi` applies to the PNG.
 
     Raises
     ------
     InputError
-        A format is not known, or the folder cannot be written to; files there before stay as they are.
+        A format is unknown, or the folder cannot be written to; existing files are kept.
     """
     unknown = [kind for kind in formats if kind not in FORMATS]
     if unknown:
@@ -62,7 +62,7 @@ def save(
         try:
             for kind, draft in drafts.items():
                 draft.write_bytes(picture(figure, kind, dpi=dpi))
-            # All or none, so that an interrupted call leaves no files of two figures under one name.
+            # All or none, so that an interrupted call does not mix the files of two figures.
             for kind, draft in drafts.items():
                 draft.replace(paths[kind])
         finally:

@@ -18,7 +18,7 @@ Name = Literal["displacement", "velocity", "force", "time", "current"]
 
 
 class Scale(Declared):
-    """How a quantity is shown."""
+    """Scale of a quantity on an axis."""
 
     label: str = part("name on the axis")
     si: str = part("SI unit of the numbers inside")
@@ -37,11 +37,11 @@ class Scale(Declared):
 
     @property
     def sign(self) -> str:
-        """The unit drawn, as it is written on the axis."""
+        """Symbol of the unit drawn."""
         return _SIGNS.get(self.unit, self.unit)
 
     def shown(self, values: npt.ArrayLike) -> FloatArray:
-        """Return values in SI as the numbers drawn."""
+        """Convert values in SI to the unit drawn."""
         import numpy as np
 
         return np.asarray(values, dtype=np.float64) * self.factor
@@ -62,14 +62,14 @@ _SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
 
 
 def scale(name: Name, largest: float = 0.0) -> Scale:
-    """Return how a quantity up to some absolute value, SI, is shown: large hammers get larger units."""
+    """Return the scale of a quantity with a given largest magnitude, SI: large hammers get larger units."""
     return next(shown for limit, shown in _SCALES[name] if largest <= limit)
 
 
 def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> SecondaryAxis | None:
-    """Name an axis with its unit and return the opposite axis, with the other unit system, if there is one.
+    """Label an axis with its unit; return the opposite axis in the other unit system, if any.
 
-    The data of the axes are in `shown.unit`; another name than that of the scale may be given.
+    The data of the axes are in `shown.unit`; `name` overrides the name of the scale.
     """
     name = name or shown.label
     text = f"{name}  [{shown.sign}]".replace("\n  ", "\n") if shown.unit != "1" else name

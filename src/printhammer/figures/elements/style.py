@@ -1,8 +1,8 @@
-"""The one style of all figures: colours, widths, sizes.
+"""Style of all figures: colours, widths, sizes.
 
-Figures are made with matplotlib's objects, never with pyplot, so that nothing global is left behind. Colours
-are those of M. Okabe and K. Ito (2008), which the colour-blind can tell apart; what matters also differs in
-dash or label.
+Figures are built with matplotlib's objects, never with pyplot, which would leave global state. Colours are
+those of M. Okabe and K. Ito (2008), suited to the colour-blind; important distinctions also use dashes or
+labels.
 """
 
 from __future__ import annotations
@@ -82,19 +82,19 @@ RC: Final[dict[str, Any]] = {
     "ytick.major.size": 3.5,
     "ytick.major.width": HAIR,
 }
-"""Settings in force while a figure is made and while it is saved, whatever the user's own are."""
+"""Settings for building and saving figures, independent of the user's settings."""
 
 
 def in_style() -> AbstractContextManager[None]:
-    """Return a context in which matplotlib's settings are those of the style."""
+    """Return a context with the matplotlib settings of the style."""
     from matplotlib import rc_context
 
-    settings: Any = RC  # matplotlib's own type lists every setting by name
+    settings: Any = RC  # The type stub of matplotlib lists every setting by name.
     return rc_context(settings)
 
 
 def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Have a function make its figure in the style, as a decorator."""
+    """Decorate a function to build its figure in the style."""
 
     @wraps(function)
     def wrapped(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
@@ -105,7 +105,7 @@ def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
 
 def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:
-    """Return an empty figure, sizes in inches, whose axes will be laid out without overlap; or by hand."""
+    """Return an empty figure, sizes in inches; the layout avoids overlaps, or is manual."""
     from printhammer.figures.elements.picture import Picture
 
     figure = Picture(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
@@ -114,13 +114,13 @@ def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrain
 
 
 def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
-    """Return a figure as `new_figure` does, with one panel."""
+    """Return a figure with one panel; see `new_figure`."""
     figure = new_figure(height, width)
     return figure, figure.add_subplot()
 
 
 def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
-    """Divide a figure into a panel and a slim strip below it on the same time axis."""
+    """Divide a figure into a panel and a slim strip below it with a common time axis."""
     grid = figure.add_gridspec(2, 1, height_ratios=(ratio, 1.0), hspace=0.03)
     panel = figure.add_subplot(grid[0])
     strip = figure.add_subplot(grid[1], sharex=panel)
@@ -130,7 +130,7 @@ def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
 
 
 def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
-    """Write below a figure which hammer it shows, how its constants came about, and remarks on the run."""
+    """Write hammer, status of its constants, and remarks on the run below a figure."""
     statuses = {constant.status for constant in hammer.constants.values()}
     known = [status for status in ("reconstructed", "assumed") if status in statuses]
     origin = [hammer.name, hammer.fingerprint[:8]]
@@ -141,7 +141,7 @@ def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
 
 
 def foot(figure: Figure, origin: str, remark: str = "") -> None:
-    """Write below a figure where it comes from, and a remark above it."""
+    """Write the origin of a figure below it, and a remark above that."""
     text = figure.supxlabel(origin, x=0.99, ha="right", fontsize=TINY, color=MUTED)
     text.set_in_layout(True)
     if remark:

@@ -31,10 +31,10 @@ def timeline(
     remarks: Sequence[str] = (),
     height: float = 4.2,
 ) -> Figure:
-    """Draw one or more motions of one hammer against time, with the drive below.
+    """Draw motions of one hammer against time, with the drive below.
 
-    Its lines have the gids "displacement" and "current" (or "force"), followed by " 1", " 2" where there are
-    several motions.
+    Lines have the SVG ids "displacement" and "current" (or "force"), followed by " 1", " 2" for several
+    motions.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ def timeline(
     until : float
         End of the time axis, s.
     labels : sequence of str, optional
-        A name for each motion.
+        Name of each motion.
     heading : str, optional
-        What is shown, written above the panel where there are no names.
+        Heading above the panel, if there are no labels.
     show_firings : bool, optional
-        Mark the firings by triangles.
+        Whether to mark the firings by triangles.
     remarks : sequence of str, optional
         Sentences shown above the figure; those of runs that stopped early are added.
     height : float, optional
@@ -70,7 +70,7 @@ def timeline(
     for number, (motion, grid, path) in enumerate(zip(motions, grids, paths, strict=True)):
         colour = _COLOURS[number % len(_COLOURS)]
         gid = f"displacement {number + 1}" if several else "displacement"
-        # Later motions lie under earlier ones where they agree.
+        # Later motions lie under earlier ones where they coincide.
         order = 3.0 - 0.1 * number
         marks.curve(panel, time.shown(grid), way.shown(path), gid, colour, zorder=order)
         if show_firings:
@@ -95,7 +95,7 @@ def timeline(
 def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> float:
     """Draw displacement, µm, against time, ms, between the tinted pack and backstop.
 
-    `above` is the room over the motion, in units of that below it, 8 % of its range; returned in µm.
+    `above` is the room over the motion, as a multiple of the room below, 8 % of its range; returned in µm.
     """
     ms, um = scale("time").factor, scale("displacement").factor
     assert hammer.front is not None
@@ -111,7 +111,7 @@ def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> 
 
 
 def current_between(ax: Axes, motion: Motion, largest: float) -> None:
-    """Draw the current of a motion, A, against time, ms, and its bounds to either side as dashed lines."""
+    """Draw the current of a motion, A, against time, ms, and its limits as dashed lines."""
     ax.plot(scale("time").factor * motion.t, motion.current, color=style.BLUE, lw=style.THIN, gid="current")
     ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
     marks.dashed(ax.axhline, -largest, largest)

@@ -1,8 +1,9 @@
-"""Figure 4: total force on the armature against time after a single pulse.
+"""Figures 2, 4, 5 and 10: static forces, total force, force loops, phase plane.
 
-Figure 5: total force against displacement over one cycle, with the loops of settle-out in an insert.
+Figure 4: total force on the armature against time. Figure 5: total force against displacement over one cycle,
+with the loops of settle-out in an insert.
 
-Figure 10: the phase plane of the armature after a single pulse.
+Figure 10: phase plane of the armature after a single pulse.
 
 Figure 2: magnetic force against displacement at several currents, the spring force and its reflection.
 """
@@ -57,8 +58,8 @@ if TYPE_CHECKING:
 def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 4: the sum of all forces on the armature, equation (2), after a single pulse.
 
-    The impacts on a rigid backstop have no finite force and are not drawn. The time shown ends, unless given,
-    when the armature has settled, at most after 4 ms.
+    Impacts on a rigid backstop have no finite force and are not drawn. By default the time axis ends when the
+    armature has settled, at most after 4 ms.
     """
     from matplotlib.patches import Patch
 
@@ -91,13 +92,13 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 
 
 def rigid_remark(motion: Motion) -> str:
-    """Return one sentence on what a force diagram cannot show of this motion; empty if nothing."""
+    """Return a remark on impulses that a force diagram cannot show; empty without any."""
     impacts = any(c.surface == "backstop" and c.peak_force is None and not c.initial for c in motion.contacts)
     return "The rigid backstop changes the velocity at once; its impulses are not drawn." if impacts else ""
 
 
 _INSERTS: Final = ((0.52, 0.46), (0.44, 0.4), (0.36, 0.32), (0.3, 0.26))
-"""Widths and heights that the insert may have, of the axes."""
+"""Possible widths and heights of the insert, fractions of the axes."""
 
 _NOTE: Final = (0.4, 0.09)
 
@@ -106,9 +107,9 @@ _NOTE: Final = (0.4, 0.09)
 def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 5: the sum of all forces, equation (2), against displacement after a single pulse.
 
-    A clockwise loop is energy given to the armature, a counter-clockwise one energy lost; arrow heads tell
-    which. The insert shows what follows the second touch of the backstop, where there is one. The motion
-    lasts 4 ms unless another duration, s, or text with a unit, is given.
+    A clockwise loop is energy given to the armature, a counter-clockwise loop energy lost; arrow heads show
+    the direction. The insert shows the motion after the second touch of the backstop, if any. The motion
+    lasts 4 ms by default; `duration` is in s, or text with a unit.
     """
     motion = fired(hammer, duration=duration)
     times = times_of(motion)
@@ -120,14 +121,14 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     ax.set_xlim(float(way.shown(min(ends) - room)), float(way.shown(max(ends) + room)))
     low, high = float(total.min()), float(total.max())
     above = (high - low) or 1.0
-    # The names of the places are written above the curve.
+    # The names of the positions are above the curve.
     ax.set_ylim(float(force.shown(low - 0.08 * above)), float(force.shown(high + 0.21 * above)))
     ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
     place_lines(ax, hammer, way, "x")
     curve(ax, way.shown(x), force.shown(total), "force", BLUE, lw=1.0)
     touches = [c.t_in for c in motion.contacts if c.surface == "backstop" and not c.initial and c.peak_force]
     settling = touches[1] if len(touches) > 1 else math.inf
-    # Settle-out runs to and fro on nearly one line: its arrows are in the insert.
+    # Settle-out oscillates on nearly one line: its arrows are in the insert.
     cycle = times < settling
     arrows(ax, way.shown(x[cycle]), force.shown(total[cycle]), 10, BLUE, 8.0)
     _annotate(ax, motion, times >= settling, x, total, way, force)
@@ -146,12 +147,12 @@ def _annotate(
     way: Scale,
     force: Scale,
 ) -> None:
-    """Add the insert, if there is a settle-out to show, and what the loops mean, where there is room."""
+    """Add the insert, if there is a settle-out, and the meaning of the loops, if there is room."""
     points = occupied(ax)
     if late.any():
         left, bottom, width, height = box = _place(points)
         _insert(ax, box, motion, way.shown(x[late]), force.shown(total[late]), way, force)
-        # What the insert covers, its tick labels included, is taken.
+        # The area of the insert, including its tick labels, is occupied.
         covered = np.meshgrid(
             np.linspace(left - 0.07, left + width, 30), np.linspace(bottom - 0.07, bottom + height + 0.05, 30)
         )
@@ -165,7 +166,7 @@ def _annotate(
 
 
 def _place(points: FloatArray) -> tuple[float, float, float, float]:
-    """Return left, bottom, width and height of the insert: as large as fits, best at the upper right."""
+    """Return left, bottom, width and height of the insert: as large as possible, preferably upper right."""
     boxes = []
     for width, height in _INSERTS:
         corners = [
@@ -173,7 +174,7 @@ def _place(points: FloatArray) -> tuple[float, float, float, float]:
             for left in np.linspace(0.915 - width, 0.05, 12).tolist()
             for bottom in np.linspace(0.73 - height, 0.05, 12).tolist()
         ]
-        # Its tick labels and title need room too.
+        # Tick labels and title need room, too.
         (left, bottom), covered = freest(points, (width + 0.07, height + 0.12), corners)
         boxes.append((covered, (left + 0.07, bottom + 0.07, width, height)))
         if covered == 0:
@@ -204,9 +205,9 @@ def _insert(
 
 @styled
 def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 10: velocity against displacement after a single pulse; arrows tell the direction of time.
+    """Draw Fig. 10: velocity against displacement after a single pulse, with arrows in the direction of time.
 
-    The motion lasts 4 ms unless another duration, s, or text with a unit, is given.
+    The motion lasts 4 ms by default; `duration` is in s, or text with a unit.
     """
     motion = fired(hammer, duration=duration)
     x, v = orbit(motion, times_of(motion))
@@ -218,7 +219,7 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     way, speed = scale("displacement", max(abs(low), abs(high))), scale("velocity")
     figure, ax = new_panel(4.4)
     ax.set_xlim(float(way.shown(low - room)), float(way.shown(high + room)))
-    # The names of the places are written above the orbit.
+    # The names of the positions are above the orbit.
     ax.set_ylim(float(speed.shown(slow - 0.06 * above)), float(speed.shown(fast + 0.17 * above)))
     ax.axhline(0.0, color=FAINT, lw=HAIR, zorder=0.5)
     place_lines(ax, hammer, way, "x")
@@ -236,7 +237,8 @@ CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
 
 _POINTS: Final = 400
 _HALF_WIDTH, _ENOUGH, _PREFERRED = 0.04, 0.055, 0.3
-"""Half the width of a label, distance from other curves that is enough, and best place; of the axes."""
+"""Half the width of a label, sufficient distance from other curves, and preferred position; fractions of the
+axes."""
 
 
 @styled
@@ -246,12 +248,12 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     Parameters
     ----------
     currents : sequence of float, optional
-        Coil currents, A; those outside the range of the magnet's law are left out.
+        Coil currents, A; currents outside the range of the magnet's law are omitted.
 
     Raises
     ------
     InputError
-        The hammer has no magnet, nothing that gives its stroke, or no current is in range.
+        The hammer has no magnet or no defined stroke, or no current is in range.
     """
     from printhammer.hammer.static_force import StaticForce
 
@@ -309,14 +311,14 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
 def _limits(
     hammer: Hammer, x: FloatArray, family: list[FloatArray], spring: FloatArray | None
 ) -> tuple[float, float]:
-    """Return limits that hold every curve within the stroke; beyond it the fit may be singular."""
+    """Return limits that include every curve within the stroke; beyond it the fit may be singular."""
     ends = list(places(hammer).values())
     stroke = (x >= min(ends)) & (x <= max(ends)) if len(ends) > 1 else np.full(x.shape, True)
     curves = [*family, *([] if spring is None else [spring, -spring])]
     values = np.concatenate([curve[stroke] for curve in curves])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     room = 0.1 * (high - low) or 1.0
-    # The names of the places are written above the curves.
+    # The names of the positions are above the curves.
     return low - room, high + 2.2 * room
 
 
@@ -330,7 +332,7 @@ def _colours(count: int) -> list[str]:
 def _label_curves(
     ax: Axes, x: FloatArray, lines: FloatArray, curves: dict[str, FloatArray], further: list[FloatArray]
 ) -> None:
-    """Write a name on each curve where the others, further ones and the lines of places are far."""
+    """Label each curve at a position far from the other curves and position lines."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     across = (x - left) / (right - left)
     up = {name: (values - bottom) / (top - bottom) for name, values in curves.items()}
@@ -341,7 +343,7 @@ def _label_curves(
         others += [(values - bottom) / (top - bottom) for values in further]
         clear = np.full(x.shape, 1.0)
         for other in others:
-            # A label is wider than high: nearness counts over its whole width.
+            # A label is wider than high: distances count over its whole width.
             distance = np.abs(other - height)
             near = np.array(
                 [np.nanmin(distance[np.abs(across - at) < _HALF_WIDTH], initial=1.0) for at in across]

@@ -1,8 +1,9 @@
-"""Figure 9: displacement in colours, against time and firing rate, in bursts of nine pulses.
+"""Figures 8 and 9: frequency-time maps, and their comparison with measured maps.
 
-Figure 8: displacement curves at gradually rising rates, laminated into a surface, hidden lines removed.
+Figure 8: displacement curves at gradually rising rates, stacked into a surface with hidden lines removed.
+Figure 9: displacement in colours, against time and firing rate, in bursts of nine pulses.
 
-A computed and a measured frequency-time map side by side, on the same scales, and how far they differ.
+`compare_maps`: a computed and a measured map side by side on the same scales, and their difference.
 """
 
 from __future__ import annotations
@@ -35,13 +36,13 @@ def frequency_map(
 ) -> Figure:
     """Draw Fig. 9: the frequency-time map in colours.
 
-    Thin lines are firings, strong ones lost dots, or marks in each row where there are fewer than 50 rates;
-    the gids are "firing 1" and so on, and "lost dots".
+    Thin lines are firings, strong lines lost dots, or marks in each row for fewer than 50 rates; the SVG ids
+    are "firing 1" and so on, and "lost dots".
 
     Parameters
     ----------
     hammer : Hammer
-        Any hammer with a waveform; not looked at where a map is given.
+        Hammer with a waveform; ignored if a map is passed.
     chart : xarray.Dataset, optional
         A map from `printhammer.frequency_map`; by default the one of the hammer.
     rates : array, optional
@@ -69,25 +70,25 @@ CURVES: Final = 81
 
 _TIMES: Final = 1361
 _LEAN: Final = (0.19, 0.66)
-"""Way from the first curve to the last, to the right and upward, in units of the width of the picture."""
+"""Offset from the first curve to the last, to the right and upward, in units of the picture width."""
 
 _ACROSS: Final = 0.80
 """Width of a curve."""
 
 _TALL: Final = 0.22
-"""Height of the displacements, from the lowest to the highest place."""
+"""Height of the displacements, from the lowest to the highest position."""
 
 _TICK: Final = 0.008
 
 _SHEETS: Final = 2.0
-"""One for curves and sheets alike, so that they are drawn in the order in which they are made."""
+"""Common z-order of curves and sheets, so that they are drawn in the order of creation."""
 
 _FLAT: Final = 4e-4
-"""How far a drawn curve may be from the computed one, in the units of the picture: 0.15 points."""
+"""Tolerance of thinned curves, in units of the picture: 0.15 points."""
 
 _NAME: Final[dict[str, Any]] = {"fontsize": "medium"}
 _POST: Final = 0.13
-"""Way from the displacement axis to the curves."""
+"""Distance from the displacement axis to the curves."""
 
 
 @dataclass(frozen=True)
@@ -115,14 +116,14 @@ class _View:
 
 @styled
 def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
-    """Draw Fig. 8: displacement against time, one curve for each rate, each hiding those behind it.
+    """Draw Fig. 8: displacement against time, one curve per rate, each hiding those behind it.
 
-    The parts of a curve inside the pack are blue; the gids of the curves are "rate" and their numbers.
+    The portions of a curve inside the pack are blue; the SVG ids of the curves are "rate" and their numbers.
 
     Parameters
     ----------
     hammer : Hammer
-        Any hammer with a waveform; not looked at where a map is given.
+        Hammer with a waveform; ignored if a map is passed.
     chart : xarray.Dataset, optional
         A map from `printhammer.frequency_map`, of which evenly chosen rates are drawn; by default the one of
         the hammer.
@@ -163,7 +164,7 @@ def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
 
 
 def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, front: float | None) -> None:
-    """Draw one curve over a white sheet that hides what is behind."""
+    """Draw a curve over a white sheet that hides the curves behind it."""
     known = np.isfinite(x)
     if not known.any():
         return
@@ -178,7 +179,7 @@ def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, 
 
 
 def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, FloatArray]:
-    """Leave out the points of a curve without which it stays within `room` of itself, measured along y.
+    """Thin a curve to the points that keep it within `room` of itself, measured along y.
 
     After D. Douglas and T. Peucker, Cartographica 10 (1973) 112.
     """
@@ -199,7 +200,7 @@ def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, Floa
 
 
 def _above(x: FloatArray, y: FloatArray, level: float) -> tuple[FloatArray, FloatArray]:
-    """Return the parts of a curve above a level, with NaN between them."""
+    """Return the portions of a curve above a level, separated by NaN."""
     crossing = np.flatnonzero((y[1:] - level) * (y[:-1] - level) < 0.0)
     share = (level - y[crossing]) / (y[crossing + 1] - y[crossing])
     x = np.insert(x, crossing + 1, x[crossing] + share * (x[crossing + 1] - x[crossing]))
@@ -267,7 +268,7 @@ def _mark(
     color: str = INK,
     **options: Any,
 ) -> None:
-    """Draw a tick from a place on an axis some way off, and its text beside its end."""
+    """Draw a tick from a position on an axis, and its text beside the end."""
     end = at[0] + way[0], at[1] + way[1]
     ax.plot([at[0], end[0]], [at[1], end[1]], color=color, lw=HAIR, **options)
     _text(ax, text, end, shift, side, color=color)
@@ -283,11 +284,11 @@ def _text(
 
 @styled
 def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
-    """Draw a computed and a measured map side by side, with the root mean square of their difference.
+    """Draw a computed and a measured map side by side, with the RMS of their difference.
 
     Maps are those of `printhammer.frequency_map` and `printhammer.maps.measured.load_measured_map`. In the
-    third panel, "difference" is the gid of the root mean square over time, for every rate that both have; in
-    grey areas the displacement is not known.
+    third panel, "difference" is the SVG id of the RMS over time, for every common rate; grey areas have no
+    displacement.
     """
     for chart in (computed, measured):
         map_marks.drawable(chart)
@@ -304,7 +305,7 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     for ax in (right, beside):
         ax.set_ylabel("")
         ax.tick_params(axis="y", labelleft=False)
-    # Both pictures, which share their axes, show all of both maps.
+    # The axes are shared, so that both pictures show the full range of both maps.
     maps = (computed, measured)
     rows = [scales.rate.shown(map_marks.edges(chart["rate"].values)) for chart in maps]
     ends = [scales.time.shown(chart["time"].values[[0, -1]]) for chart in maps]
@@ -317,7 +318,7 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
 
 
 def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measured: xr.Dataset) -> str:
-    """Draw the root mean square of the difference against rate; say so where there is none."""
+    """Draw the RMS of the difference against rate, or a remark if there is none."""
     way = scales.way
     rates, difference = rms_difference(computed, measured)
     heading(ax, "difference")

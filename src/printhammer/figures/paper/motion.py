@@ -1,10 +1,11 @@
-"""Figure 3: displacement against time after a single pulse, the current below.
+"""Figures 3, 6 and 7, and any motion against time.
 
-Figure 6: the response to two pulses, at two delays of the second.
+Figure 3: displacement after a single pulse, the current below.
 
-Figure 7: buzz printing, a train that prints while the armature stays clear of the backstop.
+Figure 6: the response to two pulses, at two delays of the second. Figure 7: buzz printing, a train that
+prints while the armature stays clear of the backstop.
 
-Any motion against time: displacement with the places of the hammer, firings, and the drive below.
+`plot` draws any motion against time: displacement, positions of the hammer, firings, and the drive.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 3: the motion that a single pulse causes, by default until it has settled, or 4 ms."""
+    """Draw Fig. 3: the motion after a single pulse, by default until it has settled, or 4 ms."""
     motion = fired(hammer, duration=duration)
     return timeline([motion], motion.end if duration is not None else shown_until(motion))
 
@@ -70,16 +71,16 @@ def _text(delay: float) -> str:
 
 
 def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 7: the train that `find_buzz_train` finds, or its best attempt, saying so.
+    """Draw Fig. 7: the train found by `find_buzz_train`, or its best attempt, with a remark.
 
-    The numbers at the dots that count are peak forces in units of that of a single pulse.
+    Numbers at the dots that count are peak forces in units of that of a single pulse.
 
     Parameters
     ----------
     hammer : Hammer
-        Any hammer with waveform, pack and backstop.
+        Hammer with waveform, pack and backstop.
     search : BuzzSearch, optional
-        Result of a search made before.
+        Result of an earlier search.
     duration : float or str, optional
         Time shown, s, or text with a unit; by default until the armature has settled.
     """
@@ -127,16 +128,16 @@ def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> N
 
 
 def plot(motion: Motion, *, until: float | str | None = None, heading: str = "") -> Figure:
-    """Draw a motion: displacement, backstop, pack and platen, firings, and the current or force of the drive.
+    """Draw a motion: displacement, positions of backstop, pack and platen, firings, and the drive.
 
     Parameters
     ----------
     motion : Motion
-        Any motion, also one that stopped early; its message is then shown.
+        Motion; the message of one that stopped early is shown.
     until : float or str, optional
         End of the time axis, s, or text with a unit; by default the end of the motion.
     heading : str, optional
-        What is shown, written above the panel.
+        Heading above the panel.
     """
     end = parse(until, "s") if isinstance(until, str) else until
     if end is None:

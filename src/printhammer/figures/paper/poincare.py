@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from printhammer.chaos import Strobe
 
 PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
-"""Strobe times of the panels, s: from 1.35 ms down to 0.80 ms."""
+"""Strobe times of the panels, s: from 1.35 ms down to 0.80 ms, as in the paper."""
 
 POINTS: Final = 200
-"""Points in each panel."""
+"""Points in each panel, as in the paper."""
 
 _COLUMNS: Final = 3
 
@@ -42,7 +42,7 @@ def poincare(
     scheme: Scheme | None = None,
     reading: Reading = "firings",
 ) -> Figure:
-    """Draw Fig. 11: the states at the first firings of trains, a panel for each strobe time.
+    """Draw Fig. 11: the states at the first firings of trains, one panel per strobe time.
 
     The vertical line is the backstop; circles are the last points of a train with a period of up to 8
     firings.
@@ -56,13 +56,13 @@ def poincare(
     points : int, optional
         Points in each panel, from the first firing on.
     printed : mapping, optional
-        Verdicts that the paper prints, such as "period-2", by strobe time, s; each is written in its panel
-        where the verdict on the points is another.
+        Verdicts printed in the paper, such as "period-2", by strobe time, s; each is written in its panel if
+        it differs from the computed verdict.
     scheme : str, optional
         "runge-kutta-4" or "trapezoid": the points as that scheme computes them on the schedule of the paper,
         see `printhammer.chaos.strobe.points`.
     reading : str, optional
-        When the short step of that schedule is taken.
+        Rule for the short step of that schedule.
     """
     from matplotlib.lines import Line2D
 
@@ -121,7 +121,7 @@ def _strobed(
 
 
 def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:
-    """Name the axis of a panel where it lies on an edge of the figure, and the other unit system opposite."""
+    """Label the axis of a panel at the edge of the figure, and the other unit system opposite."""
     other = label(ax, side, shown)
     if not here:
         ax.set(**{f"{side}label": ""})
