@@ -19,6 +19,7 @@ ROOMS = (
     "cli",
     "derivatives",
     "drive",
+    "errors",
     "figures",
     "hammer",
     "maps",
@@ -27,8 +28,13 @@ ROOMS = (
     "results",
     "support",
     "sweep",
+    "units",
 )
-PAGES: tuple[str, ...] = ()
+PAGES = (
+    "README.md",
+    *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs").glob("*.md"))),
+    *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs/tutorials").glob("*.md"))),
+)
 PHRASES = (
     r"Returns? what\b",
     r"in parts of\b",

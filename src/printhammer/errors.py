@@ -1,4 +1,4 @@
-"""The errors that printhammer raises on purpose."""
+"""Errors that printhammer raises deliberately."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Self
 
 
 class PrinthammerError(Exception):
-    """Base of every error that printhammer raises on purpose."""
+    """Base of every error that printhammer raises deliberately."""
 
 
 class InputError(PrinthammerError, ValueError):
-    """Input from outside that cannot be used.
+    """Invalid input from outside.
 
     The message is one sentence that names the file, the key, the value and what was expected. The command
     line prints it and ends with status 2. The attributes hold the same for programs; None where the message
@@ -25,7 +25,7 @@ class InputError(PrinthammerError, ValueError):
     file, key, value : optional
         The attributes.
     expected : str, optional
-        What was expected; it ends the message.
+        Expectation, appended to the message.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class InputError(PrinthammerError, ValueError):
     key : str or None
         Name of the argument, option, entry or column.
     value : object
-        The value that cannot be used.
+        Invalid value.
     expected : str or None
-        What was expected instead.
+        Expectation.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class InputError(PrinthammerError, ValueError):
         unit: str = "",
         said: str = ", expected",
     ) -> Self:
-        """Compose the message of a value that is not as expected.
+        """Compose the message of an invalid value.
 
         Parameters
         ----------
@@ -86,14 +86,14 @@ class InputError(PrinthammerError, ValueError):
         return error
 
     def within(self, where: object, *, file: object = None, key: str | None = None) -> InputError:
-        """Return the error with words before its message, and its place in its fields.
+        """Return the error with a prefix to its message, and its place in its fields.
 
         Parameters
         ----------
         where : object
-            What stands before the message. It is the file where neither file nor key is given.
+            Prefix of the message; it is the file if neither file nor key is passed.
         file, key : optional
-            The file and the key that the words name; before the file and the key of this error.
+            File and key named by the prefix, placed before those of this error.
         """
         file = where if file is None and key is None else file
         files = [str(part) for part in (file, self.file) if part is not None]
@@ -106,7 +106,7 @@ class InputError(PrinthammerError, ValueError):
 
 @contextmanager
 def located(where: object, *, file: object = None, key: str | None = None) -> Iterator[None]:
-    """Begin the message of an `InputError` with where it comes from, such as a file or a key."""
+    """Prefix the message of an `InputError` with its origin, such as a file or a key."""
     try:
         yield
     except InputError as error:
@@ -114,9 +114,9 @@ def located(where: object, *, file: object = None, key: str | None = None) -> It
 
 
 def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
-    """Return the known name that comes closest to one, in quotes, for a message.
+    """Return the known name closest to `name`, in quotes, for a message.
 
-    Where none comes close, `otherwise`, by default all of them.
+    If no name is close, return `otherwise`, by default a list of all names.
     """
     from difflib import get_close_matches
 
@@ -126,7 +126,7 @@ def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
 
 
 def missing_extra(needs: str, extra: str) -> InputError:
-    """Return the error that says what is not installed, such as "a store needs zarr", and how to get it."""
+    """Return the error for a missing package, such as "a store needs zarr", with the extra that installs it."""
     return InputError(
         f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'",
         key=extra,

@@ -1,8 +1,8 @@
-"""The only place where units exist: text with a unit to SI and back.
+"""Units: conversion of text with a unit to SI and back; no other module knows units.
 
-Inside the program every quantity is a float in SI; units are met in hammer files, drives, tables, the command
-line and on the axes of figures. A unit is written as one writes it: "N/m^1.5", "N^0.5 m^0.25/A", "in", "us",
-"lbf", "1" for a pure number; a slash divides by the one factor after it. ``units.txt`` lists the units known.
+All internal quantities are floats in SI; units occur in hammer files, drives, tables, the command line and on
+the axes of figures. Units are written in the usual way: "N/m^1.5", "N^0.5 m^0.25/A", "in", "us", "lbf", "1"
+for a pure number; a slash divides by the one factor after it. ``units.txt`` lists the known units.
 
 Conversions are correctly rounded: a float stands for its shortest decimal, factors are exact fractions (60
 digits where an exponent is not whole), and the result is rounded once, so that 0.002 in is 5.08e-05 m to the
@@ -193,7 +193,7 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
 
 @lru_cache(maxsize=1024)
 def _factor(unit: str, si_unit: str) -> Fraction:
-    """Return how many `si_unit` one `unit` is."""
+    """Return the size of a unit in `si_unit`."""
     size, dimension = _measure(unit)
     si_size, si_dimension = _measure(si_unit)
     if dimension != si_dimension:

@@ -404,7 +404,7 @@ class Hammer:
         return f"<Hammer {self.name} {self.fingerprint[:8]}>"
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: name and title, the laws, and the constants with their sources."""
+        """Return the HTML repr: name and title, the laws, and the constants with their sources."""
         laws = [(role, part.law) for role, part in self.parts.items()]
         if self.waveform is not None:
             laws.append(("waveform", f"{self.waveform.shape}, {self.waveform.quantity}"))

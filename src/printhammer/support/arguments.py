@@ -1,4 +1,4 @@
-"""Arguments of public functions that are objects: a hammer, a drive, a waveform.
+"""Type checks of public functions for arguments that are a hammer, a drive or a waveform.
 
 A name in place of a hammer, or two arguments swapped, is an `InputError` that names the argument.
 """
@@ -23,7 +23,7 @@ _KINDS: Final = {
     "Branch": "a branch of orbits",
     "Orbit": "an orbit",
 }
-"""Names of classes that arguments may have to be of, and the words for an object of each."""
+"""Names of the classes that are checked, and the words for an object of each."""
 
 
 class _Argument(NamedTuple):
@@ -36,7 +36,7 @@ class _Argument(NamedTuple):
 
 
 def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], None]:
-    """Make the check of a function's arguments.
+    """Build the check of a function's arguments.
 
     It looks at the parameters whose annotation is a union of classes in `_KINDS` and None. Objects are known
     by the names of their classes, so that nothing has to be imported.
@@ -71,7 +71,7 @@ def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], No
 
 
 def checked(function: F) -> F:
-    """Let a public function refuse an argument that is not the hammer, drive or waveform it has to be."""
+    """Decorate a public function to raise InputError for an argument that is not the object annotated."""
     check = check_objects(function)
 
     @functools.wraps(function)

@@ -1,4 +1,4 @@
-"""Tables of HTML, as notebooks show them."""
+"""HTML tables for notebooks."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from html import escape
 from typing import Final
 
 _MOST_LETTERS: Final = 80
-"""Letters of a cell that are shown; arbitrary, about a line of a notebook."""
+"""Number of characters shown of a cell; arbitrary, about a line of a notebook."""
 
 
 def html_table(rows: Sequence[Sequence[str]], heads: Sequence[str] = ()) -> str:
-    """Return a table; cells are cut to 80 letters."""
+    """Return an HTML table; cells are truncated to 80 characters."""
     head = f"<thead><tr>{''.join(f'<th>{escape(name)}</th>' for name in heads)}</tr></thead>" if heads else ""
     cells = ("".join(f"<td>{escape(_cut(cell))}</td>" for cell in row) for row in rows)
     return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
 def titled(title: str, *parts: str) -> str:
-    """Return parts of HTML below a title in bold."""
+    """Return HTML blocks below a bold title."""
     return f"<div><b>{escape(title)}</b>{''.join(parts)}</div>"
 
 

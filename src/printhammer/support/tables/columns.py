@@ -1,4 +1,4 @@
-"""What the columns of a table hold, said beside the table: in a text, or in a file of its own.
+"""Declarations of the columns of a table, in a text or in a file beside the table.
 
 ``time=1, current=2*-10 A/V, displacement=3*50 um/V+120 um, delay(current)=2 us``: columns are counted from 1.
 The factor leads from the number in the table to the quantity; where the table says a unit of its own, the
@@ -46,7 +46,7 @@ EXAMPLE: Final = "'time=1, current=2*-10 A/V, delay(current)=2 us'"
 
 @dataclass(frozen=True)
 class Source:
-    """Where a quantity comes from: a column, and how its numbers become the quantity."""
+    """Source of a quantity: a column, and the conversion of its numbers."""
 
     place: int
     """Column, counted from 1."""
@@ -91,7 +91,7 @@ def _converts(unit: str, si: str) -> bool:
 
 @dataclass(frozen=True)
 class Columns:
-    """What the columns of a table hold, by the name of the quantity."""
+    """Declared columns of a table, by the name of the quantity."""
 
     sources: dict[str, Source]
     clock: Clock | None = None
@@ -103,7 +103,7 @@ class Columns:
 
 
 def read_columns(text: str, where: str = "--columns") -> Columns:
-    """Read what columns hold from a text; `where` stands in messages.
+    """Parse a declaration of columns; `where` names it in messages.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def read_columns(text: str, where: str = "--columns") -> Columns:
 
 
 def columns_beside(path: Path) -> Columns | None:
-    """Read the file beside a table, whose name ends in .toml; None where there is none.
+    """Read the file beside a table, whose name ends in .toml; return None if there is no such file.
 
     Raises
     ------

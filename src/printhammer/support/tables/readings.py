@@ -33,11 +33,11 @@ LARGEST: Final = 1e9
 9.9e37."""
 
 BEFORE: Final = 0.1
-"""Part of its peak that what is driven may have before time 0, which is noise. Arbitrary."""
+"""Largest value of a drive before time 0, as a fraction of its peak, that counts as noise; arbitrary."""
 
 _TINY: Final = float(np.finfo(np.float64).tiny)
 _BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
-"""Quantities of a record that a unit tells where no name does; a voltage may stand for anything."""
+"""Quantities of a record that a unit identifies without a name; a voltage may be any quantity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Readings:
         return len(self.lines)
 
     def check_times(self, *, least: int = 2) -> None:
-        """Refuse fewer rows than some, and times that do not ascend; InputError with the line."""
+        """Check that there are enough rows and that times ascend; InputError with the line."""
         times, where = self.values["time"], str(self.path)
         if len(times) < least:
             raise InputError(
@@ -77,7 +77,7 @@ class Readings:
             )
 
     def check_before(self, times: FloatArray, name: str) -> None:
-        """Refuse a column that drives something before time 0, the firing, at which it is to begin.
+        """Check that a drive column starts at time 0, the firing, and not before.
 
         Raises
         ------
@@ -142,7 +142,7 @@ def read_table(
 
 
 def columns_of(path: Path, columns: str | None) -> Columns | None:
-    """Return what is said of the columns of a file: in a text, else in a file beside it; None for neither."""
+    """Return the declared columns of a file, from a text or the file beside it; None without either."""
     return columns_beside(path) if columns is None else read_columns(columns)
 
 
@@ -417,7 +417,7 @@ def _listed(table: Table) -> str:
 
 
 def _example(table: Table, numbers: Mapping[str, str]) -> str:
-    """Return what `--columns` might say of a table."""
+    """Return an example of `--columns` for a table."""
     entries = []
     for place, ((name, si), heading) in enumerate(zip(numbers.items(), table.columns, strict=False), 1):
         own = heading.unit
