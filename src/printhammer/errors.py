@@ -126,7 +126,7 @@ def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
 
 
 def missing_extra(needs: str, extra: str) -> InputError:
-    """Return the error for a missing package, such as "a store needs zarr", with the extra that installs it."""
+    """Return the error for a missing package, "a store needs zarr", with the extra that installs it."""
     return InputError(
         f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'",
         key=extra,
