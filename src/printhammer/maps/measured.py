@@ -122,7 +122,8 @@ def _one_row_a_sample(table: Readings) -> list[RateRecord]:
 def _one_column_a_rate(table: Table, names: list[str], told: Columns | None) -> list[RateRecord]:
     rates: dict[str, float] = {}
     for place, name in enumerate(names):
-        if not name or Heading(name).quantity == "time" or (table.clock and place == table.clock.numbers):
+        numbered = told is None and table.clock is not None and place == table.clock.numbers
+        if not name or Heading(name).quantity or numbered:
             continue
         try:
             rate = parse(name, "Hz")

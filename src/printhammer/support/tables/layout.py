@@ -28,7 +28,7 @@ Row = tuple[int, list[str]]
 _SEPARATORS: Final = "\t;|, "
 _LINES: Final = 2000
 """Lines from which the separator is found."""
-_START: Final = ("start", "begin", "t0", "xorg", "xorigin", "x0", "hoffset", "tstart", "xzero")
+_START: Final = ("xorg", "xorigin", "t0", "x0", "tstart", "xzero", "hoffset", "start", "begin")
 _STEP: Final = (
     *("increment", "incr", "inc", "step", "delta", "tinc", "dt", "deltax", "timeincrement", "hresolution"),
     *("xinc", "xincr", "xincrement", "sampleinterval", "samplinginterval", "samplingperiod"),
@@ -257,7 +257,8 @@ def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list
         if column.quantity == "time":
             made.append(column._replace(unit=column.unit or split_heading(f"x [{time}]").unit))
             continue
-        unit = column.unit or values[channel if len(values) > 1 and channel < len(values) else 0]
+        own = values[channel if len(values) > 1 and channel < len(values) else 0]
+        unit = column.unit or (own if column.name or len(columns) == 1 else "")
         made.append(column._replace(unit=unit))
         channel += 1
     return made
@@ -278,7 +279,10 @@ def _clock(
     where: str, facts: dict[str, list[str]], columns: list[Heading], rows: list[list[str]], *, numbered: bool
 ) -> Clock | None:
     """Return the times of samples that facts say: start and step, or step and the index of time zero."""
-    start = _seconds(where, "start", _fact(facts, _START, [""])[0])
+    written = _fact(facts, _START, [""])[0]
+    # Above the numbers, a start without a unit may be the number of a sample.
+    plain = not numbered and is_number(written) and not any(key in facts for key in _START[:-2])
+    start = None if plain else _seconds(where, "start", written)
     step = _seconds(where, "step", _fact(facts, _STEP, [""])[0])
     rate, zero = (_fact(facts, keys, [""])[0] for keys in (_RATE, _ZERO))
     if step is None and rate:
@@ -288,7 +292,7 @@ def _clock(
         start = -float(zero) * step
     if start is None or step is None:
         return None
-    if not (numbered or columns[0].name.lower() in _NUMBERING[1:]):
+    if columns[0].name.lower() not in (_NUMBERING if numbered else _NUMBERING[1:]):
         return Clock(start, step)
     numbers = [row[0].strip() for row in rows]
     counted = all(is_number(number) and float(number) == k for k, number in enumerate(numbers))

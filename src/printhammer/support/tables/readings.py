@@ -263,6 +263,9 @@ def _by_heading(
             words[name] = place
         elif name in numbers:
             sources[name] = Source(place + 1)
+        elif name and "time" in numbers:
+            # Another quantity of the same record.
+            continue
         elif (table.clock is None or place != table.clock.numbers) and (
             heading.shown or not any(each.name for each in table.columns)
         ):
