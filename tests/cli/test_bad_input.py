@@ -4,6 +4,7 @@ import subprocess
 import sysconfig
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.hammers import CRUDE
@@ -219,3 +220,35 @@ def test_as_a_process(arguments: list[str], tmp_path: Path) -> None:
     assert (done.returncode, done.stdout) == (2, "")
     assert_one_sentence(done.stderr)
     assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
+
+
+LONG = "x" * 280
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        f"run dot-peen --out {LONG}.png",
+        f"fit coil {LONG}.csv --hammer dot-peen",
+        f"fit coil a.csv --hammer {LONG}.toml",
+        f"learn dot-peen --table {LONG}.csv",
+        f"run --part {LONG}.py",
+        f"map --measured {LONG}.csv",
+        f"run --drive {LONG}.toml",
+    ],
+)
+def test_a_path_that_is_too_long_is_one_sentence(
+    cli: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = cli(*words.split())
+    assert (found.status, found.err.count("\n")) == (2, 0)
+    assert LONG in found.err.replace("\n", "")
+
+
+@pytest.mark.parametrize("words", [["hammer", "show", "dot-peen"], ["--version"]])
+def test_an_output_on_a_full_disk_is_one_sentence(words: list[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([SCRIPT, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1, done.stderr

@@ -6,9 +6,12 @@ described in one sentence on the standard error; 130 after Ctrl-C.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 from typing import Annotated, Final, NoReturn
 
 import typer
@@ -99,6 +102,7 @@ def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None
         status = program(
             None if arguments is None else list(arguments), prog_name=name, standalone_mode=False
         )
+        sys.stdout.flush()
     except PrinthammerError as error:
         complain(str(error))
         sys.exit(BAD_INPUT)
@@ -106,6 +110,14 @@ def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None
         # Without arguments typer has shown the help, and the message is empty.
         if message := getattr(error, "format_message", str)().strip():
             complain(f"{message.rstrip('.')} (see --help)")
+        sys.exit(BAD_INPUT)
+    except OSError as error:
+        # A path that is too long, or an output on a full disk.
+        complain(f"{error.filename or 'the output'}: {error.strerror or error}")
+        if error.filename is None:
+            # The interpreter would write the rest once more, and fail again.
+            with suppress(OSError, ValueError), Path(os.devnull).open("wb") as nowhere:
+                os.dup2(nowhere.fileno(), sys.stdout.fileno())
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt:
         status = INTERRUPTED
