@@ -60,11 +60,11 @@ BAD_HAMMERS = {
     "not text": (lambda _: "\udcff\udcfe", "", ("UTF-8",)),
     "empty file": (lambda _: "", "", ("format",)),
     "empty CSV": (with_samples, "", ("pulse.csv", "empty")),
-    "CSV without samples": (with_samples, HEADING, ("pulse.csv", "samples")),
+    "CSV without samples": (with_samples, HEADING, ("pulse.csv", "rows")),
     "non-monotonic CSV": (
         with_samples,
         HEADING + "0,0\n20,1\n10,1\n30,0\n",
-        ("pulse.csv", "1e-05", "increase"),
+        ("pulse.csv", "1e-05", "ascending"),
     ),
     "CSV without units": (with_samples, "time,current\n0,0\n10,1\n", ("pulse.csv", "unit")),
 }
