@@ -24,8 +24,9 @@ from printhammer.support.arrays import BoolArray, FloatArray
 if TYPE_CHECKING:
     from printhammer.claims.definition import Claim
 
+# Rates computed at once; the search stops at the first batch with a lost dot; arbitrary
 _TOGETHER: Final = 64
-_SAMPLES: Final = 2001
+_SAMPLES: Final = 2001  # Samples of a drive for a lower bound of its peak; arbitrary
 
 
 def spreads(motion: Motion) -> tuple[int, float | None, float | None]:

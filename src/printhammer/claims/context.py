@@ -23,7 +23,7 @@ CYCLE: Final = 20e-3
 TAIL: Final = 4e-3
 """Time after the last firing of a train for its dot, s."""
 
-_IDLE: Final = 1e-3
+_IDLE: Final = 1e-3  # Firing time of a motion at rest, which ends before it, s; arbitrary
 
 _T = TypeVar("_T")
 

@@ -18,7 +18,7 @@ KINDS: Final = get_args(Kind)
 TEXTS: Final = ("kind", "source", "says", "reading", "note")
 SIDES: Final = {"above": operator.gt, "at_least": operator.ge, "below": operator.lt, "at_most": operator.le}
 
-_PRINTED_DIGITS: Final = 1e-9
+_PRINTED_DIGITS: Final = 1e-9  # Relative difference up to which numbers are equal; rounding
 
 
 class Claim(Declared):

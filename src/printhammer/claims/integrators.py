@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from printhammer.claims.context import Context
     from printhammer.claims.definition import Claim
 
-REFERENCE_TOLERANCE: Final = 1e-13
-_CYCLE: Final = 10e-3
-_SETTLED: Final = 0.01
-_RATIO: Final = 2.0**0.25
-_LARGEST: Final = 32.0
+REFERENCE_TOLERANCE: Final = 1e-13  # Tolerance of the reference motion, well below the errors of 1983
+_CYCLE: Final = 10e-3  # Duration of the single-pulse cycle, s: the motion has settled
+_SETTLED: Final = 0.01  # Largest error of a settled motion, as a fraction of the stroke; arbitrary
+_RATIO: Final = 2.0**0.25  # Ratio of successive step scales tried; arbitrary
+_LARGEST: Final = 32.0  # Largest step scale tried; arbitrary
 _RUNGE_KUTTA_LIMIT: Final = math.sqrt(8.0)
 
 

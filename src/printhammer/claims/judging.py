@@ -162,8 +162,8 @@ def judge(context: Context, claim: Claim) -> JudgedClaim:
     return JudgedClaim(claim, measured.value, verdict, measured.detail, perf_counter() - start)
 
 
-_POINTS: Final = 4001
-_ZOOMS: Final = 6
+_POINTS: Final = 4001  # Points of a grid; arbitrary
+_ZOOMS: Final = 6  # Refinements of the grid; arbitrary
 
 
 def largest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float:

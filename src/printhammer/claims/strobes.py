@@ -14,9 +14,9 @@ from printhammer.support.arrays import FloatArray
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
 
-_ORBIT_TIME: Final = 4e-3
-_ORBIT_POINTS: Final = 200_001
-_LATTICE: Final = 101
+_ORBIT_TIME: Final = 4e-3  # Duration of the single-pulse orbit, s: from the first return until it has settled
+_ORBIT_POINTS: Final = 200_001  # Points of the orbit, dense compared with the distances measured
+_LATTICE: Final = 101  # Points along each axis of the window; arbitrary
 
 
 def window() -> tuple[FloatArray, FloatArray]:

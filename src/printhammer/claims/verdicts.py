@@ -17,8 +17,8 @@ from printhammer.hammer.hammer import Hammer
 if TYPE_CHECKING:
     from printhammer.claims.context import Context
 
-_CHANGE: Final = 1e-5
-_TIGHTER: Final = 0.1
+_CHANGE: Final = 1e-5  # Relative change of all constants, far below any tolerance of production; arbitrary
+_TIGHTER: Final = 0.1  # Factor of the tolerance; arbitrary
 _PLAIN: Final = "as it is"
 _FINE: Final = "ten times tighter tolerance"
 _CHANGED: Final[dict[str, Callable[[int], int]]] = {

@@ -22,7 +22,7 @@ from printhammer.cli.runner import INTERRUPTED, Verb
 from printhammer.cli.terminal import allow_any_text, complain
 from printhammer.errors import PrinthammerError
 
-BAD_INPUT: Final = 2
+BAD_INPUT: Final = 2  # Exit status, by convention of command lines
 _COLUMNS: Final = 76
 """Largest line length of an example."""
 

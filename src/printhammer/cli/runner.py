@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 Shown = TypeVar("Shown")
 
-INTERRUPTED: Final = 130
+INTERRUPTED: Final = 130  # Exit status 128 + SIGINT, as shells report it
 _FORCE: Final = "write_over"
 _WITH_PARTS: Final = ("HAMMER", "SPEC")
 """Placeholders of the files that may use laws registered with --part."""

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress, ProgressColumn, Task
 
-_WIDTH: Final = 120
+_WIDTH: Final = 120  # Columns of output that is not a terminal; arbitrary
 _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°": "deg", "→": "->"}
 """Replacements of characters that the output encoding lacks."""
 

@@ -46,9 +46,10 @@ RUN_QUANTITIES: Final = {
 }
 """Unit and meaning of the quantities of a whole run; the last one exists only for a hammer with damping."""
 
-_ENERGY: Final = 3
-_PACK_LOSS: Final = 5
-_SAMPLES: Final = 65
+_ENERGY: Final = 3  # First row of the energies in a column
+_PACK_LOSS: Final = 5  # Row of the pack loss in a column
+_SAMPLES: Final = 65  # Samples of a contact for the bracket of its largest force; arbitrary
+# Relative difference of times that counts as the same maximum; rounding of a minimisation
 _NEAR: Final = 1e-6
 
 

@@ -26,7 +26,7 @@ from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
 
-_NODES: Final = 4096
+_NODES: Final = 4096  # Nodes of a record in one stretch, which bounds the memory; arbitrary
 _WARM_UP: Final = 100
 """Firings during which the growth directions converge before growth is counted."""
 _FEWEST: Final = 8

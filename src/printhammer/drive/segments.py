@@ -39,9 +39,9 @@ RESERVOIR: Final = 6
 """Kinds of the segments of a driver, whose value is the supply voltage p0, and 0 while the supply is off."""
 COLUMNS: Final = 6
 
-_CHUNK: Final = 1024
-_REFINED: Final = 16
-_ROUNDS: Final = 9
+_CHUNK: Final = 1024  # Intervals evaluated at once, which bounds the memory; arbitrary
+_REFINED: Final = 16  # Intervals with the largest samples that are refined; arbitrary
+_ROUNDS: Final = 9  # Rounds of refinement: they reach 1e-9 of the interval
 
 
 def table(rows: Iterable[Sequence[float]], end: float) -> FloatArray:

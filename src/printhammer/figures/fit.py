@@ -36,7 +36,7 @@ _KINDS: Final = {
 _MANY: Final = 400
 """Number of data from which points are drawn small; arbitrary."""
 
-_LEGEND: Final = 8
+_LEGEND: Final = 8  # Largest number of entries in a legend; arbitrary
 _NAMED: Final = 6
 """Largest number of outliers whose lines are named."""
 

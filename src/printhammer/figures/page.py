@@ -35,9 +35,9 @@ INK: Final = (24, 24, 38)
 MOST_PIXELS: Final = 24_000_000
 """Number of pixels above which a sheet is rendered more coarsely; arbitrary."""
 
-_SOFT: Final = 0.1
-_PIXELS: Final = 1.5
-_TOGETHER: Final = 1_000_000
+_SOFT: Final = 0.1  # Width of the soft rim of a dot, as a fraction of its diameter; arbitrary
+_PIXELS: Final = 1.5  # Smallest width of the soft rim, pixels
+_TOGETHER: Final = 1_000_000  # Pixels computed at once, which bounds the memory; arbitrary
 
 
 @dataclass(frozen=True)

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_SLOTS: Final = 64
+_MOST_SLOTS: Final = 64  # Largest number of slots shown; arbitrary
 _US: Final = 1e6
-_ROOM: Final = 1.25
+_ROOM: Final = 1.25  # Half-width of the axes in units of the limits or of the dots; arbitrary
 
 
 @styled
@@ -156,8 +156,8 @@ def _window(quality: Quality) -> int:
 COLOURS: Final = {"as it is": style.INK, "hard": style.BLUE, "elastomer": style.GREEN, "pack": style.ORANGE}
 """Colour of each kind of material."""
 
-_ROW: Final = 0.2
-_BAR: Final = 0.66
+_ROW: Final = 0.2  # Height of a row, in
+_BAR: Final = 0.66  # Height of a bar, as a fraction of the spacing; arbitrary
 
 
 @styled

@@ -21,8 +21,9 @@ from printhammer.hammer.static_force import HammerLike, StaticForce
 from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import Root, bisect, roots
 
+# Smallest distance from an anchor in the search, m: far below any compression; arbitrary
 _NEAREST: Final = 1e-18
-_LARGEST_CURRENT: Final = 1e6
+_LARGEST_CURRENT: Final = 1e6  # Range of currents of a law that states none, A; arbitrary
 FARTHER: Final = (10.0, 100.0, 1000.0)
 """Search radii about the origin, m, if nothing limits the search and no equilibrium is nearer; arbitrary."""
 

@@ -111,8 +111,8 @@ def _publish(draft: Path, folder: Path) -> None:
         (draft / path).replace(folder / path)
 
 
-_BUZZ: Final = 7
-_POINCARE: Final = 11
+_BUZZ: Final = 7  # Number of the figure of buzz printing
+_POINCARE: Final = 11  # Number of the figure of strobe points
 
 
 def write_report(

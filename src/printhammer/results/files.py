@@ -46,7 +46,7 @@ _NEEDED: Final = {
     ".parquet": ("pyarrow", "Parquet files need", "tables"),
 }
 _COLUMNS: Final = "columns"
-_MOST_INT: Final = 2**31
+_MOST_INT: Final = 2**31  # Integers of the classic NetCDF format have 32 bits
 
 
 class Reopened(Declared):

@@ -29,7 +29,7 @@ MARK: Final = "status"
 """Array whose chunk marks a block as done."""
 
 _ROOT: Final = "zarr.json"
-_FLUSHES: Final = 8
+_FLUSHES: Final = 8  # Files flushed at once; arbitrary
 _ARRAYS: Final = "arrays"
 _DRAFT: Final = f"{MARK}/.draft"
 

@@ -22,8 +22,8 @@ B = TypeVar("B")
 Progress = Callable[[int, int], None]
 Piece = Callable[[int, int], None]
 
-PIECES_A_THREAD: Final = 32
-_INTERVAL: Final = 0.1
+PIECES_A_THREAD: Final = 32  # Pieces per thread: enough to balance pieces of unequal cost; arbitrary
+_INTERVAL: Final = 0.1  # Interval between progress reports, s; arbitrary
 
 
 def thread_count(threads: int | None) -> int:

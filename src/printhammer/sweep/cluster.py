@@ -29,11 +29,11 @@ ANSWER: Final = 5.0
 NO_WORKERS: Final = 60.0
 """Time without any worker after which a sweep stops, s; arbitrary."""
 
-_INTERVAL: Final = 0.5
-_COUNT_EVERY: Final = 2.0
+_INTERVAL: Final = 0.5  # Interval between checks of the cluster, s; arbitrary
+_COUNT_EVERY: Final = 2.0  # Interval between counts of the workers' threads, s; arbitrary
 _ALIVE: Final = ("running", "connecting")
-_TASKS_A_THREAD: Final = 3
-_PARTS: Final = 8
+_TASKS_A_THREAD: Final = 3  # Tasks submitted per thread: enough that no worker waits; arbitrary
+_PARTS: Final = 8  # Pieces of a block that kills its worker; arbitrary
 
 
 class _GoneError(Exception):

@@ -106,11 +106,11 @@ FORMAT: Final = "1"
 
 MEMBER: Final = "member"
 
-_MOST_MEMBERS: Final = 1_000_000_000
-_BLOCKS: Final = 128
-_FEWEST_IN_BLOCK: Final = 16
-_MOST_IN_BLOCK: Final = 256
-_MOST_BYTES: Final = 2**25
+_MOST_MEMBERS: Final = 1_000_000_000  # Largest number of members; arbitrary, to refuse typing errors
+_BLOCKS: Final = 128  # Number of blocks aimed at, for progress and resumption; arbitrary
+_FEWEST_IN_BLOCK: Final = 16  # Smallest block: one block of lanes
+_MOST_IN_BLOCK: Final = 256  # Largest block: the lanes of a thread
+_MOST_BYTES: Final = 2**25  # Largest size of the results of a block; arbitrary
 
 
 class Plan(Declared):

@@ -191,7 +191,7 @@ def _from_motion(motion: Motion, row: int, results: Results) -> None:
 
 Index = tuple[int, ...]
 
-_INTERVAL: Final = 0.1
+_INTERVAL: Final = 0.1  # Interval between progress reports, s; arbitrary
 
 
 class _StopError(Exception):

@@ -15,7 +15,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
-_MOST_RATES: Final = 200
+_MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minutes; arbitrary
 
 
 @verb(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.results.summary import Style
 
-_POINCARE: Final = 11
+_POINCARE: Final = 11  # Number of the figure of strobe points
 
 
 @verb("figure", "printhammer figure 3 hendriks-1983 --out build/figures")

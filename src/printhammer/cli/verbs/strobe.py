@@ -87,7 +87,7 @@ def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **pa
     )
 
 
-_STEPS: Final = 100
+_STEPS: Final = 100  # Default number of times between firings; arbitrary
 _TRAINS: Final = "Trains (--period, --rate, or --from and --to)"
 _trains = partial(opt.text, panel=_TRAINS)
 

@@ -86,7 +86,7 @@ def ended(result: xr.Dataset, new: float, seconds: float) -> str:
     return f"{result['status'].size} members: {each}; {how}"
 
 
-_LINE_EVERY: Final = 10.0
+_LINE_EVERY: Final = 10.0  # Interval between progress lines, s; arbitrary
 
 
 class Telling:

@@ -60,7 +60,7 @@ def _read(written: str) -> tuple[str, list[float]]:
     return axis, opt.between(opt.read_span(rest, f"--along {axis}"), AXES[axis].unit, f"--along {axis}")
 
 
-_MOST_RATES: Final = 2000
+_MOST_RATES: Final = 2000  # Largest number of rates; arbitrary
 
 
 @verb(

@@ -18,8 +18,8 @@ TAIL: Final = 1e-3
 """Largest remainder of a decaying part that may be cut off when the next part begins, as a fraction of its
 peak."""
 
-_SAMPLES: Final = 257
-_ROUNDING: Final = 1e-14
+_SAMPLES: Final = 257  # Samples of the remaining waveform; arbitrary
+_ROUNDING: Final = 1e-14  # Relative difference of times that counts as rounding
 
 
 class Chain(Waveform):

@@ -195,7 +195,7 @@ class Bridge(_Driver):
 DRIVERS: tuple[type[Waveform], ...] = (Rail, Chopper, PeakAndHold, Capacitor, Bridge)
 """Classes of the drivers."""
 
-_KEPT: Final = 256
+_KEPT: Final = 256  # Cached tables; arbitrary
 
 
 class Switched(Waveform):

@@ -88,9 +88,9 @@ OTHERS: Final = {0: ("undecided", "#ffffff"), -1: ("run ended early", "#1a1a1a")
 """Names and colours of the cells that reach no known attractor, by label."""
 
 _MARKS: Final = "os^Dvph*"
-_LIGHTER: Final = 0.5
-_MOST: Final = 12
-_FEW: Final = 4
+_LIGHTER: Final = 0.5  # Factor of the distance from white of repeated colours; arbitrary
+_MOST: Final = 12  # Attractors named in the legend; arbitrary
+_FEW: Final = 4  # Entries beyond which the legend has two columns; arbitrary
 
 
 def shade(number: int) -> str:
@@ -175,7 +175,7 @@ LOST: Final = "bone"
 """Colour maps of the force of printed dots, and of the second peak of lost dots; both monotonic."""
 
 _FAILED: Final = "#d55e00"
-_FEW_QUENCH: Final = 0.01
+_FEW_QUENCH: Final = 0.01  # Fraction of forces beyond either end of the colour scale; arbitrary
 
 
 @styled

@@ -36,12 +36,12 @@ SHADES: Final = {
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
 """Colours of points reached from one direction only; distinct from those of the bands."""
 
-_POINT: Final = 0.7
+_POINT: Final = 0.7  # Size of a point, points
 _MOST: Final = 3_000_000
 """Number of points above which they are drawn smaller; arbitrary."""
 _SPARSE: Final = 150
 """Number of values up to which points are drawn larger; arbitrary."""
-_FEW: Final = 1e-3
+_FEW: Final = 1e-3  # Fraction of the states outside the limits at either end; arbitrary
 
 
 @styled

@@ -220,7 +220,7 @@ def plot_correlation(correlation: CorrelationDimension) -> Figure:
     return figure
 
 
-_BINS: Final = 60
+_BINS: Final = 60  # Bins of a histogram; arbitrary
 
 
 @styled

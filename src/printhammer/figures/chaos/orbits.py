@@ -38,9 +38,9 @@ POINTS: Final = 600
 _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D", style.YELLOW))
 """Marker and colour of orbits of 1, 2, 3 and 4 firings."""
 _LONGER: Final = ("x", style.MUTED)
-_TRACES: Final = 4
-_ROOM: Final = 0.07
-_SIZE: Final = 5.0
+_TRACES: Final = 4  # Orbits drawn against time; arbitrary
+_ROOM: Final = 0.07  # Margin around the points, as a fraction of their range; arbitrary
+_SIZE: Final = 5.0  # Size of a mark, points
 _LINES: Final = ("-", "--", "-.", ":")
 
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")
 """Default quantities."""
 
-_COLUMNS: Final = 2
-_BAR: Final = 0.62
+_COLUMNS: Final = 2  # Panels in a row
+_BAR: Final = 0.62  # Height of a bar, as a fraction of the spacing; arbitrary
 
 
 @styled

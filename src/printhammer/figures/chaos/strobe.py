@@ -43,6 +43,7 @@ _CYCLE: Final = 8
 
 _SMALL: Final = 0.04
 """Fraction of the window below which an attractor without a period is enlarged in an inset; arbitrary."""
+# Lower left corners of an inset, fractions of the axes, best first
 _PLACES: Final = ((0.55, 0.36), (0.06, 0.36), (0.06, 0.06), (0.55, 0.06))
 _INSET: Final = (0.38, 0.42)
 """Lower left corners and size of insets, fractions of the axes."""

@@ -99,7 +99,7 @@ def _axes(ax: Axes) -> None:
     ax.margins(x=0.03)
 
 
-_DASHES: Final = ("-", (0, (4, 2)), (0, (1, 1.5)))
+_DASHES: Final = ("-", (0, (4, 2)), (0, (1, 1.5)))  # Dashes of successive lines
 _MILLI: Final = 1e3
 _MICRO: Final = 1e6
 

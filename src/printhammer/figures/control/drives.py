@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 _COLOURS: Final = (style.ORANGE, style.YELLOW, style.GREEN)
 _MARKS: Final = ("s", "^", "D")
-_BINS: Final = 41
-_REACH: Final = 4.0
+_BINS: Final = 41  # Bins of a histogram, odd so that one is centred at zero; arbitrary
+_REACH: Final = 4.0  # Half-width of the axis in units of the limit; arbitrary
 
 
 @styled
@@ -149,7 +149,7 @@ def plot_run(feedback: Feedback) -> Figure:
     return figure
 
 
-_AFTER: Final = 0.08
+_AFTER: Final = 0.08  # Time shown after the rest, as a fraction of the time to rest; arbitrary
 
 
 @styled

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_FEW: Final = 4
+_FEW: Final = 4  # Number of rates from which curves replace maps; arbitrary
 _LINES: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)
 _MICROSECONDS: Final = Scale("", "s", "us")
-_BINS: Final = 41
+_BINS: Final = 41  # Bins of a histogram, odd so that one is centred at zero; arbitrary
 
 
 @styled

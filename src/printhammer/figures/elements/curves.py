@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 SETTLED: Final = 0.01
 """Fraction of the stroke within which the armature counts as settled in a figure; arbitrary."""
 
-_POINTS: Final = 2400
-_PER_PIECE: Final = 60
+_POINTS: Final = 2400  # Uniform points of a curve: more than a picture resolves
+_PER_PIECE: Final = 60  # Points of a smooth piece; arbitrary
 
 
 def waveform_of(hammer: Hammer) -> Waveform:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 CURVE: Final = "curve:"
 """Prefix of the label of every line that counts as a curve."""
 
-_SPACING: Final = 0.004
+_SPACING: Final = 0.004  # Distance between points on a curve, fraction of the axes: less than a label
 
 
 def occupied(ax: Axes) -> FloatArray:

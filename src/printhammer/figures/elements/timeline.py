@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN)
-_HEADROOM: Final = 0.08
+_HEADROOM: Final = 0.08  # Room above the motion, as a fraction of its range; arbitrary
 
 
 @styled

@@ -100,7 +100,7 @@ def rigid_remark(motion: Motion) -> str:
 _INSERTS: Final = ((0.52, 0.46), (0.44, 0.4), (0.36, 0.32), (0.3, 0.26))
 """Possible widths and heights of the insert, fractions of the axes."""
 
-_NOTE: Final = (0.4, 0.09)
+_NOTE: Final = (0.4, 0.09)  # Width and height of the note on loops, fractions of the axes
 
 
 @styled
@@ -235,7 +235,7 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
 """Currents of the paper's Fig. 2, A."""
 
-_POINTS: Final = 400
+_POINTS: Final = 400  # Points of a static curve: more than a picture resolves
 _HALF_WIDTH, _ENOUGH, _PREFERRED = 0.04, 0.055, 0.3
 """Half the width of a label, sufficient distance from other curves, and preferred position; fractions of the
 axes."""

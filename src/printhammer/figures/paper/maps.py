@@ -68,7 +68,7 @@ def frequency_map(
 CURVES: Final = 81
 """Number of curves."""
 
-_TIMES: Final = 1361
+_TIMES: Final = 1361  # Times of a curve: more than a picture resolves
 _LEAN: Final = (0.19, 0.66)
 """Offset from the first curve to the last, to the right and upward, in units of the picture width."""
 
@@ -78,7 +78,7 @@ _ACROSS: Final = 0.80
 _TALL: Final = 0.22
 """Height of the displacements, from the lowest to the highest position."""
 
-_TICK: Final = 0.008
+_TICK: Final = 0.008  # Length of a tick, in units of the picture width
 
 _SHEETS: Final = 2.0
 """Common z-order of curves and sheets, so that they are drawn in the order of creation."""

@@ -28,7 +28,7 @@ PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
 POINTS: Final = 200
 """Points in each panel, as in the paper."""
 
-_COLUMNS: Final = 3
+_COLUMNS: Final = 3  # Panels in a row
 
 
 @styled
