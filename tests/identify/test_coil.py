@@ -8,6 +8,8 @@ import pytest
 from tests.errors import refused
 
 import printhammer as ph
+from printhammer.identify.coil import default_constants
+from printhammer.identify.current import probe_current
 
 RAIL = {"shape": "rail", "voltage": "24 V", "width": "2 ms", "decay": "zener", "decay_voltage": "30 V"}
 RECORD = {"sampling_rate": "100 kHz", "bandwidth": "20 kHz"}
@@ -104,6 +106,84 @@ def test_a_current_that_dips_rejects_the_law(tmp_path: Path) -> None:
     assert fit.outliers.sum() < 4
 
 
+SWITCHED = """-1.5,0,0.0000 -1,9,0.0000 -0.5,9,0.3318 0,9,0.5902 0.5,9,0.7915 1,9,0.9482 1.5,9,1.0702
+    2,9,1.1653 2.5,9,1.2393 3,9,1.2970 3.5,9,1.3419 4,9,1.3769 4.5,9,1.4041 5,9,1.4253 5.5,9,1.4418
+    6,9,1.4547 6.5,9,1.4647 7,9,1.4725"""
+"""Time, ms, voltage, V, and current, A: 1.5 (1 - exp(-(t + 1 ms) / 2 ms)), so 6 ohm and 12 mH."""
+
+
+def test_the_switch_lies_where_the_voltage_has_it(tmp_path: Path) -> None:
+    hammer = on_a_rail("5 ohm", "5 mH", "9 V")
+    path = case(tmp_path / "early.csv", "time [ms],voltage [V],current [A]", SWITCHED)
+    fit = ph.fit("coil", path, hammer=hammer, locked=0.0)
+    assert fit["coil.resistance"].value == pytest.approx(6.0, rel=1e-4)
+    assert fit["coil.inductance"].value == pytest.approx(12e-3, rel=1e-4)
+    assert not fit.rejected
+    rows = " ".join(",".join(row.split(",")[::2]) for row in SWITCHED.split())
+    with refused("time"):
+        ph.fit("coil", case(tmp_path / "bare.csv", "time [ms],current [A]", rows), hammer=hammer, locked=0.0)
+
+
+TIMES = np.arange(-30, 301) * 1e-5
+
+
+def probed(path: Path, seed: int, *, offset: float = 0.0, gain: float = 1.0, delay: float = 0.0) -> Path:
+    """Write a record of a locked coil by a probe with errors and a noise of 2 mA."""
+    hammer = driven()
+    assert hammer.waveform is not None
+    shown = gain * probe_current(hammer, hammer.waveform, TIMES - delay, locked=0.0) + offset
+    shown += 2e-3 * np.random.default_rng(seed).standard_normal(TIMES.size)
+    np.savetxt(path, np.column_stack([TIMES, shown]), "%.9g", ",", header="time [s],current [A]", comments="")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("errors", "stated"),
+    [
+        ({"offset": 4e-3}, {"offset": "fit"}),
+        ({"delay": 1e-5}, {"delay": "0 us +- 20 us"}),
+        ({"gain": 1.01}, {"gain": "1 +- 0.01"}),
+    ],
+)
+def test_errors_of_a_probe_that_are_stated_or_fitted(
+    errors: dict[str, float], stated: dict[str, str], tmp_path: Path
+) -> None:
+    path = probed(tmp_path / "shown.csv", 4, **errors)
+    guess = driven(resistance="9 ohm", inductance="9 mH")
+    fit = ph.fit("coil", path, hammer=guess, locked=0.0, **stated)
+    for name, value in (("coil.resistance", 10.0), ("coil.inductance", 8e-3)):
+        assert abs(fit[name].value - value) < 3.0 * fit[name].standard_error
+    assert not fit.rejected
+    ((name, value),) = errors.items()
+    assert abs(fit[f"probe.{name}"].value - value) < 3.0 * fit[f"probe.{name}"].standard_error
+    assert "probe" not in fit.fragment().split("[coil]")[1]
+    # Left unstated it moves a constant by many standard errors: the law is rejected, or the fit says why not.
+    plain = ph.fit("coil", path, hammer=guess, locked=0.0)
+    assert abs(plain["coil.resistance"].value - 10.0) > 4.0 * plain["coil.resistance"].standard_error or (
+        abs(plain["coil.inductance"].value - 8e-3) > 4.0 * plain["coil.inductance"].standard_error
+    )
+    if name == "gain":
+        assert any("gain" in remark for remark in plain.remarks)
+    else:
+        assert plain.rejected
+
+
+def test_readings_in_coarse_steps(tmp_path: Path) -> None:
+    """Eight bits: the rounding errors of rows on one step are one error."""
+    coarse = {**RECORD, "noise": {"current": "1 mA"}, "resolution": {"current": "10 mA"}}
+    path = record(driven(), tmp_path / "bits.csv", sensor=coarse)
+    fit = ph.fit("coil", path, hammer=driven(resistance="9 ohm", inductance="9 mH"))
+    for name, value in (("coil.resistance", 10.0), ("coil.inductance", 8e-3)):
+        assert abs(fit[name].value - value) < 3.0 * fit[name].standard_error
+    assert not fit.rejected
+    assert len(fit.data) < 0.8 * 306
+
+
+def test_no_inductance_is_fitted_beside_a_magnet_that_has_its_own() -> None:
+    assert default_constants(ph.load("impact-wire")) == ("coil.resistance",)
+    assert default_constants(driven()) == ("coil.resistance", "coil.inductance")
+
+
 @pytest.mark.parametrize(
     ("table", "options", "key"),
     [
@@ -113,6 +193,8 @@ def test_a_current_that_dips_rejects_the_law(tmp_path: Path) -> None:
         ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.turns"]}, "constant"),
         ("time [us],current [A]\n0,0\n1,1\n", {"free": ["coil.leakage"]}, "coil.leakage"),
         ("time [us],current [A]\n0,0\n1,1\n", {"free": []}, "free"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"delay": "2 V"}, "delay"),
+        ("time [us],current [A]\n0,0\n1,1\n", {"bandwidth": "0 Hz"}, "bandwidth"),
         ("time [us],current [A]\n0,0\n1,1\n", {}, "rows"),
         (
             "# locked: here\ntime [us],current [A]\n0,0\n1,1\n",
@@ -162,3 +244,13 @@ def test_saturation_and_resistance_from_two_places_of_a_locked_armature(tmp_path
     for name in free:
         constant, value = fit[name], hammer.constants[name].si
         assert abs(constant.value - value) < 3.0 * constant.standard_error < 0.1 * value
+
+
+@pytest.mark.slow
+def test_a_shipped_magnet_gives_its_resistance(tmp_path: Path) -> None:
+    wire = ph.load("impact-wire")
+    options = {"sensor": {"sampling_rate": "100 kHz"}, "duration": "1 ms"}
+    fit = ph.fit("coil", record(wire, tmp_path / "wire.csv", **options), hammer=wire)
+    assert list(fit.constants) == ["coil.resistance"]
+    assert abs(fit["coil.resistance"].value - 6.0) < 3.0 * fit["coil.resistance"].standard_error < 0.3
+    assert not fit.rejected

@@ -6,101 +6,48 @@ Data: the columns ``time``, from switching on, and ``current``, perhaps ``voltag
 there is no voltage, the hammer's own driver is what switches. The final current tells the resistance, the
 rise the inductance, what bends it a shorted turn or the saturation; an armature that moves adds its own.
 
-What a current probe shows of a coil that a voltage drives, with a free armature or a locked one.
-
-The probe is a first-order low-pass. Between moments at most 0.5 us apart the current is taken as straight.
+A probe has errors of its own, see `printhammer.identify.probe`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from printhammer.drive.input import read_number
-from printhammer.drive.trains import PulseTrain
-from printhammer.drive.waveforms.base import Waveform
-from printhammer.errors import InputError, located
+from printhammer.drive.input import read_number, read_positive
+from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.names import quantity_of, unknown
-from printhammer.identify.least_squares import Parameters
-from printhammer.identify.lowpass import bandwidth_of, lowpass_lines, time_constant
+from printhammer.identify.current import Trace, probe_current, read_trace
+from printhammer.identify.least_squares import Law, Parameters
+from printhammer.identify.noise import robust_scale
+from printhammer.identify.probe import (
+    NOMINAL,
+    SIGNS,
+    UNITS,
+    ProbeError,
+    bounds_of,
+    plateaus,
+    read_probe,
+    resolution_of,
+)
 from printhammer.identify.result import Fit
-from printhammer.identify.static.assemble import Data, assemble, enough, judge, solved
-from printhammer.results import Declared, part
-from printhammer.run.simulate import simulate
-from printhammer.support.arrays import FloatArray
-from printhammer.support.tables.readings import Readings, read_table
-
-_FINEST: Final = 0.5e-6
-"""Largest step of the current that goes through the probe, s."""
-
-_MOST: Final = 2_000_000
-"""Steps of a record, which bound its room in the memory."""
-
-_LOCKED: Final = 1e9
-"""Mass of a locked armature, kg: in a second 100 N move it by 0.05 um."""
-
-
-def check_driver(hammer: Hammer) -> None:
-    """Refuse a hammer whose waveform is no voltage."""
-    if hammer.waveform is None or hammer.waveform.unit != "V":
-        raise InputError(
-            f"{hammer.path}: the hammer has no [waveform] that is a voltage",
-            file=hammer.path,
-            key="waveform",
-            expected="the driver of its coil",
-        )
-
-
-def probe_current(
-    hammer: Hammer, waveform: Waveform, t: FloatArray, *, locked: float | None = None, tau: float = 0.0
-) -> FloatArray:
-    """Return what a probe shows at ascending times, s, of a coil switched on at time 0, A, shape of `t`.
-
-    The armature begins at rest, or is locked at a displacement, m; `tau` is the time constant of the
-    probe, s. Before time 0 there is no current.
-
-    Raises
-    ------
-    InputError
-        The hammer has no circuit for a voltage, the record is too long, or the run does not reach its end.
-    """
-    after = t[t >= 0.0]
-    shown = np.zeros(len(t))
-    if not len(after) or not after[-1] > 0.0:
-        return shown
-    knots = np.concatenate([[0.0], after]) if after[0] > 0.0 else after
-    each = max(1, math.ceil(float(np.diff(knots).max()) / _FINEST - 1e-9)) if tau else 1
-    count = each * (len(knots) - 1)
-    if count > _MOST:
-        raise InputError(
-            f"a record of {after[-1]:.6g} s is too long for the probe", key="record", expected="a shorter one"
-        )
-    fine = np.interp(np.arange(count + 1) / each, np.arange(len(knots)), knots)
-    state = None
-    if locked is not None:
-        hammer, state = hammer.replace("mass", _LOCKED), (locked, 0.0)
-    run = simulate(hammer, PulseTrain(waveform), duration=float(fine[-1]), state=state, points=2)
-    if not run.ok:
-        raise InputError(
-            f"{hammer.path}: the current did not reach its end: {run.message}",
-            file=hammer.path,
-            key="current",
-        )
-    current = lowpass_lines(fine, run.driven_at(fine), tau)[::each]
-    shown[t >= 0.0] = current[len(knots) - len(after) :]
-    return shown
-
+from printhammer.identify.static.assemble import Data, assemble, enough, judge, need, solved
+from printhammer.support.arrays import FloatArray, IntArray
 
 FREE: Final = ("coil.resistance", "coil.inductance")
-"""What is fitted unless others are named."""
+"""What is fitted unless others are named; the resistance alone where the magnet has its own inductance."""
 
 _STEP: Final = 1e-4
 """Of the differences for the derivatives, relative: well above the errors of the integration."""
+
+_SHORT: Final = 0.05
+"""Of the differences for derivatives by times, in time steps of the record."""
 
 _REACH: Final = 1e3
 """Factor by which constants may go away from those that the fit begins with."""
@@ -114,14 +61,14 @@ _SPARE: Final = 4
 _EXACT: Final = 1e-6
 """Residuals below this part of the current are errors of the integration: they test no law."""
 
+_COARSE: Final = 1.5
+"""Resolution over the standard deviation of the residuals from which on it is what they consist of."""
 
-class Trace(Declared, eq=False):
-    """One record, and what drove it."""
 
-    table: Readings = part("its columns")
-    waveform: Waveform = part("the voltage")
-    locked: float | None = part("where the armature is held, m; None where it is free")
-    tau: float = part("time constant of the probe, s")
+def default_constants(hammer: Hammer) -> tuple[str, ...]:
+    """Return what is fitted unless others are named: no inductance beside a magnet that has its own."""
+    linked = hammer.magnet is not None and hammer.magnet.has_linkage
+    return FREE[:1] if linked and not _stated(hammer, FREE[1]) else FREE
 
 
 def fit_coil(
@@ -129,84 +76,181 @@ def fit_coil(
     hammer: Hammer,
     *,
     free: Sequence[str] | None = None,
+    also: Sequence[str] = (),
     locked: float | str | None = None,
-    bandwidth: float | None = None,
+    offset: float | str | None = None,
+    gain: float | str | None = None,
+    delay: float | str | None = None,
+    bandwidth: float | str | None = None,
+    resolution: float | str | None = None,
     robust: bool = True,
 ) -> Fit:
     """Fit constants of the circuit to records of the current, one shot each.
 
+    An error of the probe is a number or a text with a unit; "1 +- 0.01", a value with its standard deviation,
+    which counts; or "fit". Errors that are not stated are taken as absent, and the law is tested for them.
+
     Parameters
     ----------
     paths : sequence of path
-        Tables with the columns ``time``, ``current`` and perhaps ``voltage``, which then drives the coil.
+        Tables with the columns ``time``, ``current`` and perhaps ``voltage``, which then drives the coil from
+        the first row on; each of its edges lies anywhere between two rows. Without it the coil is switched on
+        at time 0.
     hammer : Hammer
         All that is known; its values are where the fit begins. A resistance or inductance that it does not
         state is estimated first.
     free : sequence of str, optional
-        Constants to find, by default `FREE`; such as "coil.turn_resistance", "magnet.saturation_flux".
+        Constants to find, by default `default_constants`.
+    also : sequence of str, optional
+        Further ones; such as "coil.turn_resistance", "magnet.saturation_flux".
     locked : float or str, optional
         Displacement at which the armature was held, m; by default what a comment ``# locked: 100 um`` says,
         and else it is free.
-    bandwidth : float, optional
-        Of the probe, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, and else unlimited.
+    offset, gain, delay : float or str, optional
+        Offset, A, gain, and delay, s, of the probe.
+    bandwidth : float or str, optional
+        Bandwidth of the probe, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, else unlimited.
+    resolution : float or str, optional
+        Step of the readings, A; by default the one of which all of them are whole multiples.
     robust : bool, optional
         Whether rows that lie too far off are left out.
 
     Raises
     ------
     InputError
-        A record cannot be used or is too short, a constant is not known or not stated, or the hammer has no
-        circuit for a voltage.
+        A record cannot be used or is too short, current flows before the switching, a constant is not known
+        or not stated, or the hammer has no circuit for a voltage.
     """
-    names = list(dict.fromkeys(FREE if free is None else free))
+    names = list(dict.fromkeys([*(default_constants(hammer) if free is None else free), *also]))
     if not names:
         raise InputError("no constants to find", key="free", expected="one or more, such as coil.inductance")
     place = None if locked is None else read_number(locked, "m", "locked")
-    traces = [_read(path, hammer, place, bandwidth) for path in paths]
+    traces = [read_trace(path, hammer, place, offset is not None) for path in paths]
+    stated = {"offset": offset, "gain": gain, "delay": delay, "bandwidth": bandwidth}
+    errors = read_probe(stated, min(trace.step for trace in traces))
     hammer, start = _start(hammer, names, traces[0])
     units = [_unit(hammer, name) for name in names]
-    law = CurrentLaw(hammer, names, traces)
+    law = CurrentLaw(hammer, names, traces, errors)
     data = _data(traces)
-    enough(data, len(names) + _SPARE, "the constants of the coil and their errors")
+    space = law.space(start)
+    enough(data, len(space.start) + _SPARE, "the constants of the coil and their errors")
     # What the hammer lacks is said here; on the way constants that make no circuit are only passed over.
-    law.simulated(start)
-    space = Parameters.of(start, low=start / _REACH, high=start * _REACH, size=0.0, tolerance=_TOLERANCE)
+    law.simulated(space.start)
     solution = solved(data, law, space, robust=robust)
+    terms = law.missing(solution.p)
+    step = resolution_of(data.values) if resolution is None else read_positive(resolution, "A", "resolution")
+    final: Law = law
+    notes: list[str] = []
+    if step > _COARSE * robust_scale(solution.residuals):
+        averaged = Averaged(law, plateaus(solution.fitted, data.series, step), solution.fitted, step)
+        if averaged.count >= len(space.start) + _SPARE:
+            notes.append(
+                f"the readings have steps of {step:.3g} A, more than their noise: {len(data.values)} rows"
+                f" count as {averaged.count}, their means from step to step"
+            )
+            data, terms = averaged.data(data), {why: averaged.mean(term) for why, term in terms.items()}
+            final = averaged
+            solution = solved(data, final, replace(space, start=_within(solution.p, space)), robust=robust)
     p_value, why = math.nan, ""
     if solution.residual_scale > _EXACT * float(np.abs(data.values).max()):
-        p_value, why = judge(solution, {}, data.abscissa, data.series)
+        p_value, why = judge(solution, terms, data.abscissa, data.series)
+    if SIGNS["gain"] in terms and math.isnan(need(solution, terms[SIGNS["gain"]])):
+        notes.append("an error in the gain of the probe is not seen: the constants scale with it")
     held = sorted({trace.locked for trace in traces if trace.locked is not None})
+    known = {"armature locked at": ", ".join(f"{place!r} m" for place in held)} if held else {}
+    fitted = [error for error in errors if error.is_fitted]
+    found = [(name, unit, True) for name, unit in zip(names, units, strict=True)]
+    found += [(error.key, UNITS[error.name], False) for error in fitted]
+    found += [("", "s", False)] * sum(trace.edges.size for trace in traces)
     return assemble(
         data,
-        law,
+        final,
         solution,
-        [(name, unit, True) for name, unit in zip(names, units, strict=True)],
-        given={"armature locked at": ", ".join(f"{place!r} m" for place in held)} if held else {},
+        found,
+        given=known | {error.key: error.text for error in errors if math.isfinite(error.deviation)},
         remedies=dict.fromkeys(names, "a longer record, or one with less noise"),
         rejected=why,
         p_value=p_value,
+        notes=notes,
     )
 
 
 class CurrentLaw:
-    """Currents of all records, A, shape (m,); p are the values of the constants named, SI."""
+    """Currents of all records, A, shape (m,).
 
-    def __init__(self, hammer: Hammer, names: list[str], traces: list[Trace]) -> None:
-        self.hammer, self.names, self.traces = hammer, names, traces
+    p are the values of the constants named, the errors of the probe that are fitted, and how far each edge of
+    a recorded voltage lies from the middle between its rows, SI.
+    """
+
+    def __init__(
+        self, hammer: Hammer, names: list[str], traces: list[Trace], errors: list[ProbeError]
+    ) -> None:
+        self.hammer, self.names, self.traces, self.errors = hammer, names, traces, errors
+        self.fitted = [error for error in errors if error.is_fitted]
+        self.gaps = np.concatenate([np.diff(trace.times)[trace.edges] for trace in traces])
+        self.step = min(trace.step for trace in traces)
         self._values: dict[bytes, FloatArray] = {}
         self._slopes: dict[bytes, FloatArray] = {}
 
-    def simulated(self, p: FloatArray) -> FloatArray:
-        """Return the currents."""
-        hammer = self.hammer.replace(dict(zip(self.names, p.tolist(), strict=True)))
-        return np.concatenate(
-            [
-                probe_current(
-                    hammer, trace.waveform, trace.table.values["time"], locked=trace.locked, tau=trace.tau
-                )
-                for trace in self.traces
-            ]
+    def space(self, start: FloatArray) -> Parameters:
+        """Return where the fit begins, and how far it may go, of constants that begin at `start`."""
+        longest = max(float(trace.times[-1]) for trace in self.traces)
+        peak = max(float(np.abs(trace.table.values["current"]).max()) for trace in self.traces)
+        ends = [bounds_of(error, longest) for error in self.fitted]
+        sizes = {"offset": peak, "delay": longest, "gain": 0.0, "time constant": 0.0}
+        edge = (0.5 - 2e-5) * self.gaps
+        return Parameters.of(
+            np.concatenate([start, [error.value for error in self.fitted], 0.0 * edge]),
+            low=np.concatenate([start / _REACH, [low for low, _high in ends], -edge]),
+            high=np.concatenate([start * _REACH, [high for _low, high in ends], edge]),
+            # An edge lies anywhere between two rows.
+            deviation=np.concatenate(
+                [
+                    0.0 * start + math.inf,
+                    [error.deviation for error in self.fitted],
+                    self.gaps / math.sqrt(12.0),
+                ]
+            ),
+            size=np.concatenate([0.0 * start, [sizes[error.name] for error in self.fitted], self.gaps]),
+            tolerance=_TOLERANCE,
         )
+
+    def simulated(self, p: FloatArray, **added: float) -> FloatArray:
+        """Return the currents, with errors of the probe added."""
+        count = len(self.names)
+        hammer = self.hammer.replace(dict(zip(self.names, p[:count].tolist(), strict=True)))
+        probe = {error.name: error.value for error in self.errors}
+        probe |= {error.name: float(p[count + k]) for k, error in enumerate(self.fitted)}
+        shifts = np.split(
+            p[count + len(self.fitted) :], np.cumsum([trace.edges.size for trace in self.traces])[:-1]
+        )
+        shown = []
+        for trace, moved in zip(self.traces, shifts, strict=True):
+            of = NOMINAL | {"time constant": trace.tau} | probe
+            of = {name: value + added.get(name.replace(" ", "_"), 0.0) for name, value in of.items()}
+            current = probe_current(
+                hammer,
+                trace.driven(moved),
+                trace.times - of["delay"],
+                locked=trace.locked,
+                tau=of["time constant"],
+            )
+            shown.append(of["gain"] * current + of["offset"])
+        return np.concatenate(shown)
+
+    def missing(self, p: FloatArray) -> dict[str, FloatArray]:
+        """Return the derivatives by errors of the probe that are not stated, by what they look like."""
+        short = _SHORT * self.step
+        steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
+        unstated = [name for name in steps if name not in [error.name for error in self.errors]]
+        terms = {}
+        for name in unstated:
+            ahead = self.simulated(p, **{name.replace(" ", "_"): steps[name]})
+            # A probe is never faster than it is.
+            both = name == "delay"
+            behind = self.simulated(p, **({name: -steps[name]} if both else {}))
+            terms[SIGNS[name]] = (ahead - behind) / steps[name]
+        return terms
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the currents; NaN where the constants make no circuit."""
@@ -223,7 +267,10 @@ class CurrentLaw:
         """Return the derivatives by the parameters, by central differences."""
 
         def made() -> FloatArray:
-            steps = _STEP * p
+            sizes = {"offset": 1e-3, "gain": 1e-3, "delay": _SHORT * self.step, "time constant": 0.0}
+            steps = np.concatenate([0.0 * p[: len(self.names)], [sizes[e.name] for e in self.fitted]])
+            steps = np.concatenate([steps, 1e-3 * self.gaps])
+            steps = np.where(steps > 0.0, steps, _STEP * p)
             columns = [
                 (self.value(p + step) - self.value(p - step)) / (2.0 * size)
                 for size, step in zip(steps, np.diag(steps), strict=True)
@@ -238,46 +285,61 @@ class CurrentLaw:
         return np.repeat(np.eye(count), [len(trace.table) for trace in self.traces], axis=0)
 
 
+class Averaged:
+    """A law of readings whose steps exceed their noise: its means over the rows of each step.
+
+    Rows on one step of the readings share their rounding error. Where the law passes through the step it
+    averages out; where the law stays on it, the error is anything up to half a step.
+    """
+
+    def __init__(self, law: CurrentLaw, plateau: IntArray, fitted: FloatArray, step: float) -> None:
+        self.law, self.plateau = law, plateau
+        self.rows = np.bincount(plateau)
+        self.count = len(self.rows)
+        begins = np.flatnonzero(np.diff(plateau, prepend=-1))
+        self.begins = begins
+        span = np.maximum.reduceat(fitted, begins) - np.minimum.reduceat(fitted, begins)
+        self.share = np.minimum(np.maximum(1.0 - span / step, 0.0) ** 2 + 1.0 / self.rows**2, 1.0)
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """Return the means of rows, shape (count,)."""
+        return np.asarray(np.add.reduceat(values, self.begins, axis=0) / self.rows)
+
+    def data(self, data: Data) -> Data:
+        """Return the means of the data; each has the line of its first row."""
+        return replace(
+            data,
+            abscissa=self.mean(data.abscissa),
+            values=self.mean(data.values),
+            series=data.series[self.begins],
+            lines=data.lines[self.begins],
+        )
+
+    def value(self, p: FloatArray) -> FloatArray:
+        """Return the means of the currents."""
+        return self.mean(self.law.value(p))
+
+    def jacobian(self, p: FloatArray) -> FloatArray:
+        """Return the means of the derivatives."""
+        slopes = self.law.jacobian(p)
+        return np.column_stack([self.mean(column) for column in slopes.T])
+
+    def spread(self, p: FloatArray) -> FloatArray:
+        """Return the components of the variance: the rounding error of each record."""
+        return np.asarray(self.law.spread(p)[self.begins] * self.share[:, np.newaxis])
+
+
+def _within(p: FloatArray, space: Parameters) -> FloatArray:
+    """Return where the second of two fits begins; what is known beforehand keeps its mean."""
+    return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
+
+
 def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], FloatArray]) -> FloatArray:
     """Return what was computed at parameters before, or compute it: a fit asks for the same ones often."""
     key = p.tobytes()
     if key not in known:
         known[key] = made()
     return known[key]
-
-
-def _read(path: str | Path, hammer: Hammer, locked: float | None, bandwidth: float | None) -> Trace:
-    table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"})
-    table.check_times()
-    t = table.values["time"]
-    if not t[-1] > 0.0:
-        raise InputError(
-            f"{table.path}: no time after 0 s",
-            file=table.path,
-            key="time",
-            expected="a record from switching on",
-        )
-    if locked is None and "locked" in table.comments:
-        text = table.comments["locked"]
-        try:
-            locked = read_number(text, "m", f"{table.path}: the comment 'locked'")
-        except InputError as error:
-            raise InputError(str(error), file=table.path, key="locked", value=text) from None
-    width = bandwidth_of(table) if bandwidth is None else bandwidth
-    if "voltage" in table.values:
-        from printhammer.drive.waveforms.sampled import Sampled
-
-        after = t >= 0.0
-        with located(str(table.path)):
-            waveform: Waveform = Sampled.from_samples(
-                t[after], table.values["voltage"][after], quantity="voltage", interpolation="linear"
-            )
-    else:
-        with located(f"{table.path}: the table has no column 'voltage'"):
-            check_driver(hammer)
-        assert hammer.waveform is not None
-        waveform = hammer.waveform
-    return Trace(table, waveform, locked, time_constant(width))
 
 
 def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, FloatArray]:

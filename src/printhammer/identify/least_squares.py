@@ -43,6 +43,9 @@ _AT_BOUND: Final = 1e-6
 _SINGULAR: Final = 1e-12
 """Least singular value of a Jacobian with columns of unit length that determines all parameters."""
 
+_TIED: Final = 0.5
+"""Component of the weakest direction, as a fraction of the largest, of a parameter that may be held."""
+
 _RESISTS: Final = 1.0
 """Increase of the weighted sum of squares, one standard error, up to which a parameter is held elsewhere."""
 
@@ -221,7 +224,9 @@ def _undetermined(solution: Solution, data: FloatArray) -> int | None:
     _, singular, directions = np.linalg.svd(rows, full_matrices=False)
     if singular[-1] >= limit:
         return None
-    return int(free[np.argmax(np.abs(directions[-1]))])
+    parts = np.abs(directions[-1])
+    # Of parameters that go together the last, which is what a law adds to its main constants.
+    return int(free[np.flatnonzero(parts > _TIED * parts.max())[-1]])
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:

@@ -410,14 +410,23 @@ class Fit(Result):
         count = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
         if not len(self.lines):
             return count
-        listed = [str(self.lines[row]) for row in rows[:most]]
-        if len(self.source) > 1:
-            listed = [
-                f"{line} ({self.series_names[self.series[row]]})"
-                for line, row in zip(listed, rows, strict=False)
-            ]
-        more = ", …" if len(rows) > most else ""
-        return f"{count}: line{'s' if len(rows) > 1 else ''} {', '.join(listed)}{more}"
+        series = [int(self.series[row]) for row in rows]
+        # Rows that follow one another in a series are one stretch, from its first line to its last.
+        starts = [
+            k for k, row in enumerate(rows) if k == 0 or row != rows[k - 1] + 1 or series[k] != series[k - 1]
+        ]
+        listed, together = [], 0
+        for first, end in zip(starts, [*starts[1:], len(rows)], strict=True):
+            line, last = str(self.lines[rows[first]]), str(self.lines[rows[end - 1]])
+            if end - first > 2:
+                line, together = f"{line} to {last}", together + end - first
+            elif end - first == 2:
+                line = f"{line}, {last}"
+            where = f" ({self.series_names[series[first]]})" if len(self.source) > 1 else ""
+            listed.append(f"{line}{where}")
+        more = ", …" if len(listed) > most else ""
+        stretches = f", {together} of them in stretches" if together else ""
+        return f"{count}{stretches}: line{'s' if len(rows) > 1 else ''} {', '.join(listed[:most])}{more}"
 
 
 def with_error(fit: Fit, key: str, error: float, slopes: list[float]) -> Fit:

@@ -257,12 +257,19 @@ def motion(
     return _fitted(job, hammer, strict, made)
 
 
+_probe = partial(opt.text, panel="Probe")
+
+
 @verb(
     "fit coil",
     "printhammer fit coil current.csv --hammer driven.toml --locked '100 um' --out coil.toml",
     {
         **_PASSED,
-        "bandwidth": opt.quantity("Hz", "FREQUENCY", "Bandwidth of the current probe, e.g. '200 kHz'."),
+        "offset": _probe("CURRENT", "Offset of the current probe, e.g. '2 mA', '0 mA +- 5 mA' or 'fit'."),
+        "gain": _probe("X", "Gain of the current probe, e.g. '1 +- 0.01' or 'fit'."),
+        "delay": _probe("TIME", "Delay of the current probe, e.g. '2 us', '0 us +- 5 us' or 'fit'."),
+        "bandwidth": _probe("FREQUENCY", "Bandwidth of the current probe, e.g. '200 kHz' or 'fit'."),
+        "resolution": _probe("CURRENT", "Step of the readings; default: found in the readings."),
         "locked": opt.quantity("m", "LENGTH", "Displacement of a locked armature (default: free armature)."),
     },
     **_FILES,
@@ -285,14 +292,14 @@ def coil(
     """
 
     def made(known: Hammer | None) -> Fit:
-        from printhammer.identify.coil import FREE, fit_coil
+        from printhammer.identify.coil import fit_coil
 
         if known is None:
             raise InputError(
                 "the hammer is missing", key="hammer", expected="--hammer with the constants known already"
             )
-        keys = list(FREE) if free is None else _keys(free)
-        return fit_coil(files, known, free=[*keys, *_keys(also or "")], **passed)
+        keys = None if free is None else _keys(free)
+        return fit_coil(files, known, free=keys, also=_keys(also or ""), **passed)
 
     return _fitted(job, hammer, strict, made)
 

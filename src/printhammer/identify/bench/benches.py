@@ -27,7 +27,7 @@ from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.static_force import StaticForce, law_of
 from printhammer.identify.bench.sensor import Sensor
-from printhammer.identify.coil import check_driver, probe_current
+from printhammer.identify.current import check_driver, probe_current
 from printhammer.identify.lowpass import lowpass_motion, lowpass_waveform, time_constant
 from printhammer.parts.backstop._hertz import damping_from_restitution
 from printhammer.parts.backstop.hertz import HertzBackstop

@@ -38,7 +38,7 @@ from printhammer.support.arrays import FloatArray
 _REJECTED: Final = 0.01
 """Probability below which the model is rejected."""
 _LARGER: Final = 1.1
-"""Residuals over noise, at least, where the model is rejected: the noise of a record is not known better."""
+"""Factor by which the noise may exceed what a record shows of it: it is not known better."""
 _DEGREES: Final = 0.22
 """Degrees of freedom, a sample, of a noise from the median of third differences of white noise."""
 _TOLD: Final = 0.05
@@ -47,7 +47,7 @@ _OFF: Final = 5.0
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
-    """Compare the residuals with the noise that the records show by themselves."""
+    """Compare the residuals with the noise of the records themselves, with a margin for its error."""
     from scipy.stats import f
 
     p_value, worst = 1.0, ""
@@ -64,16 +64,16 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
         if noise == 0.0:
             continue
         number = int((~out).sum())
-        tail = float(f.sf((scale / noise) ** 2, max(number - count, 1), _DEGREES * len(shot.x)))
+        ratio = scale / (_LARGER * noise)
+        tail = float(f.sf(ratio**2, max(number - count, 1), _DEGREES * len(shot.x)))
         if tail < p_value:
             p_value = tail
-            if scale > _LARGER * noise:
-                left = np.where(out, 0.0, np.abs(shot.x - shown))
-                place = shot.t[int(np.argmax(left))]
-                worst = (
-                    f"the residuals of {shot.name} are {scale:.3g} m, its noise is {noise:.3g} m, and they"
-                    f" are largest at {place:.4g} s (p = {tail:.2g})"
-                )
+            left = np.where(out, 0.0, np.abs(shot.x - shown))
+            place = shot.t[int(np.argmax(left))]
+            worst = (
+                f"the residuals of {shot.name} are {scale:.3g} m, its noise is {noise:.3g} m, and they"
+                f" are largest at {place:.4g} s (p = {tail:.2g} if the noise is {_LARGER:g} times that)"
+            )
     # The largest of several records counts.
     p_value = min(1.0, p_value * len(shots))
     return p_value, worst if p_value < _REJECTED else ""

@@ -34,6 +34,9 @@ LEVEL: Final = 0.01
 _RUNS: Final = (
     "residuals of neighbours go together: the data bend another way than the law, or the sensor is slow"
 )
+_COPY: Final = 1e-6
+"""Singular value of a Jacobian with columns of unit length below which a term is a copy of others."""
+
 _TOGETHER: Final = "the rows left out follow one another: there the data leave the law"
 
 _HARD_TO_TELL: Final = 30.0
@@ -58,7 +61,7 @@ def judge(
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""
-    p_values = {why: _need(solution, term) for why, term in terms.items()}
+    p_values = {why: need(solution, term) for why, term in terms.items()}
     order = np.lexsort((abscissa, series))
     ordered = (solution.residuals / np.sqrt(solution.variance))[order][solution.used[order]]
     p_values[_RUNS] = min(1.0, 2.0 * float(np.nanmin([1.0, runs_p_value(ordered), ratio_p_value(ordered)])))
@@ -71,7 +74,7 @@ def judge(
     return p_value, why if p_value < LEVEL else ""
 
 
-def _need(solution: Solution, term: FloatArray) -> float:
+def need(solution: Solution, term: FloatArray) -> float:
     """Return the probability that a law in need of no term asks for as much of it; NaN for a copy."""
     from scipy.stats import t
 
@@ -81,7 +84,7 @@ def _need(solution: Solution, term: FloatArray) -> float:
     known = np.zeros(len(rows) - len(errors))
     rows = np.column_stack([rows, np.concatenate([term[solution.used] / root, known])])
     rows = rows / lengths_of(rows)
-    if np.linalg.matrix_rank(rows, tol=1e-9) < rows.shape[1]:
+    if np.linalg.matrix_rank(rows, tol=_COPY) < rows.shape[1]:
         return math.nan
     need = np.linalg.lstsq(rows, np.concatenate([errors, known]), rcond=None)[0]
     covariance, freedoms = sandwich(rows, errors - rows[: len(errors)] @ need)

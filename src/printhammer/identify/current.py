@@ -1,0 +1,188 @@
+"""What a current probe shows of a coil that a voltage drives, computed, and as records of it have it.
+
+A record has the columns ``time`` and ``current``, perhaps ``voltage``; one shot a file. The armature is free
+or locked. The probe is a first-order low-pass. Between moments at most 0.5 us apart the current is taken as
+straight.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from printhammer.drive.input import read_number
+from printhammer.drive.trains import PulseTrain
+from printhammer.drive.waveforms.base import Waveform
+from printhammer.errors import InputError, located
+from printhammer.hammer.hammer import Hammer
+from printhammer.identify.lowpass import bandwidth_of, lowpass_lines, time_constant
+from printhammer.results import Declared, part
+from printhammer.run.simulate import simulate
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.tables.readings import Readings, read_table
+
+_FINEST: Final = 0.5e-6
+"""Largest step of the current that goes through the probe, s."""
+
+_MOST: Final = 2_000_000
+"""Steps of a record, which bound its room in the memory."""
+
+_LOCKED: Final = 1e9
+"""Mass of a locked armature, kg: in a second 100 N move it by 0.05 um."""
+
+_STEEP: Final = 0.3
+"""Change of the voltage from row to row, as a fraction of its range, that is an edge."""
+
+_EDGES: Final = 8
+"""Number of edges above which a voltage is no switched one, and is taken as straight between its rows."""
+
+_FLOWS: Final = 0.05
+"""Current at the switching, as a fraction of its largest, above which it flowed before."""
+
+_RAMP: Final = 1e-5
+"""Half the duration of an edge of a recorded voltage, over the time between its rows."""
+
+
+def check_driver(hammer: Hammer) -> None:
+    """Refuse a hammer whose waveform is no voltage."""
+    if hammer.waveform is None or hammer.waveform.unit != "V":
+        raise InputError(
+            f"{hammer.path}: the hammer has no [waveform] that is a voltage",
+            file=hammer.path,
+            key="waveform",
+            expected="the driver of its coil",
+        )
+
+
+def probe_current(
+    hammer: Hammer, waveform: Waveform, t: FloatArray, *, locked: float | None = None, tau: float = 0.0
+) -> FloatArray:
+    """Return what a probe shows at ascending times, s, of a coil switched on at time 0, A, shape of `t`.
+
+    The armature begins at rest, or is locked at a displacement, m; `tau` is the time constant of the
+    probe, s. Before time 0 there is no current.
+
+    Raises
+    ------
+    InputError
+        The hammer has no circuit for a voltage, the record is too long, or the run does not reach its end.
+    """
+    after = t[t >= 0.0]
+    shown = np.zeros(len(t))
+    if not len(after) or not after[-1] > 0.0:
+        return shown
+    knots = np.concatenate([[0.0], after]) if after[0] > 0.0 else after
+    each = max(1, math.ceil(float(np.diff(knots).max()) / _FINEST - 1e-9)) if tau else 1
+    count = each * (len(knots) - 1)
+    if count > _MOST:
+        raise InputError(
+            f"a record of {after[-1]:.6g} s is too long for the probe", key="record", expected="a shorter one"
+        )
+    fine = np.interp(np.arange(count + 1) / each, np.arange(len(knots)), knots)
+    state = None
+    if locked is not None:
+        hammer, state = hammer.replace("mass", _LOCKED), (locked, 0.0)
+    run = simulate(hammer, PulseTrain(waveform), duration=float(fine[-1]), state=state, points=2)
+    if not run.ok:
+        raise InputError(
+            f"{hammer.path}: the current did not reach its end: {run.message}",
+            file=hammer.path,
+            key="current",
+        )
+    current = lowpass_lines(fine, run.driven_at(fine), tau)[::each]
+    shown[t >= 0.0] = current[len(knots) - len(after) :]
+    return shown
+
+
+class Trace(Declared, eq=False):
+    """One record, and what drove it."""
+
+    table: Readings = part("its columns")
+    waveform: Waveform = part(
+        "the voltage of the hammer's driver, or that of the table with its edges halfway"
+    )
+    locked: float | None = part("where the armature is held, m; None where it is free")
+    tau: float = part("time constant of the probe by the table, s")
+    times: FloatArray = part(
+        "times since the coil was switched on, or since the record of a voltage begins, s"
+    )
+    edges: IntArray = part("rows of the table after which its voltage jumps")
+
+    @property
+    def step(self) -> float:
+        """Median time between rows, s."""
+        return float(np.median(np.diff(self.times)))
+
+    def driven(self, shifts: FloatArray) -> Waveform:
+        """Return the voltage with its edges moved from the middle between two rows, s."""
+        if not self.edges.size:
+            return self.waveform
+        t, volts = self.times, self.table.values["voltage"]
+        middle = 0.5 * (t[self.edges] + t[self.edges + 1]) + shifts
+        half = _RAMP * (t[self.edges + 1] - t[self.edges])
+        times = np.concatenate([t, middle - half, middle + half])
+        values = np.concatenate([volts, volts[self.edges], volts[self.edges + 1]])
+        order = np.argsort(times, kind="stable")
+        return _sampled(self.table, times[order], values[order])
+
+
+def read_trace(path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool) -> Trace:
+    """Read a record, locked where the argument says, m, or a comment of its file."""
+    table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"})
+    table.check_times()
+    t = table.values["time"]
+    recorded = "voltage" in table.values
+    if not (t[-1] > 0.0 or recorded) or len(t) < 2:
+        raise InputError(
+            f"{table.path}: no time after 0 s",
+            file=table.path,
+            key="time",
+            expected="a record from switching on",
+        )
+    if locked is None and "locked" in table.comments:
+        text = table.comments["locked"]
+        try:
+            locked = read_number(text, "m", f"{table.path}: the comment 'locked'")
+        except InputError as error:
+            raise InputError(str(error), file=table.path, key="locked", value=text) from None
+    if not has_offset:
+        _check_begin(table, recorded)
+    tau = time_constant(bandwidth_of(table))
+    if not recorded:
+        with located(f"{table.path}: the table has no column 'voltage'"):
+            check_driver(hammer)
+        assert hammer.waveform is not None
+        return Trace(table, hammer.waveform, locked, tau, t, np.empty(0, dtype=np.int64))
+    volts = table.values["voltage"]
+    edges = np.flatnonzero(np.abs(np.diff(volts)) > _STEEP * float(np.ptp(volts)))
+    edges = edges if edges.size <= _EDGES else edges[:0]
+    times = t - t[0]
+    made = Trace(table, _sampled(table, times, volts), locked, tau, times, edges)
+    return replace(made, waveform=made.driven(np.zeros(edges.size)))
+
+
+def _check_begin(table: Readings, recorded: bool) -> None:
+    """Refuse a record whose current flows when the coil is switched on, or when a recorded voltage begins."""
+    t, current = table.values["time"], np.abs(table.values["current"])
+    before = current[:1] if recorded else current[t <= 0.0][-3:]
+    if before.size and float(np.median(before)) > _FLOWS * float(current.max()):
+        when = "when the record begins" if recorded else "at time 0"
+        raise InputError(
+            f"{table.path}: {float(before[-1]):.3g} A flow {when}",
+            file=table.path,
+            key="time",
+            expected=(
+                "times from the switching on, the column 'voltage' from before it, or an offset of the probe"
+            ),
+        )
+
+
+def _sampled(table: Readings, times: FloatArray, volts: FloatArray) -> Waveform:
+    from printhammer.drive.waveforms.sampled import Sampled
+
+    with located(str(table.path)):
+        return Sampled.from_samples(times, volts, quantity="voltage", interpolation="linear")

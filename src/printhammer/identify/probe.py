@@ -1,0 +1,133 @@
+"""A current probe and its errors: offset, gain, delay, bandwidth and resolution, declared or fitted.
+
+    shown(t) = gain * lowpass(i)(t - delay) + offset,   in steps of the resolution
+
+An error is exact, known with a standard deviation ("1 % +- 0.5 %"), or free ("fit").
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from printhammer.drive.input import read_number, read_positive
+from printhammer.errors import InputError
+from printhammer.identify.lowpass import time_constant
+from printhammer.results import Declared, part
+from printhammer.support.arrays import FloatArray, IntArray
+
+FIT: Final = "fit"
+"""What is written for an error that the fit finds."""
+
+NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0}
+"""Errors of a probe that has none, SI."""
+
+UNITS: Final = {"offset": "A", "gain": "1", "delay": "s", "time constant": "s"}
+
+SIGNS: Final = {
+    "offset": "the current is off by a constant, as by an offset of the probe: state it, or fit it",
+    "gain": "the current is off by a factor, as by a gain of the probe: state it, or fit it",
+    "delay": "the current comes late or early, as by a delay of the probe: state it, or fit it",
+    "time constant": "the current is smoother, as by the bandwidth of the probe: state it, or fit it",
+}
+"""What an error that nobody stated looks like."""
+
+_WIDEST: Final = 0.2
+"""Lower bound of a bandwidth that is fitted, over the reciprocal of the record."""
+
+
+class ProbeError(Declared):
+    """One error of a probe, as far as it is known."""
+
+    name: str = part("offset, gain, delay or time constant")
+    value: float = part("SI")
+    deviation: float = part("standard deviation, SI; 0 where it is exact, infinite where it is free")
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the fit finds it."""
+        return self.deviation > 0.0
+
+    @property
+    def key(self) -> str:
+        """Name in a result."""
+        return f"probe.{self.name.replace(' ', '_')}"
+
+    @property
+    def text(self) -> str:
+        """Value with unit, and its standard deviation where it has one."""
+        unit = UNITS[self.name]
+        return f"{self.value!r} {unit}" + (f" +- {self.deviation:.3g} {unit}" if self.deviation else "")
+
+
+def read_probe(settings: Mapping[str, float | str | None], step: float) -> list[ProbeError]:
+    """Read the errors of a probe that are stated; `step` is the time between samples, s.
+
+    Settings are "offset", A, "gain", "delay", s, and "bandwidth", Hz: a number or a text with a unit, a
+    value with its standard deviation such as "0 us +- 5 us", or "fit". Those that are None are not stated.
+    """
+    errors = []
+    for name, written in settings.items():
+        if written is None:
+            continue
+        if name not in _SI:
+            raise InputError.of("probe", name, f"one of {', '.join(_SI)}")
+        value, deviation = _read(name, written)
+        if name == "bandwidth":
+            if math.isinf(deviation):
+                errors.append(ProbeError("time constant", step, deviation))
+                continue
+            tau = time_constant(value)
+            errors.append(ProbeError("time constant", tau, tau * deviation / value))
+        else:
+            errors.append(ProbeError(name, value, deviation))
+    return errors
+
+
+_SI: Final = {"offset": "A", "gain": "1", "delay": "s", "bandwidth": "Hz"}
+
+
+def _read(name: str, written: float | str) -> tuple[float, float]:
+    if isinstance(written, str) and written.strip() == FIT:
+        return NOMINAL.get(name, math.nan), math.inf
+    deviation = 0.0
+    if isinstance(written, str):
+        written, mark, error = (each.strip() for each in written.replace("±", "+-").partition("+-"))
+        if mark:
+            deviation = abs(read_number(error, _SI[name], f"the standard deviation of {name}"))
+    read = read_positive if name in ("bandwidth", "gain") else read_number
+    return read(written, _SI[name], name), deviation
+
+
+def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
+    """Return how far an error of a probe may go, SI, in records of a duration, s."""
+    if error.name == "gain":
+        return 0.1 * error.value, 10.0 * error.value
+    if error.name == "time constant":
+        return 1e-3 * error.value, _WIDEST * longest
+    reach = 0.5 * longest if error.name == "delay" else math.inf
+    return error.value - reach, error.value + reach
+
+
+def resolution_of(values: FloatArray) -> float:
+    """Return the step of which readings are whole multiples; 0 where they have none, or too few repeat."""
+    levels = np.unique(values)
+    if len(levels) < 3 or 2 * len(levels) > len(values):
+        return 0.0
+    step = float(np.diff(levels).min())
+    counts = (levels - levels[0]) / step
+    return step if float(np.abs(counts - np.rint(counts)).max()) < _WHOLE else 0.0
+
+
+_WHOLE: Final = 0.02
+"""How far readings may be from whole multiples of the resolution, for the digits of a file."""
+
+
+def plateaus(fitted: FloatArray, series: IntArray, step: float) -> IntArray:
+    """Return the plateau of each row, ascending: rows that a law puts on the same step of the readings."""
+    code = np.rint(fitted / step)
+    begins = (np.diff(code) != 0.0) | (np.diff(series) != 0)
+    return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)
