@@ -115,7 +115,7 @@ def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
 def resolution_of(values: FloatArray) -> float:
     """Return the step of which readings are whole multiples; 0 where they have none, or too few repeat."""
     levels = np.unique(values)
-    if len(levels) < 3 or 2 * len(levels) > len(values):
+    if len(levels) < 3 or len(levels) == len(values):
         return 0.0
     step = float(np.diff(levels).min())
     counts = (levels - levels[0]) / step
