@@ -47,10 +47,11 @@ def test_files_and_the_header(tables: AxisTables, tmp_path: Path) -> None:
     assert len(tables.to_dataframe()) == 3 * len(tables.tables[0].to_dataframe())
     text = tables.to_header("1 us", budget=tables.size("1 us"))
     (tmp_path / "t.h").write_text(text)
-    prefix = "printhammer_hendriks_1983"
+    prefix = "printhammer_hendriks_1983_1275hz_gap"
     entries = tables.tables[0].advance.shape[1]
     columns = [
-        f"{prefix}_{name}" for name in ("gap", "rate", "advance", "width", "brake_delay", "brake_width")
+        f"{prefix}_{name}"
+        for name in ("gap", "rate", "advance", "width", "brake_delay", "brake_width", "look_ahead")
     ]
     main = f"""
 #include "t.h"
@@ -115,7 +116,7 @@ def test_firmware_interpolates_to_the_tick(tables: AxisTables, tmp_path: Path, t
         last.advance.shape[1],
         [-12000, -10000, -7001, -1, 0, 1, 3333, 4999, 5001, 7777, 10000, 11000],
     )
-    name = "printhammer_hendriks_1983_gap_times"
+    prefix = "printhammer_hendriks_1983_1275hz_gap"
     (tmp_path / "main.c").write_text(f"""
 #include "t.h"
 #include <stdio.h>
@@ -124,10 +125,10 @@ int main(void) {{
   for (unsigned i = 0; i < {len(values)}u; i++) for (unsigned j = 0; j < {entries}u; j++) {{
     unsigned gaps[1] = {{j}};
     int32_t t[4];
-    {name}(value[i], 0u, printhammer_hendriks_1983_history(gaps), t);
+    {prefix}_times(value[i], 0u, {prefix}_history(gaps), t);
     printf("%ld %ld %ld %ld\\n", (long)t[0], (long)t[1], (long)t[2], (long)t[3]);
   }}
-  return (int)(printhammer_hendriks_1983_rate[0] != 1275000u);
+  return (int)({prefix}_rate[0] != 1275000u);
 }}
 """)
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]

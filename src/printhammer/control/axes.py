@@ -1,7 +1,4 @@
-"""Tables along one more axis that a firmware knows: rail, temperature of the coil, gap, or forms.
-
-Interpolation along an axis of tables as firmware does it: C99 in whole numbers, without a library.
-"""
+"""Tables along one more axis that a firmware knows: rail, temperature of the coil, gap, or forms."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from printhammer.control.pulses import of_width
-from printhammer.control.table.compensation import JUMP, CompensationTable, TableStrategy, checked_tick, mixed
+from printhammer.control.table.compensation import CompensationTable, TableStrategy, checked_tick, mixed
 from printhammer.control.table.drive import (
     COLUMNS,
     LARGEST_CURRENT,
@@ -24,7 +21,8 @@ from printhammer.control.table.drive import (
     print_pulse,
     with_pulse,
 )
-from printhammer.control.table.formats import HEAD, NANOSECOND, bits_of, header_text, size_of
+from printhammer.control.table.formats import HEAD, OPTIONAL
+from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
 from printhammer.control.table.tuning import tune
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError, located
@@ -38,55 +36,11 @@ from printhammer.results.summary import (
     Summary,
 )
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.support.c_code import identifier
 from printhammer.support.files import write_file
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-_ADVANCE, _, _DELAY, _BRAKE = COLUMNS
-_END: Final = "\n#endif\n"
-
-
-def with_interpolation(header: str, prefix: str, axis: str, values: int, tick: float) -> str:
-    """Return a header of tables along an axis with a function that interpolates between its values.
-
-    It does what `printhammer.control.table.compensation.mixed` does, on the times in ticks, s, that the
-    header holds.
-    """
-    name, count = f"{prefix}_{axis}", len(COLUMNS)
-    ends = "\n".join(
-        f"  low[{row}] = {prefix}_{column}[above - 1u][rate][history];\n"
-        f"  high[{row}] = {prefix}_{column}[above][rate][history];"
-        for row, column in enumerate(COLUMNS)
-    )
-    place = {column: row for row, column in enumerate(COLUMNS)}
-    differ = " || ".join(f"low[{place[key]}] != high[{place[key]}]" for key in (_DELAY, _BRAKE))
-    code = f"""
-/* The four times at a value of the axis, in the order of the arrays: interpolated between two values; where
-   two ways to fire do not belong together, those of the nearer value; beyond the ends, those of the end. */
-static inline void {name}_times(int32_t value, unsigned rate, unsigned history, int32_t times[{count}])
-{{
-  int32_t low[{count}], high[{count}];
-  unsigned above = 1u;
-  while (above < {values - 1}u && value > {name}[above]) above++;
-  const int64_t whole = (int64_t){name}[above] - {name}[above - 1u];
-  int64_t part = (int64_t)value - {name}[above - 1u];
-  part = part < 0 ? 0 : part > whole ? whole : part;
-{ends}
-  int32_t apart = high[{place[_ADVANCE]}] - low[{place[_ADVANCE]}];
-  apart = apart < 0 ? -apart : apart;
-  if (apart > {int(JUMP / tick + 1e-6)} || {differ})
-    part = 2 * part > whole ? whole : 0;
-  for (unsigned i = 0; i < {count}u; i++) {{
-    const int64_t sum = low[i] * (whole - part) + high[i] * part;
-    times[i] = (int32_t)((sum < 0 ? sum - whole / 2 : sum + whole / 2) / whole);
-  }}
-}}
-"""
-    return f"{header.removesuffix(_END)}{code}{_END}"
-
 
 _MILLIONTH: Final = 1e-6
 
@@ -188,10 +142,9 @@ class AxisTables:
                 expected="a larger budget or fewer",
             )
         scale = NANOSECOND if AXES[self.axis].unit == "m" else _MILLIONTH
-        head = {name: getattr(first, name) for name in HEAD}
+        head = {name: getattr(first, name) for name in (*HEAD, *OPTIONAL)}
         along = self.axis, np.rint(np.array(self.values) / scale)
-        text = header_text(head, first.rates, times, unit, along)
-        return with_interpolation(text, identifier(first.hammer), self.axis, len(self.values), unit)
+        return header_text(head, first.rates, times, unit, along)
 
     def quantised(self, tick: float | str) -> AxisTables:
         """Return the tables as a timer with a tick, s or text, holds them."""

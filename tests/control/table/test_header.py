@@ -1,23 +1,41 @@
 """C headers in ticks of a timer: they compile without a warning, and agree with Python to the tick."""
 
+import math
+import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from tests.control.table.by_hand import by_hand
 from tests.errors import refused
 
-from printhammer.control.table.drive import COLUMNS
+from printhammer.control.table.compensation import CompensationTable
+from printhammer.control.table.drive import COLUMNS, histories, number_of, pattern_of, pulses_of
+from printhammer.control.table.header import look_ahead
+from printhammer.printing.dots.strategy import FIRST_SLOT
 
 TICKS = ("1 ns", "1 us", "5 us")
+PREFIX = "printhammer_hendriks_1983_800_1000hz"
+PAGE = Path(__file__).parents[3] / "docs" / "howto" / "tables.md"
+
+
+def run_c(folder: Path, text: str) -> list[list[int]]:
+    """Compile a program without a warning, run it, and return the whole numbers of its lines."""
+    (folder / "main.c").write_text(text)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Wunused-const-variable=2", "-Werror"]
+    subprocess.run(["cc", *flags, "-o", "main", "main.c"], cwd=folder, check=True)
+    said = subprocess.run([folder / "main"], check=True, capture_output=True, text=True).stdout
+    return [[int(word) for word in line.split()] for line in said.splitlines()]
 
 
 @pytest.mark.parametrize("tick", TICKS)
 def test_a_driver_in_c_agrees_to_the_tick(tmp_path: Path, tick: str) -> None:
     table = by_hand()
     (tmp_path / "table.h").write_text(table.to_header(tick))
-    name = "printhammer_" + "".join(letter if letter.isalnum() else "_" for letter in table.hammer)
+    name = PREFIX
     rates, entries = table.advance.shape
     lines = [
         '#include "table.h"',
@@ -28,18 +46,14 @@ def test_a_driver_in_c_agrees_to_the_tick(tmp_path: Path, tick: str) -> None:
     lines.append(f"  for (int i = 0; i < {rates}; i++) for (int j = 0; j < {entries}; j++)")
     every = ", ".join(f"(long){name}_{column}[i][j]" for column in COLUMNS)
     lines.append(f'    printf("%ld %ld %ld %ld\\n", {every});')
-    lines += [f"  size += sizeof {name}_{column};" for column in COLUMNS]
+    lines += [f"  size += sizeof {name}_{column};" for column in (*COLUMNS, "look_ahead")]
     lines += [
         f"  unsigned gaps[{table.gaps}] = {{0}};",
         f'  printf("%lu %u %u\\n", (unsigned long)size, {name.upper()}_BYTES, {name}_history(gaps));',
         "  return 0;",
         "}",
     ]
-    (tmp_path / "main.c").write_text("\n".join(lines) + "\n")
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror"]
-    subprocess.run(["cc", *flags, "-o", "main", "main.c"], cwd=tmp_path, check=True)
-    said = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout
-    *rows, last = [[int(word) for word in line.split()] for line in said.splitlines()]
+    *rows, last = run_c(tmp_path, "\n".join(lines) + "\n")
     unit = {"1 ns": 1e-9, "1 us": 1e-6, "5 us": 5e-6}[tick]
     wanted = np.stack([np.rint(getattr(table, column) / unit) for column in COLUMNS], axis=2)
     assert np.array_equal(np.array(rows).reshape(rates, entries, 4), wanted)
@@ -51,8 +65,9 @@ def test_a_driver_in_c_agrees_to_the_tick(tmp_path: Path, tick: str) -> None:
 
 def test_short_times_take_half_the_bytes() -> None:
     table = by_hand()
-    rates = 4 * table.rates.size
-    assert table.size("1 us") - rates == (table.size() - rates) // 2
+    # Rates of four bytes, and a byte of look-ahead for each entry, are as long with every tick.
+    others = 4 * table.rates.size + table.advance.size
+    assert table.size("1 us") - others == (table.size() - others) // 2
     assert "int16_t" in table.to_header("1 us")
     assert "TICK_NS 5000" in table.to_header("5 us")
     assert "int16_t" not in table.to_header()
@@ -66,3 +81,101 @@ def test_a_budget_and_a_tick_are_kept_to() -> None:
     for tick in ("0.5 ns", 1.5e-9, "-1 us"):
         with refused("tick"):
             table.size(tick)
+
+
+def braked(**changes: Any) -> CompensationTable:
+    """A table by hand with brake pulses, one history fired in another way at the second rate."""
+    table = by_hand()
+    values = {name: getattr(table, name).copy() for name in COLUMNS}
+    values["brake_width"][:, 1], values["brake_delay"][:, 1] = 20e-6, 700e-6
+    values["advance"][1, 4] += 30e-6
+    return replace(table, **values, **changes)
+
+
+@pytest.mark.parametrize("tick", TICKS)
+def test_firmware_interpolates_between_rates_to_the_tick(tmp_path: Path, tick: str) -> None:
+    table, unit = braked(), {"1 ns": 1e-9, "1 us": 1e-6, "5 us": 5e-6}[tick]
+    (tmp_path / "table.h").write_text(table.to_header(tick))
+    asked = [700_000, 800_000, 800_001, 851_234, 899_999, 950_000, 999_999, 1_000_000, 1_200_000]
+    rows = run_c(
+        tmp_path,
+        f"""
+#include "table.h"
+#include <stdio.h>
+int main(void) {{
+  static const uint32_t rate[] = {{{", ".join(map(str, asked))}}};
+  for (unsigned i = 0; i < {len(asked)}u; i++) for (unsigned j = 0; j < {PREFIX.upper()}_HISTORIES; j++) {{
+    int32_t t[4];
+    {PREFIX}_times(rate[i], j, t);
+    printf("%ld %ld %ld %ld\\n", (long)t[0], (long)t[1], (long)t[2], (long)t[3]);
+  }}
+  return 0;
+}}
+""",
+    )
+    fired = np.array(rows).reshape(len(asked), -1, 4)
+    held = table.quantised(tick)
+    for place, millihertz in enumerate(asked):
+        exact = np.stack(held.at(min(max(1e-3 * millihertz, 800.0), 1000.0)), axis=1) / unit
+        assert abs(fired[place] - exact).max() <= 0.5 + 1e-4
+
+
+def test_a_dot_is_known_when_its_first_pulse_is_fired(tmp_path: Path) -> None:
+    """Of every history and rate, against the drive that the table makes of a pattern."""
+    table = braked()
+    ahead = look_ahead({name: getattr(table, name) for name in COLUMNS}, table.rates, 2, 2)
+    for row, rate in enumerate(table.rates.tolist()):
+        for history in histories(2, 2):
+            number = number_of(history, 2)
+            slots = pattern_of(history)
+            pulses = pulses_of(table.at(rate), 2, 2, slots, rate)
+            begun = [float(pulses.fired[-1])]
+            if len(slots) > 1 and pulses.braked[-2] > 0.0:
+                begun.append(float(pulses.fired[-2] + pulses.offset[-2]))
+            if history[0] != 0:
+                slots_before = (float(pulses.due[-1]) - min(begun)) * rate
+                assert ahead[row, number] == max(0, math.ceil(slots_before - 1e-6))
+    (tmp_path / "table.h").write_text(table.to_header())
+    text = '#include "table.h"\n#include <stdio.h>\n'
+    text += f'int main(void) {{ printf("%u\\n", {PREFIX}_slots_ahead(1u)); return 0; }}\n'
+    assert run_c(tmp_path, text) == [[int(ahead[1].max())]]
+
+
+def test_two_tables_go_into_one_program(tmp_path: Path) -> None:
+    tables = [
+        braked(),
+        braked(serial="7-a"),
+        braked(driver="switch"),
+        braked(rates=np.array([500.0, 1000.0])),
+    ]
+    prefixes = [
+        PREFIX,
+        "printhammer_hendriks_1983_7_a_800_1000hz",
+        "printhammer_hendriks_1983_switch_800_1000hz",
+    ]
+    prefixes.append("printhammer_hendriks_1983_500_1000hz")
+    text = "#include <stdio.h>\n"
+    for number, table in enumerate(tables):
+        (tmp_path / f"{number}.h").write_text(table.to_header())
+        text += f'#include "{number}.h"\n'
+    calls = "".join(f'printf("%u\\n", (unsigned){prefix.upper()}_HISTORIES);' for prefix in prefixes)
+    assert run_c(tmp_path, f"{text}int main(void) {{ {calls} return 0; }}\n") == [[9]] * 4
+    assert '"7-a"' in tables[1].to_header()
+    assert '_DRIVER "switch"' in tables[2].to_header()
+
+
+def test_the_example_of_the_page_fires_what_python_fires(tmp_path: Path) -> None:
+    table = braked()
+    (tmp_path / "table.h").write_text(table.to_header("1 us"))
+    (text,) = re.findall("```c\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    for name in ("HENDRIKS_1983_100_1665HZ", "hendriks_1983_100_1665hz"):
+        text = text.replace(f"printhammer_{name}", PREFIX).replace(f"PRINTHAMMER_{name}", PREFIX.upper())
+    rows = np.array(run_c(tmp_path, text))
+    slots = [place for place, wanted in enumerate("1101000111") if wanted == "1"]
+    pulses = pulses_of(table.quantised("1 us").at(950.0), 2, 2, slots, 950.0)
+    on, off = pulses.fired - FIRST_SLOT, pulses.fired - FIRST_SLOT + pulses.width
+    brake = pulses.braked > 0.0
+    begun = (pulses.fired + pulses.offset)[brake] - FIRST_SLOT
+    expected = np.concatenate([np.c_[on, off], np.c_[begun, begun + pulses.braked[brake]]])
+    expected = expected[np.argsort(expected[:, 0])] / 1e-6
+    assert abs(rows[np.argsort(rows[:, 0])] - expected).max() <= 2.0

@@ -11,6 +11,7 @@ import numpy as np
 
 from printhammer.control.table.drive import (
     COLUMNS,
+    JUMP,
     ROUNDING,
     Settings,
     checked_size,
@@ -25,15 +26,12 @@ from printhammer.control.table.drive import (
 )
 from printhammer.control.table.formats import (
     HEAD,
-    NANOSECOND,
     OPTIONAL,
-    bits_of,
     columns,
     csv_head,
-    header_text,
     read_table,
-    size_of,
 )
+from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
 from printhammer.drive.input import read_positive
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
@@ -58,8 +56,6 @@ if TYPE_CHECKING:
 
     from printhammer.results.result import Entries
 
-# Difference of neighbouring advances from which on they belong to different ways to fire a dot, s
-JUMP: Final = 8e-6
 _NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
 _CELLS: Final = "rate history"
 ANY_UNIT: Final = "any"

@@ -124,6 +124,9 @@ _FEWER: Final = 12  # The same for a driver, of which each takes a run
 _SAMPLES: Final = 4001  # Instants at which a decaying pulse is looked at
 _WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
 
+JUMP: Final = 8e-6
+"""Difference of neighbouring advances from which on they belong to different ways to fire a dot, s."""
+
 
 class Settings(NamedTuple):
     """What a `CompensationTable` says at one rate: arrays of shape (entries,), over the numbers of histories.

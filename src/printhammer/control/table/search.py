@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from printhammer.control.table.compensation import JUMP
+from printhammer.control.table.drive import JUMP
 from printhammer.control.table.task import Task
 from printhammer.control.table.ways import (
     LEAST_OF_OWN,

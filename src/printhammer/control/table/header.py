@@ -1,0 +1,271 @@
+"""Compensation tables as C headers (C99, whole numbers, no library), in ticks of the timer of the firmware.
+
+Every name of a header begins with hammer, unit, driver and rates, so that headers of several tables go into
+one program. The times between two rates, or between two values of an axis, are those that the table gives in
+Python, to the tick.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from printhammer.control.table.drive import COLUMNS, JUMP, REST, entries_of
+from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.c_code import comment, identifier, nested, numbers
+
+NANOSECOND: Final = 1e-9
+"""Unit of the times in a header where no tick is given, s."""
+
+_PLACE_BYTES: Final = 4
+"""Size of a rate, or of a value of an axis."""
+
+_ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
+
+
+def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
+    """Return the size in bits of a time in ticks: 32 of nanoseconds, else 16 where all of them fit."""
+    largest = max(float(np.abs(np.rint(values / tick)).max()) for values in times.values())
+    return 32 if tick == NANOSECOND or largest > np.iinfo(np.int16).max else 16
+
+
+def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
+    """Return the bytes that the arrays of a header take, by numbers of rates, entries and values."""
+    each = len(COLUMNS) * bits // 8 + 1
+    return max(values, 1) * rates * entries * each + _PLACE_BYTES * (rates + values)
+
+
+def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int) -> IntArray:
+    """Return how many slots before its own slot a dot of each history has to be known.
+
+    A dot must be known when it is fired, `advance` before its slot, and when its brake pulse is,
+    `brake_delay` after the slot of the dot before. A dot from rest has the brake pulse that follows the last
+    dot for long: it is known when no dot comes within reach.
+
+    Parameters
+    ----------
+    times : mapping
+        Arrays (..., rates, entries) by name, s.
+    rates : array, shape (R,)
+        Slots per second.
+    gaps, reach : int
+        Gaps of a history, and the longest gap that counts.
+
+    Returns
+    -------
+    array, shape (..., rates, entries)
+        Whole slots, 0 for a dot that is fired after its slot and has no brake pulse.
+    """
+    advance, _, delay, brake = (times[name] * rates[:, np.newaxis] for name in COLUMNS)
+    gap = np.arange(entries_of(gaps, reach)) // (reach + 1) ** (gaps - 1)
+    gap[gap == REST] = reach + 1
+    ahead = np.where(brake > 0.0, np.maximum(advance, gap - delay), advance)
+    return np.ceil(np.maximum(ahead, 0.0) - 1e-9).astype(np.int64)
+
+
+def prefix_of(head: Mapping[str, Any], rates: FloatArray, axis: str = "") -> str:
+    """Return what the names of a header begin with: hammer, unit, driver, rates and axis.
+
+    The driver is left out where it is the hammer's own, the unit where the table is for every unit.
+    """
+    driver = "" if head["driver"] == "own" else head["driver"]
+    span = "_".join(f"{rate:g}" for rate in sorted({float(rates[0]), float(rates[-1])}))
+    said = (head["hammer"], head["serial"], driver, f"{span}hz", axis)
+    return identifier("_".join(str(part) for part in said if part)).rstrip("_")
+
+
+def header_text(
+    head: Mapping[str, Any],
+    rates: FloatArray,
+    times: Mapping[str, FloatArray],
+    tick: float = NANOSECOND,
+    axis: tuple[str, FloatArray] | None = None,
+) -> str:
+    """Return a C header with the table in whole ticks, and functions that a firmware calls.
+
+    Parameters
+    ----------
+    head : mapping
+        What is said of the whole table, see `printhammer.control.table.formats.HEAD` and `OPTIONAL`.
+    rates : array, shape (R,)
+        Slots per second.
+    times : mapping
+        Arrays (rates, entries) by name, s; with an axis (values, rates, entries). Every number of a history
+        is there, so that the firmware needs no search.
+    tick : float
+        Tick of the timer, s.
+    axis : tuple, optional
+        Name of the axis, and its values as whole numbers.
+    """
+    from printhammer import __version__
+
+    gaps, reach = head["gaps"], head["reach"]
+    prefix = prefix_of(head, rates, "" if axis is None else axis[0])
+    upper = prefix.upper()
+    entries, fingerprint = entries_of(gaps, reach), re.sub(r"[^0-9a-zA-Z]", "", head["fingerprint"])
+    nanoseconds, bits = round(tick / NANOSECOND), bits_of(times, tick)
+    unit = "nanoseconds" if nanoseconds == 1 else f"ticks of {nanoseconds} ns"
+    shape, values, between = f"[{rates.size}][{entries}]", 0, _over_rates(prefix, rates.size)
+    arrays = f"static const uint32_t {prefix}_rate[{rates.size}] = {{\n{numbers(np.rint(1e3 * rates))}\n}};\n"
+    if axis is not None:
+        values = axis[1].size
+        shape, between = f"[{values}]{shape}", _over_axis(prefix, axis[0], values)
+        arrays += f"\nstatic const int32_t {prefix}_{axis[0]}[{values}] = {{\n{numbers(axis[1])}\n}};\n"
+    for column, table in times.items():
+        arrays += f"\nstatic const int{bits}_t {prefix}_{column}{shape} = {nested(np.rint(table / tick))};\n"
+    unit_of = f"unit {comment(head['serial'])}" if head["serial"] else "every unit"
+    ahead = nested(look_ahead(times, rates, gaps, reach))
+    arrays += "\n/* Slots before its own at which a dot has to be known. */\n"
+    arrays += f"static const uint8_t {prefix}_look_ahead{shape} = {ahead};\n"
+    return f"""\
+/* SPDX-License-Identifier: MIT */
+#ifndef {upper}_TABLE_H
+#define {upper}_TABLE_H
+
+/* Compensation table for the hammer {comment(head["hammer"])},
+   fingerprint {fingerprint},
+   {unit_of}, driver {comment(head["driver"])}, at most {head["largest_current"]:g} A;
+   made by printhammer {__version__}.
+   Times are in {unit}, {"[value][rate][history]" if values else "[rate][history]"}; a history is the gaps \
+in slots to the dots before,
+   the latest first, 0 (rest) where a gap is longer than REACH. A dot is fired `advance` before its
+   slot with a pulse of `width`; a brake pulse of `brake_width`, where not 0, comes `brake_delay`
+   after the slot of the dot before. A pulse begins when the driver switches on and ends when it switches
+   off; the current rises and falls after these edges as the driver lets it. */
+
+#include <stdint.h>
+
+#define {upper}_RATES {rates.size}
+#define {upper}_GAPS {gaps}
+#define {upper}_REACH {reach}
+#define {upper}_HISTORIES {entries}
+#define {upper}_FINGERPRINT "{fingerprint}"
+#define {upper}_DRIVER "{_quoted(head["driver"])}"
+#define {upper}_SERIAL "{_quoted(head["serial"])}"
+#define {upper}_LARGEST_CURRENT_MA {round(1e3 * head["largest_current"])}
+#define {upper}_TICK_NS {nanoseconds}
+#define {upper}_BYTES {size_of(rates.size, entries, bits, values)}
+
+/* Slots per second, in millihertz. */
+{arrays}
+/* Number of a history; what lies before a rest does not count. */
+static inline unsigned {prefix}_history(const unsigned *gaps)
+{{
+  unsigned number = 0, rested = 0;
+  for (unsigned i = 0; i < {gaps}u; i++) {{
+    unsigned gap = gaps[i] > {reach}u ? 0u : gaps[i];
+    rested |= gap == 0u;
+    number = number * {reach + 1}u + (rested ? 0u : gap);
+  }}
+  return number;
+}}
+
+/* Place in the arrays of the largest rate that is not above one in millihertz; the first one below it. */
+static inline unsigned {prefix}_rate_at(uint32_t millihertz)
+{{
+  unsigned place = 0;
+  while (place < {rates.size - 1}u && {prefix}_rate[place + 1u] <= millihertz) place++;
+  return place;
+}}
+
+/* Slots ahead that a pattern has to be known at one of the rates: the largest number of `look_ahead`. */
+static inline unsigned {prefix}_slots_ahead(unsigned rate)
+{{
+  unsigned most = 0;
+{_most(prefix, values, entries)}
+  return most;
+}}
+{_between(prefix, tick, between)}
+#endif
+"""
+
+
+def _quoted(text: str) -> str:
+    """Return a text that is safe inside a C string."""
+    return comment(text).replace('"', "'")
+
+
+def _most(prefix: str, values: int, entries: int) -> str:
+    """Return the loops over the look-ahead of one rate."""
+    place = f"{prefix}_look_ahead{'[value]' if values else ''}[rate][history]"
+    loops = f"  for (unsigned history = 0; history < {entries}u; history++)\n"
+    if values:
+        loops = f"  for (unsigned value = 0; value < {values}u; value++)\n  {loops}"
+    return f"{loops}      if ({place} > most) most = {place};"
+
+
+class _Between(NamedTuple):
+    """What differs between interpolations: over the period of the slots, and along an axis."""
+
+    said: str
+    call: str
+    """Name and first arguments of the function."""
+
+    share: str
+    """Statements that set `below`, `above`, and `part` of `whole`."""
+
+    place: str
+    """Index of the arrays by `below` or `above`, which stands for `%`."""
+
+
+def _over_rates(prefix: str, rates: int) -> _Between:
+    """Return the interpolation in the period, as `CompensationTable.at` does it."""
+    rate = f"{prefix}_rate"
+    share = f"""\
+  const unsigned at = {prefix}_rate_at(millihertz), last = {max(rates - 2, 0)}u;
+  const unsigned below = at < last ? at : last, above = below + {min(rates - 1, 1)}u;
+  const int64_t low_rate = {rate}[below], high_rate = {rate}[above];
+  int64_t asked = millihertz;
+  asked = asked < low_rate ? low_rate : asked > high_rate ? high_rate : asked;
+  int64_t whole = asked * (high_rate - low_rate), part = high_rate * (asked - low_rate);
+  if (whole == 0) whole = 1;
+  while (whole > INT32_MAX) {{ whole /= 2; part /= 2; }}"""
+    said = "The four times at a rate in millihertz, in the order of the arrays: interpolated in the period"
+    return _Between(said, f"{prefix}_times(uint32_t millihertz, ", share, "[%][history]")
+
+
+def _over_axis(prefix: str, axis: str, values: int) -> _Between:
+    """Return the interpolation between the values of an axis, at one of the rates."""
+    name = f"{prefix}_{axis}"
+    share = f"""\
+  unsigned above = 1u;
+  while (above < {values - 1}u && value > {name}[above]) above++;
+  const unsigned below = above - 1u;
+  const int64_t whole = (int64_t){name}[above] - {name}[below];
+  int64_t part = (int64_t)value - {name}[below];
+  part = part < 0 ? 0 : part > whole ? whole : part;"""
+    said = (
+        "The four times at a value of the axis, in the order of the arrays: interpolated between two values"
+    )
+    return _Between(said, f"{prefix}_times(int32_t value, unsigned rate, ", share, "[%][rate][history]")
+
+
+def _between(prefix: str, tick: float, over: _Between) -> str:
+    """Return the function that interpolates, as `printhammer.control.table.compensation.mixed` does."""
+    ends = "\n".join(
+        f"  low[{row}] = {prefix}_{column}{over.place.replace('%', 'below')};\n"
+        f"  high[{row}] = {prefix}_{column}{over.place.replace('%', 'above')};"
+        for row, column in enumerate(COLUMNS)
+    )
+    differ = " || ".join(f"low[{row}] != high[{row}]" for row in (_DELAY, _BRAKE))
+    return f"""
+/* {over.said}; where
+   two ways to fire do not belong together, those of the nearer one; beyond the ends, those of the end. */
+static inline void {over.call}unsigned history, int32_t times[{len(COLUMNS)}])
+{{
+  int32_t low[{len(COLUMNS)}], high[{len(COLUMNS)}];
+{over.share}
+{ends}
+  int32_t apart = high[{_ADVANCE}] - low[{_ADVANCE}];
+  apart = apart < 0 ? -apart : apart;
+  if (apart > {int(JUMP / tick + 1e-6)} || {differ})
+    part = 2 * part > whole ? whole : 0;
+  for (unsigned i = 0; i < {len(COLUMNS)}u; i++) {{
+    const int64_t sum = low[i] * (whole - part) + high[i] * part;
+    times[i] = (int32_t)((sum < 0 ? sum - whole / 2 : sum + whole / 2) / whole);
+  }}
+}}
+"""
