@@ -167,7 +167,7 @@ static inline unsigned {prefix}_history(const unsigned *gaps)
 static inline unsigned {prefix}_rate_at(uint32_t millihertz)
 {{
   unsigned place = 0;
-  while (place < {rates.size - 1}u && {prefix}_rate[place + 1u] <= millihertz) place++;
+  while (place + 1u < {rates.size}u && {prefix}_rate[place + 1u] <= millihertz) place++;
   return place;
 }}
 
