@@ -26,6 +26,7 @@ ROOMS = (
     "parts",
     "report",
     "results",
+    "studio",
     "support",
     "sweep",
     "units",

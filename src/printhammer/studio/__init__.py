@@ -1,7 +1,7 @@
-"""The studio: hammer, drive and all their pictures in a browser, changing while a slider moves.
+"""Studio: hammer, drive and all their pictures in a browser, updated while a slider moves.
 
-`serve` runs it on this machine for its user alone and needs the extra `studio`; `widget` puts the same page
-into a notebook and needs the extra `notebook`.
+`serve` runs it on this machine for its user alone and needs the extra `studio`; `widget` embeds the same page
+in a notebook and needs the extra `notebook`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def __getattr__(name: str) -> Any:
 
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # Imported by name when asked for, since server and widget need different extras.
+    # Imported lazily by name, since server and widget need different extras.
     value = getattr(import_module(f"{__name__}.{name}"), name)
     globals()[name] = value
     return value

@@ -1,4 +1,4 @@
-"""The studio as a web application: the page, its files, and one socket."""
+"""Web application of the studio: the page, its files, and one socket."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 REFUSED: Final = 1008
 BUSY: Final = 1013
-"""Codes with which a socket is closed, RFC 6455, section 7.4, and its registry."""
+"""Close codes of a socket, RFC 6455, section 7.4, and its registry."""
 
 _PATIENCE: Final = 20.0
 
@@ -38,22 +38,22 @@ def application(guard: Guard, shelf: Shelf, crew: Crew) -> Starlette:
     Parameters
     ----------
     guard : Guard
-        Who may speak to it.
+        Access control.
     shelf : Shelf
-        The hammers that it offers.
+        Hammers on offer.
     crew : Crew
-        Who computes for all its pages.
+        Workers of all pages.
     """
     tabs: set[Session] = set()
 
     def page(request: Request) -> Response:
-        # The page itself is the same for everybody; what it may ask of the socket depends on the token.
+        # The page is the same for everybody; access to the socket depends on the token.
         if reason := guard.refuse(request.headers, request.query_params.get("token")):
             return _refused(reason)
         return _file("index.html")
 
     def part(request: Request) -> Response:
-        # These are the same for everybody, and say nothing about the user.
+        # These files are the same for everybody, and contain nothing about the user.
         if reason := guard.refuse(request.headers):
             return _refused(reason)
         return _file(request.path_params["name"])
@@ -109,12 +109,12 @@ async def _listen(connection: WebSocket, session: Session) -> None:
         return
     except ProtocolError as error:
         with suppress(RuntimeError, WebSocketDisconnect):
-            # A reason has at most 123 bytes.
+            # A close reason has at most 123 bytes.
             await connection.close(REFUSED, str(error).encode()[:120].decode(errors="ignore"))
 
 
 def _sender(connection: WebSocket) -> Callable[[bytes], None]:
-    """Return how a thread sends a frame: it waits until the browser takes it, so that nothing piles up."""
+    """Return a blocking sender of frames: it waits for the browser to accept one, which avoids a queue."""
     loop = asyncio.get_running_loop()
 
     def send(data: bytes) -> None:

@@ -1,29 +1,29 @@
-"""How much one message may ask for, and how large it may be."""
+"""Limits on the work and the size of a message."""
 
 from __future__ import annotations
 
 from typing import Final
 
 LARGEST_MESSAGE: Final = 1_000_000
-"""Bytes of one message to the server."""
+"""Largest size of a message to the server, bytes."""
 
 LARGEST_FILE: Final = 400_000
-"""Characters of a dropped file."""
+"""Largest length of a dropped file, characters."""
 
 MOST_DOTS: Final = 200
-"""Dots in a key of a dropped file."""
+"""Largest number of dots in a key of a dropped file."""
 
 LONGEST_REASON: Final = 500
-"""Characters of the reason why something is refused."""
+"""Largest length of the reason of a refusal, characters."""
 
 MOST_PULSES: Final = 64
-"""Firings of a drive, and slots of a pattern."""
+"""Largest number of firings of a drive, and of slots of a pattern."""
 
 RATES: Final = (10.0, 20e3)
-"""Firing rates, Hz."""
+"""Range of firing rates, Hz."""
 
 LONGEST_TIME: Final = 0.5
-"""Longest width, rise, decay or fall of a pulse, s."""
+"""Largest width, rise, decay or fall of a pulse, s."""
 
 LARGEST_CURRENT: Final = 100.0
 """Largest amplitude, A or N."""
@@ -35,31 +35,31 @@ LARGEST: Final = {"V": LARGEST_VOLTAGE, "ohm": 1e6}
 """Largest constants of a driver, by their units."""
 
 SPAN: Final = 10.0
-"""Factor by which a constant may differ from the one of the hammer that is loaded."""
+"""Largest factor between a constant and its value in the loaded hammer."""
 
 MOST_STEPS: Final = 50_000
-"""Steps after which a run is given up."""
+"""Step limit of a single run."""
 
 MOST_MAP_STEPS: Final = 20_000
-"""Steps of one run, for a view that takes many runs or long ones."""
+"""Step limit of one run, for views with many or long runs."""
 
 MOST_SECTION_STEPS: Final = 60_000
-"""Steps of the run to the first points of a strobe section."""
+"""Step limit of the run to the first points of a strobe section."""
 
 MOST_WORK: Final = 20_000_000
-"""Steps of all runs of a printed line."""
+"""Step limit of all runs of a printed line."""
 
 ALIKE: Final = 1.25
-"""Factor by which a constant may move before the work of a map is tried out anew."""
+"""Factor by which a constant may change before the work of a map is estimated again."""
 
 PATIENCE: Final = 20.0
-"""Seconds after which work on a view is given up; what takes longer is told so instead."""
+"""Time limit of a view, s; a view beyond it shows a message instead."""
 
 MOST_SAMPLES: Final = 2000
-"""Samples of a waveform, and of a measured curve."""
+"""Largest number of samples of a waveform, and of a measured curve."""
 
 LONGEST_TEXT: Final = 200
-"""Characters of a printed line."""
+"""Largest length of a printed line, characters."""
 
 MOST_TABS: Final = 8
-"""Connections at a time."""
+"""Largest number of simultaneous connections."""

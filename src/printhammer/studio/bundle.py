@@ -1,4 +1,4 @@
-"""The page as one ES module and one style sheet, for a notebook, and as one file that needs no server."""
+"""Page as one ES module and one style sheet, for a notebook, and as one file without a server."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ export default {
 
 @lru_cache
 def module() -> str:
-    """Return the one module: the modules of the page as texts, needed ones first, and what loads them."""
+    """Return one module: the modules of the page as texts, in order of dependence, and their loader."""
     return _sources("mount.js") + _WIDGET
 
 
 def _sources(wanted: str) -> str:
-    """Return a script that makes modules of the page: one that is wanted, and what it needs."""
+    """Return a script that creates a module of the page and its dependencies."""
     texts = {name: data.decode() for name, data in page_files().items() if name.endswith(".js")}
     ordered: list[tuple[str, str]] = []
 
@@ -61,19 +61,19 @@ def _sources(wanted: str) -> str:
         ordered.append((name, texts[name]))
 
     add(wanted)
-    # Inside a page, no text may look like the end of a script.
+    # Inside a page, no text may resemble the end of a script.
     return _SOURCES % json.dumps(ordered).replace("<", "\\u003c")
 
 
 @lru_cache
 def style() -> str:
-    """Return the one style sheet."""
+    """Return the combined style sheet."""
     sheets = page_files()
     return "\n".join(sheets[name].decode() for name in ("vendor/uPlot.min.css", "studio.css"))
 
 
 PLACE: Final = "/* what is kept */"
-"""Where the page that is saved holds its state and its curves, as JSON without the sign <."""
+"""Placeholder of the saved page for its state and curves, as JSON without the character <."""
 
 _PAGE: Final = """<!doctype html>
 <html lang="en">
@@ -100,5 +100,5 @@ show(document.getElementById("studio"), JSON.parse(document.getElementById("kept
 
 @lru_cache
 def page() -> str:
-    """Return a page that shows, without a server, what is put in the place of `PLACE`."""
+    """Return a page that shows, without a server, the content inserted at `PLACE`."""
     return _PAGE % (style(), PLACE, _sources("kept.js"))

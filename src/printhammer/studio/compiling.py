@@ -1,4 +1,4 @@
-"""When machine code is being made: for what, and for how long it has been."""
+"""Compilation times, and notifications of the start and end of compilation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class _Gauge:
-    """Time spent on compiling in this process, and who is told of its beginning and end."""
+    """Time spent on compilation in this process, and the listener."""
 
     def __init__(self) -> None:
         self.spent = 0.0
@@ -25,13 +25,13 @@ _gauge = _Gauge()
 
 
 def seconds() -> float:
-    """Return the time that was spent on compiling in this process since the first `measure`, s."""
+    """Return the time spent on compilation in this process since the first `measure`, s."""
     return _gauge.spent + (time.monotonic() - _gauge.begun if _gauge.depth else 0.0)
 
 
 @cache
 def measure() -> None:
-    """Measure from now on how long compiling takes in this process."""
+    """Start measuring the compilation time of this process."""
     from numba.core import event
 
     class Listener(event.Listener):
@@ -45,11 +45,11 @@ def measure() -> None:
 
 
 def listen(tell: Callable[[str], None]) -> None:
-    """Have `tell` called with a sentence where compiling begins, and with nothing where it ends."""
+    """Register a listener, called with a sentence when compilation starts, and with "" when it ends."""
     from printhammer.run.simulate import announce_compiling
 
     _gauge.tell = tell
-    # Workers compile side by side already.
+    # Workers compile in parallel already.
     announce_compiling(_announced, helped=False)
     measure()
 
@@ -59,7 +59,7 @@ def _announced(sentence: str) -> None:
 
 
 def _begin() -> None:
-    # Functions are compiled inside others, one thread at a time.
+    # Compilations nest within a thread, and run one thread at a time.
     if _gauge.depth == 0:
         _gauge.begun = time.monotonic()
         _gauge.tell(_gauge.what)

@@ -1,9 +1,9 @@
-"""Frames: what the studio sends, one binary message each.
+"""Frames: the binary messages that the studio sends.
 
 A frame is the length of its heading (4 bytes, little-endian), the heading (JSON in UTF-8, padded with spaces
-so that what follows begins at a multiple of 8), and arrays one after the other, each padded likewise.
-The heading has ``kind``, ``serial`` (of the state that it answers), whatever else is told, and ``arrays``: a
-list of name, dtype, shape and offset from the end of the heading.
+to a multiple of 8 bytes), and arrays in sequence, each padded likewise. The heading has ``kind``, ``serial``
+(of the state that the frame answers), further entries, and ``arrays``: a list of name, dtype, shape and
+offset from the end of the heading.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _DTYPES: Final = {"f4": "<f4", "f8": "<f8", "u2": "<u2", "i4": "<i4", "u1": "|u1
 
 
 def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **entries: Any) -> bytes:
-    """Return one frame.
+    """Encode a frame.
 
     Parameters
     ----------
     kind : str
-        What it holds, such as "motion".
+        Kind of the content, such as "motion".
     serial : int
-        Number of the state that it answers.
+        Number of the state that the frame answers.
     arrays : mapping, optional
         Arrays by name: float32, float64, uint16, int32 or uint8; others are turned into float32.
     **entries
@@ -57,17 +57,17 @@ def frame(kind: str, serial: int, arrays: Mapping[str, Any] | None = None, **ent
 
 
 def nothing(view: str, serial: int, reason: object) -> bytes:
-    """Return that there is nothing to show in a view, and why."""
+    """Return a frame that a view is empty, with the reason."""
     return frame(view, serial, reason=str(reason), **_NOTHING.get(view, {}))
 
 
 def refusal(serial: int, reason: str) -> bytes:
-    """Return that something is refused, and why."""
+    """Return a frame that a request is refused, with the reason."""
     return frame("refusal", serial, reason=reason[:LONGEST_REASON])
 
 
 def unframe(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]]]:
-    """Return heading and arrays of a frame."""
+    """Decode a frame into heading and arrays."""
     (length,) = struct.unpack_from("<I", data)
     heading = json.loads(data[4 : 4 + length])
     arrays = {}
@@ -79,8 +79,8 @@ def unframe(data: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray[Any, Any]
 
 
 def plain(value: Any) -> Any:
-    """Return a value that JSON can hold: NaN and infinity as None, numbers of NumPy as those of Python."""
-    # Most are numbers, and asked for first they cost a third.
+    """Convert a value to JSON: NaN and infinity to None, NumPy numbers to those of Python."""
+    # Test for numbers first: most values are numbers, and this takes a third of the time.
     if type(value) is float:
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):

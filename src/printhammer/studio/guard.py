@@ -1,4 +1,4 @@
-"""Who may speak to the studio: pages of its own, with its token, on this machine."""
+"""Access control of the studio: its own pages, with its token, on this machine."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ HEADERS: Final = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-"""Headers of every answer: nothing is fetched from elsewhere, the page stands in no other."""
+"""Headers of every answer: no external resources, no embedding in other pages."""
 
 
 class Guard:
-    """Checks of one server.
+    """Access checks of a server.
 
     Parameters
     ----------
     port : int
         Port of the server.
     token : str, optional
-        What the address has to hold; by default a new random one.
+        Token required in the address; by default a new random one.
     """
 
     def __init__(self, port: int, token: str | None = None) -> None:
@@ -44,18 +44,18 @@ class Guard:
         return f"http://{HOSTS[0]}:{self.port}/?token={self.token}"
 
     def refuse(self, headers: Mapping[str, str], token: str | None = None, origin: bool = False) -> str:
-        """Return why a request is refused, or nothing.
+        """Return the reason to refuse a request, or "".
 
         Parameters
         ----------
         headers : mapping
-            Of the request.
+            Headers of the request.
         token : str, optional
-            From its address; None where none is needed.
+            Token in its address; None if none is required.
         origin : bool, optional
-            Whether it has to come from a page of this server.
+            Whether the request must come from a page of this server.
         """
-        # Another name for 127.0.0.1 would let a foreign page reach the server as its own (DNS rebinding).
+        # Another name for 127.0.0.1 would let a foreign page use the server as its own (DNS rebinding).
         if headers.get("host", "") not in {f"{name}:{self.port}" for name in HOSTS}:
             return f"the host is expected to be {HOSTS[0]}:{self.port}"
         if origin and headers.get("origin", "") not in {f"http://{name}:{self.port}" for name in HOSTS}:

@@ -1,4 +1,4 @@
-"""What a page may send, and the answers to its questions."""
+"""Messages from a page, and answers to its questions."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from printhammer.studio.states.shelf import Shelf
 
 LONGEST_UNIT: Final = 40
-"""Characters of a unit."""
+"""Largest length of a unit, characters."""
 
 
 def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
-    """Read a message: its kind, the serial number of the page, and its content.
+    """Parse a message: its kind, the serial number of the page, and its content.
 
     Raises
     ------
     ProtocolError
-        It is none that the page would send.
+        The page never sends such a message.
     """
     if len(text) > LARGEST_MESSAGE:
         raise ProtocolError(f"the message has {len(text)} characters, expected at most {LARGEST_MESSAGE}")
@@ -56,7 +56,7 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
     if kind in ("open", "page"):
         return kind, serial, message.get("state")
     if kind in ASKED:
-        # A pin of a link may hold anything, and is no reason to end the connection.
+        # A pin of a link may hold anything, and does not end the connection.
         try:
             return kind, serial, read_state(message["state"], shelf)
         except ProtocolError as error:
@@ -70,7 +70,7 @@ def read_message(text: str, shelf: Shelf | None = None) -> tuple[str, int, Any]:
 
 
 def _columns(content: Any) -> list[tuple[str, str]] | None:
-    """Read what the columns of a dropped table hold; None where it was not asked for."""
+    """Parse the declared columns of a dropped table; None if they were not asked for."""
     if content is None:
         return None
     told = []
@@ -83,7 +83,7 @@ def _columns(content: Any) -> list[tuple[str, str]] | None:
 
 
 def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
-    """Return the answer to a question: what a link or a file holds, what a hammer is, a state as texts."""
+    """Answer a question on a link, a file, a hammer, or a state as texts."""
     from printhammer.studio.bundle import page
     from printhammer.studio.states.controls import describe, vocabulary
     from printhammer.studio.states.drops import dropped
@@ -103,7 +103,7 @@ def answer(kind: str, serial: int, content: Any, shelf: Shelf) -> bytes:
             }
             return frame("hammer", serial, hammer=describe(hammer), **heading)
         if kind == "open":
-            # A page without a state of its own opens with that of the studio.
+            # A page without a state opens with that of the studio.
             table, notes = taken(content, shelf) if content else shelf.start
             return frame("open", serial, state=table, notes=notes)
         if kind == "page":

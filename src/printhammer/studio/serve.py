@@ -1,4 +1,4 @@
-"""The server of the studio: on this machine, for its user alone."""
+"""Server of the studio: on this machine, for its user alone."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from printhammer.studio.states.shelf import Shelf, Told
 
 PORT: Final = 19830
-"""Port of the studio unless told otherwise: the same every time, so that links and open pages stay good."""
+"""Default port of the studio, always the same, so that links and open pages remain valid."""
 
 
 def serve(
@@ -31,20 +31,20 @@ def serve(
     Parameters
     ----------
     hammer : Hammer, optional
-        The hammer that it opens with; by default the first one that comes with the program.
+        Hammer to open; by default the first shipped hammer.
     port : int, optional
-        Port on 127.0.0.1, 0 for a free one; by default `PORT`, or a free one where that is taken.
+        Port on 127.0.0.1, 0 for a free one; by default `PORT`, or a free port if that is taken.
     state : path, optional
-        A state that the studio has saved, to open with; what of it cannot be taken the page tells.
+        Saved state to open; the page reports entries that cannot be used.
     ready : callable, optional
-        Called with the address of the page once it can be opened.
+        Called with the address of the page when it is ready.
     token : str, optional
-        What the address has to hold; by default that of the user, see `printhammer.studio.token`.
+        Token required in the address; by default that of the user, see `printhammer.studio.token`.
 
     Raises
     ------
     InputError
-        The extra `studio` is not installed, the port cannot be used, or the file is no state.
+        The extra `studio` is not installed, the port cannot be used, or the file is not a state.
     """
     try:
         import uvicorn

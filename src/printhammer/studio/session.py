@@ -1,10 +1,10 @@
-"""One page and what is computed for it: the latest state wins, and nothing waits for what takes longer.
+"""Session of one page: the latest state wins, and slow work delays nothing else.
 
-What a hammer is and what a file holds is answered in this process, by a thread that does nothing else.
-Questions about states that are not shown, and states themselves, go to workers, which are processes: of a
-state curves and dots first, then, side by side, the map and what else is shown in detail. A worker that is
-told that its state is no longer the latest, and does not come back, is ended; one that compiles is left to
-it, since that will be needed, and another one serves the newer state meanwhile.
+Questions on hammers and files are answered in this process, by a dedicated thread. Questions about states
+that are not displayed, and states themselves, go to worker processes: first curves and dots of a state, then,
+in parallel, the map and the detailed views. A worker that is told that its state is outdated and does not
+return is terminated; a worker that compiles is left to finish, since its code will be needed, and another
+worker serves the newer state meanwhile.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ _MOST_QUESTIONS: Final = 16
 
 
 class Session:
-    """The work for one page.
+    """Work for one page.
 
     Parameters
     ----------
     send : callable
-        Takes a frame to the page and returns when it is on its way; raises where the page is gone.
+        Sends a frame to the page and returns when it is sent; raises if the page is gone.
     shelf : Shelf, optional
-        The hammers that are offered; by default those that come with the program.
+        Hammers on offer; by default the shipped ones.
     crew : Crew, optional
-        Who computes; by default workers of its own, which end with it.
+        Workers; by default private workers that end with the session.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Session:
         self._closed = False
         self._served: dict[str, int] = {}
         self._told: dict[str, float] = {}
-        # What the page shows, and what it has in its last form, by view.
+        # Views displayed by the page, and views complete in their final form.
         self._shown: dict[str, Any] = {}
         self._whole: dict[str, Any] = {}
         works: dict[str, Callable[[], None]] = {"questions": self._answers, "asked": self._answers_of_states}
@@ -84,12 +84,12 @@ class Session:
             thread.start()
 
     def receive(self, text: str) -> None:
-        """Take a message of the page.
+        """Handle a message of the page.
 
         Raises
         ------
         ProtocolError
-            It is none that the page would send.
+            The page never sends such a message.
         """
         kind, serial, content = read_message(text, self._shelf)
         with self._change:
@@ -102,7 +102,7 @@ class Session:
             self._change.notify_all()
 
     def close(self) -> None:
-        """End; what is under way is given up, and nothing is sent any more."""
+        """Close the session: cancel the work, and send nothing more."""
         with self._change:
             self._closed = True
             self._change.notify_all()
@@ -153,7 +153,7 @@ class Session:
             self._safely(Order("asked", serial, content, (kind,), {}))
 
     def _serve(self, role: str) -> None:
-        """Wait for a state that a role has not served yet, and have it served."""
+        """Wait for a state that a role has not served yet, and serve it."""
         with self._change:
             self._change.wait_for(lambda: self._closed or self._waiting(role))
             taken = self._waiting(role)
@@ -169,7 +169,7 @@ class Session:
             self._change.notify_all()
 
     def _safely(self, order: Order) -> None:
-        """Have an order done; where that fails as nobody thought of, it is told, and the page lives on."""
+        """Run an order; report an unexpected failure to the page, which continues."""
         try:
             self._work(order)
         except OSError:
@@ -183,12 +183,12 @@ class Session:
         if latest is None or latest[0] == self._served.get(role):
             return None
         serial, state = latest
-        # The map is looked at first, and makes machine code that the printed line needs too.
+        # The map comes first; it compiles machine code that the printed line needs as well.
         behind = role == "detail" and "map" in state.views and self._served.get("map") != serial
         return None if behind else latest
 
     def _outdated(self, state: State) -> dict[str, str]:
-        """Return why views that the page shows do not belong to a state."""
+        """Return the reasons why displayed views do not belong to a state."""
         return {
             view: _BEFORE if view in self._shown else _NOT_YET
             for view in _computed(state)
@@ -196,25 +196,25 @@ class Session:
         }
 
     def _work(self, order: Order) -> None:
-        """Have a worker do an order and pass on what comes of it."""
+        """Let a worker run an order, and forward its messages."""
         role, serial = order.role, order.serial
 
         def newer() -> bool:
-            # A question is no state that another one could take the place of.
+            # A question is not replaced by a later state.
             later = role != "asked" and (self._latest is None or self._latest[0] != serial)
             return self._closed or later
 
         try:
             key = kernel_key(order.state)
         except InputError as error:
-            # What the worker would find as well.
+            # The worker would detect the same.
             self._tell(refusal(serial, str(error)))
             return
 
         def wanted() -> bool:
             if role == "asked":
                 return not self._closed
-            # A coarse map is to arrive also while a slider moves, and newer states come.
+            # Deliver a coarse map even while a slider moves and newer states arrive.
             waiting = self._waiting(role)
             return not self._closed and waiting is not None and waiting[0] == serial
 
@@ -231,7 +231,7 @@ class Session:
         self._end_progress(order)
 
     def _follow(self, order: Order, worker: Worker, newer: Callable[[], bool]) -> bool:
-        """Pass on what a worker tells of an order; return whether it is done, and not ended or left alone."""
+        """Forward a worker's messages on an order; return whether it is done, not terminated or left."""
         role = order.role
         worker.begin(order)
         superseded, ahead = False, role == "curves"
@@ -270,7 +270,7 @@ class Session:
                 self._end_progress(order)
 
     def _tell_ahead(self, order: Order) -> None:
-        """Show what was drawn ahead, where that is a state with which a hammer opens."""
+        """Send the precomputed pictures of a state, if it is the opening of a hammer."""
         for data in frames_ahead(order.state, order.serial):
             self._tell(data)
 
@@ -282,7 +282,7 @@ class Session:
             self._progress(order, "")
 
     def _note(self, order: Order, view: str, whole: bool) -> None:
-        """Note what the page comes to show."""
+        """Record the view that the page now displays."""
         with self._change:
             if view in KEYS:
                 self._shown[view] = KEYS[view](order.state)
@@ -293,7 +293,7 @@ class Session:
             self._change.notify_all()
 
     def _ends(self, order: Order, worker: Worker) -> bool:
-        """End or leave a worker that is to stop and does not; return whether it is gone."""
+        """Terminate or leave a worker that does not stop; return whether it is gone."""
         if self._closed and self._owns_crew:
             return True
         if worker.compiling:
@@ -325,5 +325,5 @@ class Session:
 
 
 def _computed(state: State) -> list[str]:
-    """Return those views of a state that are computed apart from its curves; a line without a text is not."""
+    """Return the views of a state that are computed separately from its curves; an empty line is not."""
     return [view for view in KEYS if view in state.views and (view != "line" or state.line.strip())]

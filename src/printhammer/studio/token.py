@@ -1,4 +1,4 @@
-"""The token of a user: kept in a folder of this user alone, so that links and open pages stay good."""
+"""Token of a user, stored in a private folder, so that links and open pages remain valid."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TOKEN: Final = re.compile(r"[\w-]{32}")
 
 
 def user_folder() -> Path:
-    """Return the folder where programs keep what belongs to a user and is no document."""
+    """Return the folder for private program data of the user."""
     if os.name == "nt":
         base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
     elif sys.platform == "darwin":
@@ -29,10 +29,10 @@ def user_folder() -> Path:
 
 
 def user_token() -> str:
-    """Return the token of this user, a new one where none is kept yet.
+    """Return the stored token of this user, or a new one.
 
-    Where it cannot be kept, or others could have read or written it, it serves for this time only, and a
-    warning says why.
+    If the token cannot be stored, or others could have read or written it, it is valid for this session only,
+    and a warning gives the reason.
     """
     path = user_folder() / FILE
     new = secrets.token_urlsafe(24)
@@ -53,7 +53,7 @@ def user_token() -> str:
 
 
 def _kept(path: Path) -> str:
-    """Return the token of a file; ValueError where it is not of this user alone, or holds none."""
+    """Return the token in a file; ValueError if others can access the file, or it holds no token."""
     with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0)), encoding="ascii") as file:
         entry = os.fstat(file.fileno())
         own = not hasattr(os, "getuid") or (entry.st_uid == os.getuid() and not entry.st_mode & 0o077)

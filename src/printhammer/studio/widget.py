@@ -1,4 +1,4 @@
-"""The studio in a notebook: the same page, computed by the notebook's own Python."""
+"""Studio in a notebook: the same page, computed by the notebook's Python."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
     Parameters
     ----------
     hammer : Hammer, optional
-        The hammer that it opens with; by default the first one that comes with the program.
+        Hammer to open; by default the first shipped hammer.
     state : str, optional
-        A state as the address of the page holds it, behind the #.
+        State, in the form of the page's address after the #.
     height : str, optional
-        Height, as a style sheet tells it.
+        Height, in the syntax of a style sheet.
 
     Returns
     -------
     anywidget.AnyWidget
-        Its trait `state` follows what is set.
+        Widget whose trait `state` follows the settings.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
     shelf = Shelf(hammer)
 
     class StudioWidget(anywidget.AnyWidget):
-        """A page and the work for it."""
+        """Page and its session."""
 
         _esm = module()
         _css = style()
@@ -65,7 +65,7 @@ def widget(hammer: Hammer | None = None, *, state: str = "", height: str = "760p
                 return
 
         def close(self) -> None:
-            """End the work."""
+            """Close the session."""
             self._session.close()
             super().close()
 

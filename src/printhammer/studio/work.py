@@ -1,7 +1,7 @@
-"""An end to all work: what is likely to take long is not begun, what does is given up, and both are told.
+"""Limits on work: computations expected to take long are refused, and slow ones cancelled with a message.
 
-The run of a state ends after `bounds.MOST_STEPS`. Many runs at a time know no such end; before them some of
-their kind are run one by one with an end, anew as soon as a constant has moved by `bounds.ALIKE`.
+The run of a state ends after `bounds.MOST_STEPS`. Ensembles have no such limit; a few of their runs are
+tested one by one with a limit beforehand, and again as soon as a constant has changed by `bounds.ALIKE`.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ if TYPE_CHECKING:
     from printhammer.studio.states.state import State
 
 STEP_LIMIT: Final = "step limit"
-"""Status of a run that was given up."""
+"""Status of a run that exceeded its step limit."""
 
 
 class GivenUp(Exception):
-    """A newer state has come."""
+    """A newer state has arrived."""
 
 
 class Patience:
-    """Asked now and then whether work on a view may go on.
+    """Time limit of the work on a view, checked from time to time.
 
     Parameters
     ----------
     newer : callable
         Whether a newer state has come.
     what : str
-        What is worked on.
+        Name of the work, for the message.
     seconds : float, optional
-        How long it may take.
+        Time limit.
     """
 
     def __init__(self, newer: Callable[[], bool], what: str, seconds: float = bounds.PATIENCE) -> None:
@@ -53,18 +53,18 @@ class Patience:
 
     @property
     def spent(self) -> float:
-        """Time since the beginning, s, without that of compiling, which is needed once."""
+        """Elapsed time, s, excluding compilation, which is needed only once."""
         return time.monotonic() - compiling.seconds() - self._begun
 
     def check(self, more: float = 0.0) -> None:
-        """Go on, unless there is a newer state, or no time for what is expected to take `more` seconds.
+        """Raise unless work may continue: no newer state, and time left for the next `more` seconds.
 
         Raises
         ------
         GivenUp
-            A newer state has come.
+            A newer state has arrived.
         InputError
-            It takes too long.
+            The work takes too long.
         """
         if self._newer():
             raise GivenUp
@@ -74,7 +74,7 @@ class Patience:
             )
 
     def progress(self, _done: int, _all: int) -> None:
-        """Do as `check`, where progress is told."""
+        """Call `check`; a progress callback."""
         self.check()
 
 
@@ -88,14 +88,14 @@ def try_out(
     through: bool = False,
     most: int = 0,
 ) -> Motion:
-    """Run a drive once; where it takes more than so many steps, refuse what needs many such runs.
+    """Run a drive once with a step limit, and refuse a view that needs many such runs.
 
-    By default these are `bounds.MOST_MAP_STEPS`.
+    The default limit is `bounds.MOST_MAP_STEPS`.
 
     Raises
     ------
     InputError
-        It does, or is to go `through` and does not come to its end.
+        The run exceeds the limit, or with `through` does not complete.
     """
     most = most or bounds.MOST_MAP_STEPS
     motion = limited_run(state.changed, drive, end, most, tolerance)
@@ -109,7 +109,7 @@ def try_out(
 
 
 def alike(one: State, other: State) -> bool:
-    """Whether two states differ by so little that a map of them is about the same work."""
+    """Whether a map of two states needs about the same computation time."""
     keys = ("hammer", "text", "pulses", "pattern", "overlap", "low", "high")
     if any(getattr(one, key) != getattr(other, key) for key in keys):
         return False
@@ -130,5 +130,5 @@ def alike(one: State, other: State) -> bool:
 
 
 def near(one: float, other: float) -> bool:
-    """Whether two numbers are equal, or of the same sign and apart by less than the factor `bounds.ALIKE`."""
+    """Whether two numbers are equal, or have the same sign and a ratio below `bounds.ALIKE`."""
     return one == other or (one * other > 0.0 and 1.0 / bounds.ALIKE < one / other < bounds.ALIKE)

@@ -1,1 +1,1 @@
-"""What the studio computes and shows of a state."""
+"""Pictures of a state."""

@@ -1,7 +1,7 @@
-"""Pictures drawn ahead, of the shipped hammers as they open: shown, marked, while machine code is made.
+"""Precomputed pictures of the shipped hammers, shown with a mark while machine code is compiled.
 
-``python -m printhammer.studio.pictures.ahead`` draws them anew, where a hammer, its opening or a frame has
-changed; the tests say when.
+``python -m printhammer.studio.pictures.ahead`` computes them again after a change of a hammer, its opening
+state or a frame; the tests report when that is necessary.
 """
 
 from __future__ import annotations
@@ -35,28 +35,28 @@ START: Final[dict[str, Any]] = {
     "line": "",
     "views": [],
 }
-"""What the page opens with, as in `state.js`, but for the hammer."""
+"""Opening state of the page, as in `state.js`, except for the hammer."""
 
 SIZE: Final = (128, 192)
-"""Rates and times of a map that is drawn ahead."""
+"""Rates and times of a precomputed map."""
 
 _FIRED: Final = ("constants", "waveform", "rate", "pulses", "pattern", "overlap", "low", "high")
 
 
 def opening(name: str) -> State:
-    """Return the state with which a shipped hammer opens."""
+    """Return the opening state of a shipped hammer."""
     shelf = Shelf()
     return read_state({**START, "hammer": name, **opening_of(shelf.hammer(name))}, shelf)
 
 
 def key_of(state: State) -> str:
-    """Return what the pictures of a state depend on, in a few characters."""
+    """Return a digest of the inputs of a state's pictures."""
     content = [state.base.fingerprint, *(getattr(state, name) for name in _FIRED)]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
 
 
 def frames_ahead(state: State, serial: int) -> list[bytes]:
-    """Return frames of a state that were drawn ahead, none where it is no opening of a shipped hammer."""
+    """Return the precomputed frames of a state; empty unless it is the opening of a shipped hammer."""
     if state.constants or state.text:
         return []
     key, parts = _kept(state.base.name)
@@ -72,7 +72,7 @@ def frames_ahead(state: State, serial: int) -> list[bytes]:
 
 @lru_cache(maxsize=8)
 def _kept(name: str) -> tuple[str | None, list[tuple[dict[str, Any], dict[str, Any]]]]:
-    """Return the key and the frames, headings without what belongs to a state, that are kept for a hammer."""
+    """Return the stored key and frames of a hammer; the headings lack the entries of a state."""
     place = files("printhammer.studio").joinpath("ahead", f"{name}.gz")
     if not place.is_file():
         return None, []
@@ -90,7 +90,7 @@ def _kept(name: str) -> tuple[str | None, list[tuple[dict[str, Any], dict[str, A
 
 
 def draw(name: str) -> bytes:
-    """Return the file of a hammer."""
+    """Compute the file of a hammer."""
     from printhammer.studio.pictures.chart import map_frame
     from printhammer.studio.pictures.engine import dots_frame, motion_frame
 
@@ -102,7 +102,7 @@ def draw(name: str) -> bytes:
 
 
 def main() -> None:
-    """Draw all."""
+    """Compute the files of all shipped hammers."""
     from printhammer.hammer.hammer import shipped
     from printhammer.support.files import write_file
 

@@ -1,4 +1,4 @@
-"""The frequency-time map of a state: displacement against time and firing rate, as codes for colours."""
+"""Frequency-time map of a state: displacement against time and firing rate, as codes for colours."""
 
 from __future__ import annotations
 
@@ -26,32 +26,33 @@ if TYPE_CHECKING:
     from printhammer.studio.states.state import State
 
 PREVIEW: Final = (64, 128)
-"""Rates and times of the map that is shown while a slider moves."""
+"""Rates and times of the map while a slider moves."""
 
 PREVIEW_BY_VOLTAGE: Final = (32, 128)
-"""The same where a voltage drives the coil: runs with a circuit take about five times as long."""
+"""Rates and times of that map if a voltage drives the coil: runs with a circuit take about five times as
+long."""
 
 FULL: Final = (512, 512)
-"""Rates and times of the map in full detail."""
+"""Rates and times of the full map."""
 
 GAP: Final = 65535
-"""Code of a displacement that is not known."""
+"""Code of a missing displacement."""
 
 _RATES_OF_PIECE: Final = {False: 64, True: 16}
-"""Rates between two questions for a newer state, by whether a voltage drives the coil."""
+"""Rates between two checks for a newer state, by whether a voltage drives the coil."""
 _TRIED: Final = 9
 _STEEPEST: Final = 1e38
 
 
 def try_map(state: State, known: State | None) -> State:
-    """Refuse a map that would take too long, by runs at some of its rates; return what it was tried on.
+    """Estimate the work of a map from runs at some of its rates; return the state that was tested.
 
     Parameters
     ----------
     state : State
-        What the map is of.
+        State of the map.
     known : State or None
-        What was tried before; a state like it is good too.
+        State tested before, which is valid for similar states.
 
     Raises
     ------
@@ -72,7 +73,7 @@ def try_map(state: State, known: State | None) -> State:
 
 
 def preview_of(state: State) -> tuple[int, int]:
-    """Return rates and times of the map that is shown while a slider moves."""
+    """Return rates and times of the map while a slider moves."""
     return PREVIEW_BY_VOLTAGE if by_voltage(state.fired) else PREVIEW
 
 
@@ -88,9 +89,9 @@ def map_frame(
     Raises
     ------
     GivenUp
-        A newer state has come before it was done.
+        A newer state arrived first.
     InputError
-        It takes too long, or the state describes no hammer or drive that could be run.
+        The map takes too long, or the state has no valid hammer or drive.
     """
     hammer, count = state.changed, size[0]
     rates = np.linspace(state.low, state.high, count)
@@ -100,7 +101,7 @@ def map_frame(
     times = np.linspace(0.0, end, size[1])
     rest = initial_state(hammer, None)
     patience = Patience(newer, "the map")
-    # A touch may be shorter than the distance of two times.
+    # A touch may be shorter than the time step of the map.
     struck = np.zeros((count, state.slots.count("1")), np.uint8) if size == FULL else None
 
     def piece(first: int, last: int) -> None:
@@ -114,9 +115,9 @@ def map_frame(
         if struck is not None and result.dots is not None:
             struck[first:last] = result.dots.struck
 
-    # While one piece is integrated, another is made ready.
+    # Prepare the next piece while the current one is integrated.
     in_threads([piece], [count], thread_count(threads), lengths=[_RATES_OF_PIECE[by_voltage(state.fired)]])
-    # Colours lie between backstop and platen, or what there is.
+    # Colours span the range from backstop to platen, as far as both exist.
     known = x[np.isfinite(x)]
     low, high = hammer.position or 0.0, hammer.platen or 0.0
     if known.size:
@@ -145,7 +146,7 @@ def _end(state: State) -> float:
 
 @lru_cache(maxsize=64)
 def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: Overlap) -> PulseTrains:
-    """Return a train for each rate; kept, since they stay the same while a constant of the hammer changes."""
+    """Return a train for each rate, cached, since trains do not depend on constants of the hammer."""
     if "0" not in slots:
         return PulseTrains.at_rates(waveform, rates, len(slots), overlap)
     fired = np.flatnonzero([mark == "1" for mark in slots])
@@ -153,8 +154,8 @@ def _trains(waveform: Waveform, rates: tuple[float, ...], slots: str, overlap: O
 
 
 def codes_of(x: Any, low: float, high: float) -> Any:
-    """Return displacements as whole numbers from 0 (low) to 65534 (high), 65535 where they are not known."""
-    # Where nothing moves the ends are next to each other.
+    """Encode displacements as integers from 0 (low) to 65534 (high), and 65535 for missing ones."""
+    # Without motion, both ends are adjacent floats.
     steep = np.float32(min((GAP - 1) / (high - low), _STEEPEST))
     scaled = np.minimum(x - np.float32(low), np.float32(high - low)) * steep
     np.clip(scaled, 0.0, GAP - 1, out=scaled)

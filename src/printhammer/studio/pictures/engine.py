@@ -1,4 +1,4 @@
-"""From a state to the curves of its single run, its dots and energies."""
+"""Curves of the single run of a state, its dots and energies."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
 POINTS: Final = 1600
-"""Points of a curve, at least."""
+"""Smallest number of points of a curve."""
 
 MOST_ENDS: Final = 20_000
-"""Ends of steps among the points of a curve, at most."""
+"""Largest number of step ends among the points of a curve."""
 
 
 def motion_frame(
     state: State, serial: int, outdated: Mapping[str, str] | None = None
 ) -> tuple[bytes, Motion]:
-    """Return the curves of a single run, and the run, given up after `bounds.MOST_STEPS` steps.
+    """Return the curves of a single run, and the run, limited to `bounds.MOST_STEPS` steps.
 
     Parameters
     ----------
     state : State
-        What is run.
+        State to run.
     serial : int
-        Its number.
+        Number of the state.
     outdated : mapping, optional
-        Why views that the page shows do not belong to this state, by their names.
+        Reasons why displayed views do not belong to this state, by view.
 
     Raises
     ------
     InputError
-        The state describes no hammer or drive that could be run.
+        The state has no valid hammer or drive.
     """
     hammer, drive = state.changed, state.drive
     motion = limited_run(hammer, drive, end_of_run(hammer, drive, None), bounds.MOST_STEPS)
@@ -91,7 +91,7 @@ def motion_frame(
 def limited_run(
     hammer: Hammer, drive: Drive, end: float, most: int, tolerance: float = DISPLAY_TOLERANCE
 ) -> Motion:
-    """Return a run that is given up after some steps.
+    """Return a run with a step limit.
 
     Raises
     ------
@@ -105,11 +105,11 @@ def limited_run(
 
 
 def points_of(ends: FloatArray) -> FloatArray:
-    """Return the times of a curve's points, s: close where the integrator's steps are short, as in contacts.
+    """Return the times of a curve's points, s: dense where the integrator's steps are short, as in contacts.
 
-    Every switch of a force is the end of a step, and is among them, where the steps are at most `MOST_ENDS`.
+    Every switch of a force ends a step, and is included unless there are more than `MOST_ENDS` steps.
     """
-    # What is longer than any picture is wide is thinned out.
+    # Thin out beyond the width of any picture.
     ends = ends[np.unique(np.linspace(0, len(ends) - 1, min(len(ends), MOST_ENDS)).astype(int))]
     steps = np.diff(ends)
     least = 3 if len(steps) < POINTS else 1
@@ -123,7 +123,7 @@ def pulse_of(waveform: Waveform) -> dict[str, list[float]]:
     """Return the curve of one pulse for the waveform editor, s and A, N or V."""
     shown = waveform.support
     width, decay = getattr(waveform, "width", None), getattr(waveform, "decay", None)
-    # An exponential decay goes on far beyond what can be seen; that of a driver is the name of a path.
+    # An exponential decay extends beyond the visible range; that of a driver only names a path.
     if width is not None and isinstance(decay, float):
         shown = min(shown, float(width + 5.0 * decay))
     tau = np.linspace(0.0, shown, 160)
@@ -131,7 +131,7 @@ def pulse_of(waveform: Waveform) -> dict[str, list[float]]:
 
 
 def dots_frame(serial: int, motion: Motion) -> bytes:
-    """Return what the firings did, and the energies of the run."""
+    """Return the dots of the run and its energies."""
     dots = motion.dots
     struck = [dot for dot in dots if dot.struck]
     forces, flights = [dot.peak_force or 0.0 for dot in struck], [dot.flight_time or 0.0 for dot in struck]
@@ -152,5 +152,5 @@ def dots_frame(serial: int, motion: Motion) -> bytes:
 
 
 def _fields(made: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass by name, without the copies that `dataclasses.asdict` makes."""
+    """Return the fields of a dataclass by name, without the copies of `dataclasses.asdict`."""
     return {field.name: getattr(made, field.name) for field in fields(made)}

@@ -1,4 +1,4 @@
-"""What the pictures of a state depend on: while that is the same, so is the picture."""
+"""Cache keys of the pictures of a state: an unchanged key means an unchanged picture."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ KEYS: Final[dict[str, Callable[[State], Any]]] = {
     "line": attrgetter("hammer", "text", "constants", "waveform", "rate", "line"),
     "strobe": attrgetter("hammer", "text", "constants", "waveform", "rate", "overlap"),
 }
-"""Keys of the pictures that are drawn anew only where they change, by view."""
+"""Key of each picture that is drawn again only after a change, by view."""
 
 
 def kernel_key(state: State) -> tuple[Any, ...]:
-    """Return what decides which machine code a state needs.
+    """Return the key of the machine code that a state needs.
 
     Raises
     ------
     InputError
-        The state describes no hammer or drive.
+        The state has no valid hammer or drive.
     """
     hammer, fired = state.changed, state.fired
     laws = tuple(sorted((section, type(part).__name__) for section, part in hammer.parts.items()))

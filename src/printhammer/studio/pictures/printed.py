@@ -1,4 +1,4 @@
-"""The line that the studio prints: a text, each of its dots where and as dark as it comes out."""
+"""Printed line: a text with the position and darkness of each of its dots."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _TRIED: Final = 16
 
 
 def check_line(state: State, pattern: Pattern) -> None:
-    """Refuse a line that would take too long, by a run of some slots that are all fired.
+    """Check the work of a line by a run in which every slot is fired.
 
     Raises
     ------
     InputError
-        It would.
+        The line would take too long.
     """
     train = PulseTrain(state.fired, rate=state.rate, pulses=_TRIED, overlap=state.overlap)
     what = f"the first {_TRIED} slots of the line"
@@ -43,12 +43,12 @@ def check_line(state: State, pattern: Pattern) -> None:
 
 
 def line_frame(state: State, serial: int, newer: Callable[[], bool]) -> bytes:
-    """Return the dots of the line; where it cannot be printed, or takes too long, the reason instead.
+    """Return the dots of the line, or the reason why it cannot be printed or takes too long.
 
     Raises
     ------
     GivenUp
-        A newer state has come before it was done.
+        A newer state arrived first.
     """
     from printhammer.printing.page.page import print_page
     from printhammer.printing.page.pattern import Pattern

@@ -1,4 +1,4 @@
-"""What the page asks about states that it does not show: pins, and rates that are searched for."""
+"""Questions of the page about states that it does not show: pins, and rates in a search."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from printhammer.studio.states.state import State
 
 SCREENED: Final = 200
-"""Firings over whose later half an exponent is taken, where many rates are looked through."""
+"""Number of firings for an exponent in a search over many rates; the later half counts."""
 
 
 def curves(state: State, serial: int) -> bytes:
@@ -24,16 +24,16 @@ def curves(state: State, serial: int) -> bytes:
 
 
 def dots(state: State, serial: int) -> bytes:
-    """Return what the firings of the single run did."""
+    """Return the dots of the single run."""
     return dots_frame(serial, motion_frame(state, serial)[1])
 
 
 def exponent(state: State, serial: int) -> bytes:
-    """Return the largest exponent of an endless train over some firings, or None where there is none."""
+    """Return the largest exponent of an endless train over some firings; None if there is none."""
     try:
         check_strobe(state)
     except InputError as error:
-        # A rate at which a train ends is no end to a search.
+        # A train that stops early does not end a search.
         return frame("exponent", serial, exponent=None, reason=str(error))
     return frame("exponent", serial, exponent=exponent_so_far(state, SCREENED), reason="")
 
@@ -50,4 +50,4 @@ QUESTIONS: Final[dict[str, Callable[[State, int], Any]]] = {
     "exponent": exponent,
     "verdict": verdict,
 }
-"""Questions by their kind, `ASKED`; each raises `InputError` where the state describes no run."""
+"""Function for each kind of question in `ASKED`; raises `InputError` for an invalid state."""

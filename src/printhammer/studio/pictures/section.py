@@ -1,4 +1,4 @@
-"""The strobe section of a state: points as they arrive, with a running exponent, and the verdict."""
+"""Strobe section of a state: points as they arrive, with a running exponent, and the verdict."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
     from printhammer.studio.states.state import State
 
 AT_ONCE: Final = (25, 50, 100)
-"""Points that are shown at once, one number after the other."""
+"""Numbers of points that are shown in succession."""
 
 LATER: Final = (150, 200, 300, 400)
-"""Points that follow where no newer state comes, with the exponent over the later half of them."""
+"""Numbers of points that follow if no newer state arrives, with the exponent over their later half."""
 
 
 VERDICT_WORK: Final = 16.0
-"""Work of the verdict in that of all points before it: five times the firings, and the exponent over them."""
+"""Work of the verdict relative to that of all points before: five times the firings, and the exponent."""
 
 
 def check_strobe(state: State) -> None:
-    """Refuse a section whose first points take too long, by running to them.
+    """Check the work of a section by the run to its first points.
 
     Raises
     ------
     InputError
-        They do.
+        The first points take too long.
     """
     train = PulseTrain(state.fired, rate=state.rate, pulses=AT_ONCE[0], overlap=state.overlap)
     what = f"the first {AT_ONCE[0]} strobe points"
@@ -50,12 +50,12 @@ def strobe_frame(
     exponent: bool = False,
     judged: bool = False,
 ) -> bytes:
-    """Return strobe points of an endless train at the rate; exponent so far and verdict if asked for.
+    """Return strobe points of an endless train at the rate; exponent so far and verdict if requested.
 
     Raises
     ------
     InputError
-        The state describes no hammer or drive that could be run.
+        The state has no valid hammer or drive.
     """
     from printhammer.chaos.strobe.points import strobe
 
@@ -71,7 +71,7 @@ def strobe_frame(
 
 
 def exponent_so_far(state: State, points: int) -> dict[str, Any] | None:
-    """Return the largest exponent over the later half of some firings, or None where there is none."""
+    """Return the largest exponent over the later half of some firings; None if there is none."""
     from printhammer.derivatives.states import strobe_exponent
 
     period = 1.0 / state.rate

@@ -1,1 +1,1 @@
-"""The state of a studio page: hammer, drive, edits."""
+"""State of a studio page: hammer, drive, edits."""

@@ -1,7 +1,7 @@
-"""What the studio sets of a coil that a hammer file leaves open: its temperature, or the whole winding.
+"""Constants of a coil that a hammer file leaves open: its temperature, or the whole winding.
 
-A hammer whose file states no resistance is driven by a current. Where a driver by voltage is chosen for it,
-the winding is one behind whose rail the current comes out about as before.
+A hammer whose file states no resistance is driven by a current. If the user selects a driver by voltage for
+it, the winding is chosen such that the rail reproduces the current approximately.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ if TYPE_CHECKING:
 _SOURCE: Final = "not in the file of the hammer; taken where a voltage drives the coil"
 
 _RESISTANCE: Final = 28.6
-"""Resistance of a coil of which none is known, ohm."""
+"""Resistance of a coil without a stated one, ohm; arbitrary."""
 
 _REACH: Final = 1.775
-"""Voltage of the rail in that of the peak current at the resistance."""
+"""Rail voltage as a multiple of peak current times resistance."""
 
 _LAST: Final = 1.287
-"""Time constant of the coil in the width of the pulse."""
+"""Time constant of the coil as a multiple of the pulse width."""
 
 _PULSE: Final = (1.97, 177e-6)
-"""Current, A, and width, s, of a pulse of which neither is known."""
+"""Current, A, and width, s, of a pulse without stated ones: those of the shipped hammer."""
 
 
 def has_rail(hammer: Hammer) -> bool:
-    """Whether a voltage may drive the coil: the flux linkage of the magnet is known."""
+    """Whether a voltage can drive the coil: the flux linkage of the magnet is known."""
     return hammer.magnet is not None and hammer.magnet.has_linkage
 
 
 @lru_cache(maxsize=16)
 def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
-    """Return the constants of the coil that a hammer file leaves open and a control sets, by dotted key."""
+    """Return the coil constants that a hammer file leaves open and a control sets, by dotted key."""
     if not has_rail(hammer):
         return {}
     from printhammer.parts.coil import REFERENCE, Winding
@@ -70,11 +70,11 @@ def _range(constant: Constant) -> Range:
 
 
 TEMPERATURES: Final = Range(-40.0, 180.0, logarithmic=False)
-"""Where a control moves the temperature of a winding, degC."""
+"""Range of the control of the winding temperature, degC."""
 
 
 def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
-    """Return where a constant may lie, also one that the file leaves open; None where there is none such."""
+    """Return the range of a constant, possibly one that the file leaves open; None if it does not exist."""
     if key.startswith("waveform."):
         return None
     if (further := open_constants(hammer).get(key)) is not None:
@@ -88,12 +88,12 @@ def span_of(hammer: Hammer, key: str, factor: float) -> Range | None:
 
 
 def rail_of(hammer: Hammer) -> dict[str, Any] | None:
-    """Return the rail that a hammer is first driven by, where that is not its own; None where none can."""
+    """Return the rail for a hammer that has none of its own; None if no voltage can drive it."""
     if not has_rail(hammer):
         return None
     current, width = _pulse(hammer)
     resistance = getattr(hammer.coil, "resistance", None) or _RESISTANCE
-    # Through a resistor the current ends about as fast as it began.
+    # With a resistor the current decays about as fast as it rises.
     voltage, decay = (float(f"{value:.3g}") for value in (_REACH * resistance * current, 5.56 * resistance))
     return Rail(voltage=voltage, width=width, decay_resistance=decay).model_dump()
 
@@ -104,7 +104,7 @@ def by_voltage(waveform: Waveform | None) -> bool:
 
 
 def _pulse(hammer: Hammer) -> tuple[float, float]:
-    """Return peak and width of the current that a hammer is fired with."""
+    """Return peak and width of the current pulse of a hammer."""
     waveform = hammer.waveform
     width = getattr(waveform, "width", None)
     if waveform is None or waveform.quantity != "current" or width is None:

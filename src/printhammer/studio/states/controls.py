@@ -1,4 +1,4 @@
-"""What the page needs to know of a hammer to offer a control for each of its constants."""
+"""Description of a hammer for the page, with a control for each constant."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ SHOWN: Final = {
     "F": ("uF", "uF"),
     "degC": ("degC", "degC"),
 }
-"""Units in which a quantity is shown, by its SI unit: metric, inch-pound; else the SI unit itself."""
+"""Units in which a quantity is shown, by its SI unit: metric, inch-pound; otherwise the SI unit itself."""
 
 _SLOW: Final = 2e-3
-"""Width of a pulse from which on times are shown in ms, s."""
+"""Pulse width from which times are shown in ms, s."""
 
 _WIDE: Final = 3e-3
-"""Stroke from which on lengths are shown in mm, m."""
+"""Stroke from which lengths are shown in mm, m."""
 
 EQUATIONS: Final = {
     "mass": "m x'' = Fm + Fs + Fp + Fb + Fe",
@@ -48,7 +48,7 @@ EQUATIONS: Final = {
     "coil.winding": "dλ/dt = u - R i, R = R20 (1 + 0.00393 (T - 20 °C))",
     "backstop.hertz": "Fb = k δ^1.5 (6), Fe = -l v δ^1.5 (7), δ = b - x",
 }
-"""Equations of the laws of the paper; the others are told in the first line of their part."""
+"""Equations of the laws of the paper; others are in the first line of their part."""
 
 # A hop lasts about as long as a period.
 _HOPS: Final[dict[str, Any]] = {
@@ -57,7 +57,7 @@ _HOPS: Final[dict[str, Any]] = {
     "low": 20.0,
     "high": 100.0,
 }
-# Two pushes, a free period apart, of 2 pi s.
+# Two pushes, separated by the free period of 2 pi s.
 _PUSHES: Final[dict[str, Any]] = {
     "waveform": {"shape": "half-sine", "amplitude": 10.0, "width": 0.02, "quantity": "force"},
     "rate": 10.0,
@@ -65,7 +65,7 @@ _PUSHES: Final[dict[str, Any]] = {
     "low": 10.0,
     "high": 20.0,
 }
-# The same, hard enough to get to a stop that is a unit of length away.
+# As above, hard enough to reach a stop one unit of length away.
 _BLOWS: Final = {**_PUSHES, "waveform": {**_PUSHES["waveform"], "amplitude": 100.0}}
 
 OPENINGS: Final[dict[str, dict[str, Any]]] = {
@@ -84,11 +84,11 @@ OPENINGS: Final[dict[str, dict[str, Any]]] = {
     "pot-magnet": {"rate": 10.0, "pulses": 1, "low": 10.0, "high": 20.0, "line": ""},
     "relay-5v": {"rate": 20.0, "pulses": 3, "low": 10.0, "high": 40.0, "line": ""},
 }
-"""What those shipped hammers open with whose times and forces are not those of printers."""
+"""Opening states of the shipped hammers whose times and forces differ from those of printers."""
 
 
 def describe(hammer: Hammer) -> dict[str, Any]:
-    """Return everything about a hammer that the page shows: constants with range, unit, equation, source.
+    """Return the description of a hammer for the page: constants with range, unit, equation, source.
 
     Returns
     -------
@@ -137,7 +137,7 @@ def _control(hammer: Hammer, constant: Constant, span: Range) -> dict[str, Any]:
 
 
 def opening_of(hammer: Hammer) -> dict[str, Any]:
-    """Return the entries of a state that show a hammer which has no pulse to fire, or other times."""
+    """Return the entries of a state for a hammer without a pulse, or with other time scales."""
     if hammer.waveform is not None:
         return OPENINGS.get(hammer.name, {})
     quantity = "current" if "magnet" in hammer.parts else "force"
@@ -147,7 +147,7 @@ def opening_of(hammer: Hammer) -> dict[str, Any]:
 
 
 def equation_of(section: str, law: str) -> str:
-    """Return the equation of a law, or the first line of the part that tells it."""
+    """Return the equation of a law, or the first line of its part."""
     known = EQUATIONS.get(f"{section}.{law}" if law else section)
     if known is not None or not law:
         return known or ""
@@ -160,8 +160,8 @@ def equation_of(section: str, law: str) -> str:
 def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
     """Return the controls of the paper's terminal that move several constants together.
 
-    Of platen, front of the pack and thickness two are free, since the pack lies on the platen: the platen
-    distance moves platen and front, the forms thickness moves the front toward the hammer.
+    Of platen, front of the pack and thickness two are independent, since the pack lies on the platen: the
+    platen distance moves platen and front, the forms thickness moves the front toward the hammer.
     """
     keys = hammer.constants
     if not {"platen", "pack.front", "pack.thickness"} <= set(keys):
@@ -191,7 +191,7 @@ def combined_of(hammer: Hammer) -> list[dict[str, Any]]:
 
 
 def fields_of(waveform: Waveform) -> dict[str, Any]:
-    """Return shape and constants of a waveform, SI, as a state holds them."""
+    """Return shape and constants of a waveform, SI, in the form of a state."""
     content: dict[str, Any] = getattr(waveform, "content", dict)()
     if content:
         columns = {name: [float(x) for x in values] for name, values in content.items()}
@@ -200,7 +200,7 @@ def fields_of(waveform: Waveform) -> dict[str, Any]:
 
 
 def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
-    """Return units with factors, as fit a hammer, shapes of pulses with their constants, and bounds."""
+    """Return units with factors suited to a hammer, pulse shapes with their constants, and limits."""
     from printhammer.support.constants import quantities
 
     named = SHOWN if hammer is None else {**SHOWN, **_large(hammer)}
@@ -235,7 +235,7 @@ def vocabulary(hammer: Hammer | None = None) -> dict[str, Any]:
 
 
 def _large(hammer: Hammer) -> dict[str, tuple[str, str]]:
-    """Return larger units of time and length for devices that are slower and larger than printers."""
+    """Return larger units of time and length for devices slower and larger than printers."""
     places = [place for place in (hammer.position, hammer.front) if place is not None]
     units: dict[str, tuple[str, str]] = {}
     if by_voltage(hammer.waveform) and getattr(hammer.waveform, "width", 0.0) > _SLOW:

@@ -1,4 +1,4 @@
-"""Files that are dropped onto the page: a state, a hammer file, measured curves."""
+"""Files dropped onto the page: a state, a hammer file, measured curves."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def dropped(
     columns: list[tuple[str, str]] | None = None,
     shelf: Shelf | None = None,
 ) -> bytes:
-    """Return what a dropped file holds: a state, a hammer, or measured curves.
+    """Read a dropped file: a state, a hammer, or measured curves.
 
     Parameters
     ----------
@@ -25,19 +25,20 @@ def dropped(
     name, text : str
         Name and text of the file.
     columns : list of tuple, optional
-        What each column of a table holds, and its unit, where that was asked for.
+        Quantity and unit of each column of a table, if the page asked for them.
     shelf : Shelf, optional
-        The hammers that are offered.
+        Hammers on offer.
 
     Returns
     -------
     bytes
-        A frame; `what` is "state", "hammer", "curves", or "columns" where it has to be asked what these hold.
+        A frame; `what` is "state", "hammer", "curves", or "columns" if the page has to ask for their
+        quantities.
 
     Raises
     ------
     InputError
-        It is none of these.
+        The file is none of these.
     """
     where = name[-80:] or "dropped file"
     if name.lower().endswith(".json"):

@@ -1,4 +1,4 @@
-"""States from outside, out of a link or a file: what can be taken is, and of the rest it is told why not."""
+"""States from a link or a file: valid entries are used, the others reported."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _MOST_NOTES: Final = 6
 
 
 def taken(content: Any, shelf: Shelf) -> Told:
-    """Return those entries of a state that can be taken, and a sentence for each that cannot.
+    """Return the valid entries of a state, and a sentence for each invalid one.
 
     Parameters
     ----------
     content
-        Whatever a link or a file holds; entries that are missing are no matter.
+        Content of a link or a file; missing entries are allowed.
     shelf : Shelf
-        The hammers that are offered.
+        Hammers on offer.
     """
     if not isinstance(content, dict):
         return {}, ["a state is expected to be a table"]
@@ -54,7 +54,7 @@ def taken(content: Any, shelf: Shelf) -> Told:
 
 
 def _hammer(table: dict[str, Any], shelf: Shelf, notes: list[str]) -> Hammer:
-    """Return the hammer of a table, whose entries are put right where there is none such."""
+    """Return the hammer of a table; invalid entries are replaced."""
     try:
         if table.get("text"):
             return dropped_hammer(table["text"])
@@ -78,7 +78,7 @@ def _constants(content: dict[Any, Any], base: Hammer, notes: list[str]) -> dict[
 
 
 def _check(table: dict[str, Any], key: str, shelf: Shelf, notes: list[str]) -> None:
-    """Take an entry out of a table where no hammer or pulse can be made with it."""
+    """Remove an entry from a table if no hammer or pulse can be built with it."""
     rest: dict[str, Any] = {"waveform": None, "constants": {}}
     named = {"hammer": table.get("hammer") or shelf.names[0], "text": table.get("text", "")}
     made = {name: table[name] for name in rest if name in table}
@@ -107,12 +107,12 @@ _PLAIN: Final[dict[str, Any]] = {
 
 
 def read_file(text: str, where: str, shelf: Shelf) -> Told:
-    """Return what can be taken of the text of a state file, and a sentence for each entry that cannot.
+    """Return the valid entries of the text of a state file, and a sentence for each invalid one.
 
     Raises
     ------
     InputError
-        It is no state file.
+        The text is not a state file.
     """
     if len(text) > LARGEST_MESSAGE:
         raise InputError(
@@ -141,7 +141,7 @@ def read_file(text: str, where: str, shelf: Shelf) -> Told:
 
 
 def file_of(state: State) -> str:
-    """Return the text of a state file; a hammer that does not come with the program is in it as a whole."""
+    """Return the text of a state file; a hammer that is not shipped is included completely."""
     table = {key: getattr(state, key) for key in READERS}
     table["constants"] = dict(state.constants)
     table["waveform"] = None if state.waveform is None else dict(state.waveform)

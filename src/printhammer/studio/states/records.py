@@ -1,4 +1,4 @@
-"""Measured curves as oscilloscopes and spreadsheets write them: time, and what is declared in `QUANTITIES`.
+"""Measured curves from oscilloscopes and spreadsheets: time, and the quantities of `QUANTITIES`.
 
 Tables are read as everywhere, see `printhammer.support.tables`. Where heading and units do not say what a
 column holds, it is asked for. A curve keeps its times before the firing, which is at time 0.
@@ -22,16 +22,16 @@ from printhammer.support.tables.text import with_line_ends
 from printhammer.units import split
 
 QUANTITIES: Final = {"time": "s", "displacement": "m", "current": "A", "force": "N", "voltage": "V"}
-"""What a column may hold, with its SI unit."""
+"""Quantities of a column, with their SI units."""
 
 _CURVES: Final = {name: si for name, si in QUANTITIES.items() if name != "time"}
 
 MOST_COLUMNS: Final = 16
-"""Columns of a table."""
+"""Largest number of columns of a table."""
 
 
 class Column(NamedTuple):
-    """A column of a table: what its heading says, and what it holds as far as that is known."""
+    """Column of a table: its heading, and its quantity as far as known."""
 
     name: str
     unit: str
@@ -40,14 +40,14 @@ class Column(NamedTuple):
 
 
 class Record(NamedTuple):
-    """Curves over one time, SI, thinned evenly to at most `MOST_SAMPLES`."""
+    """Curves over a common time, SI, thinned evenly to at most `MOST_SAMPLES`."""
 
     times: np.ndarray[Any, Any]
     curves: dict[str, np.ndarray[Any, Any]]
 
 
 def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None) -> Record | list[Column]:
-    """Read a table.
+    """Read a table of curves.
 
     Parameters
     ----------
@@ -110,13 +110,13 @@ def read_record(text: str, where: str, told: list[tuple[str, str]] | None = None
 
 
 def _filled(table: Table) -> list[list[str]]:
-    """Return the first three rows, all cells of them."""
+    """Return the first three rows with all their cells."""
     width = len(table.columns)
     return [[*row[:width], *[""] * (width - len(row))] for row in table.rows[:3]]
 
 
 def _record(table: Table, known: list[str]) -> Record:
-    """Return the curves of a table of which it is known what its columns hold."""
+    """Return the curves of a table with known columns."""
     where = table.where
     for quantity in QUANTITIES:
         if known.count(quantity) > 1:
@@ -154,7 +154,7 @@ def _record(table: Table, known: list[str]) -> Record:
 
 
 def _checked(record: Record, where: str) -> Record:
-    """Return a record whose drive, where it has one, can be fired."""
+    """Return a record after checking that its drive, if any, can be fired."""
     for name in {"current", "force", "voltage"} & set(record.curves):
         last, peak = float(record.times[-1]), float(np.abs(record.curves[name]).max())
         if last > LONGEST_TIME:

@@ -1,4 +1,4 @@
-"""The hammers that one studio offers by name: those of the program, and the one that it opened with."""
+"""Hammers that a studio offers by name: the shipped ones, and the one that it opened with."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 Told = tuple[dict[str, Any], list[str]]
-"""Entries of a state that can be taken, and sentences about those that cannot."""
+"""Valid entries of a state, and sentences about the invalid ones."""
 
 DEFAULT: Final = "hendriks-1983"
-"""Hammer that a studio opens with unless told otherwise."""
+"""Default hammer of a studio."""
 
 
 class Shelf:
-    """Hammers by name, which is never taken for a path; `start` is what a page without a state opens with.
+    """Hammers by name, never by path; `start` is the state of a page without one.
 
     Parameters
     ----------
     guest : Hammer, optional
-        The hammer that the studio opens with; it may stand in the place of one that comes with the program.
+        Hammer that the studio opens with; it may replace a shipped one of the same name.
     """
 
     def __init__(self, guest: Hammer | None = None) -> None:
@@ -32,7 +32,7 @@ class Shelf:
 
     @property
     def names(self) -> list[str]:
-        """Names of all hammers, the one that the studio opens with first."""
+        """Names of all hammers, the one that the studio opened with first."""
         from printhammer.hammer.hammer import shipped
 
         others = sorted(shipped(), key=lambda name: (name != DEFAULT, name))
@@ -41,11 +41,11 @@ class Shelf:
         return [self.guest.name, *(name for name in others if name != self.guest.name)]
 
     def is_guest(self, name: str) -> bool:
-        """Whether this is the name of the hammer that the studio opened with."""
+        """Whether a name is that of the hammer that the studio opened with."""
         return self.guest is not None and name == self.guest.name
 
     def is_shipped(self, name: str) -> bool:
-        """Whether the hammer of this name is one that comes with the program, as it does."""
+        """Whether the hammer of a name is a shipped one, unmodified."""
         from printhammer.hammer.hammer import shipped
 
         return name in shipped() and self.hammer(name).fingerprint == _shipped(name).fingerprint
@@ -56,7 +56,7 @@ class Shelf:
         Raises
         ------
         InputError
-            It is not offered.
+            The hammer is not on offer.
         """
         if self.guest is not None and name == self.guest.name:
             return self.guest

@@ -1,6 +1,6 @@
-"""The state of a studio: which hammer, what of it is changed, how it is fired, and what is looked at.
+"""State of a studio: hammer, changes, drive, and displayed views.
 
-It is what the browser sends, keeps in its history and writes into the address; the server keeps none.
+The browser sends the state, keeps it in its history and writes it into the address; the server stores none.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ VIEWS: Final = ("motion", "forces", "loops", "phase", "sketch", "map", "strobe",
 
 
 class ProtocolError(Exception):
-    """A message that the page would never send; it ends the connection, and its text is the reason."""
+    """Message that the page never sends; it ends the connection, with its text as the reason."""
 
 
 class State(Declared):
-    """What the user has set; all numbers SI."""
+    """Settings of the user; all numbers SI."""
 
     hammer: str = part("name of a hammer that the studio offers; not looked at where `text` is given")
     text: str = part("text of a hammer file that was dropped, or empty")
@@ -59,17 +59,17 @@ class State(Declared):
 
     @cached_property
     def base(self) -> Hammer:
-        """The hammer before any change."""
+        """Hammer before any change."""
         return dropped_hammer(self.text) if self.text else self.shelf.hammer(self.hammer)
 
     @cached_property
     def changed(self) -> Hammer:
-        """The hammer with its changed constants.
+        """Hammer with its changed constants.
 
         Raises
         ------
         InputError
-            There is no such constant, it is too far from the hammer's own, or the hammer would not be one.
+            A constant is unknown or too far from its value in the hammer, or the hammer would be invalid.
         """
         base = self.base
         for key, value in self.constants:
@@ -78,9 +78,9 @@ class State(Declared):
 
     @cached_property
     def settings(self) -> dict[str, float]:
-        """The constants that the hammer has otherwise than its file, by dotted key.
+        """Constants that differ from the hammer file, by dotted key.
 
-        Those of the coil that the file leaves open are among them where a voltage drives it, and only there.
+        Coil constants that the file leaves open are included if, and only if, a voltage drives the coil.
         """
         driven = by_voltage(self.base.waveform if self.waveform is None else self._set_waveform)
         further = open_constants(self.base)
@@ -91,12 +91,12 @@ class State(Declared):
 
     @cached_property
     def fired(self) -> Waveform:
-        """What every firing does.
+        """Waveform of every firing.
 
         Raises
         ------
         InputError
-            The hammer has no waveform, or the waveform is none.
+            The hammer has no waveform, or the waveform is invalid.
         """
         if self.waveform is None:
             if self.changed.waveform is None:
@@ -118,12 +118,12 @@ class State(Declared):
 
     @property
     def slots(self) -> str:
-        """Which slots are fired: the pattern, or as many as there are pulses."""
+        """Fired slots: the pattern, or as many slots as there are pulses."""
         return self.pattern or "1" * self.pulses
 
     @cached_property
     def drive(self) -> PulseTrain:
-        """The drive."""
+        """Drive of the state."""
         if not self.pattern:
             return PulseTrain(self.fired, rate=self.rate, pulses=self.pulses, overlap=self.overlap)
         times = [slot / self.rate for slot, mark in enumerate(self.pattern) if mark == "1"]
@@ -131,12 +131,12 @@ class State(Declared):
 
 
 def check_constant(base: Hammer, key: str, value: float) -> None:
-    """Refuse a constant that a hammer has not, or a value too far from its own.
+    """Check that a hammer has a constant, and that the value is near its own.
 
     Raises
     ------
     InputError
-        It is one of these.
+        The constant is unknown, or the value is out of range.
     """
     span = span_of(base, key, bounds.SPAN)
     if span is None:
@@ -152,14 +152,14 @@ def check_constant(base: Hammer, key: str, value: float) -> None:
 
 @lru_cache(maxsize=8)
 def dropped_hammer(text: str) -> Hammer:
-    """Read the text of a dropped hammer file, which may name no other file.
+    """Parse the text of a dropped hammer file, which may not refer to other files.
 
     Raises
     ------
     InputError
-        It is no hammer file, or names a table beside it.
+        The text is not a hammer file, or refers to a table.
     """
-    # The time to read a key of many dots grows with the square of their number.
+    # The parse time of a key with many dots grows with the square of their number.
     if any(part.count(".") > bounds.MOST_DOTS for part in re.split(r"[\n,=\[\]{}]", text)):
         most = bounds.MOST_DOTS
         raise InputError(
@@ -186,14 +186,14 @@ def dropped_hammer(text: str) -> Hammer:
 
 
 def read_state(content: Any, shelf: Shelf | None = None) -> State:
-    """Read a state from a message.
+    """Parse a state from a message.
 
     Parameters
     ----------
     content
-        What the message holds.
+        Content of the message.
     shelf : Shelf, optional
-        The hammers that are offered; by default those that come with the program.
+        Hammers on offer; by default the shipped ones.
 
     Raises
     ------
@@ -327,4 +327,4 @@ READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "line": lambda content: _text(content, "line", bounds.LONGEST_TEXT),
     "views": _views,
 }
-"""What reads an entry of a state, by its key; raises `ProtocolError` where the page would never send it."""
+"""Parser of each entry of a state; raises `ProtocolError` for values that the page never sends."""

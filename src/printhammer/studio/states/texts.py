@@ -1,4 +1,4 @@
-"""A state as texts that leave the studio: hammer file, drive file, Python, command."""
+"""State as texts that leave the studio: hammer file, drive file, Python, command."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ DRIVE_FILE: Final = "studio-drive.toml"
 def texts_of(state: State) -> dict[str, str]:
     """Return a state as texts.
 
-    "hammer" and "drive" are TOML; "python" and "command" give the same run; "state" is a file that the studio
-    opens.
+    "hammer" and "drive" are TOML; "python" and "command" produce the same run; "state" is a file that the
+    studio opens.
 
     Raises
     ------
     InputError
-        The state describes no hammer or drive.
+        The state has no valid hammer or drive.
     """
     return {
         "hammer": state.changed.to_toml(),
@@ -36,7 +36,7 @@ def texts_of(state: State) -> dict[str, str]:
 
 
 def python_of(state: State) -> str:
-    """Return a script that makes the same hammer, drive and motion."""
+    """Return a script that builds the same hammer, drive and motion."""
     lines = ["import printhammer as ph", ""]
     if name := _name(state):
         lines.append(f"hammer = ph.load({name!r})")
@@ -75,7 +75,7 @@ def python_of(state: State) -> str:
 
 
 def command_of(state: State) -> str:
-    """Return the command for the same run; what is changed is read from the files that the studio saves."""
+    """Return the command for the same run; changes are read from the files saved by the studio."""
     hammer = (not state.settings and _name(state)) or HAMMER_FILE
     if state.waveform is None and not state.pattern:
         overlap = "" if state.overlap == "add" else f" --overlap {state.overlap}"
@@ -84,7 +84,7 @@ def command_of(state: State) -> str:
 
 
 def _name(state: State) -> str:
-    """Return the name or file under which the hammer before any change can be loaded, if there is one."""
+    """Return the name or file from which the unchanged hammer can be loaded, if any."""
     if state.text:
         return ""
     if not state.shelf.is_guest(state.hammer) or state.shelf.is_shipped(state.hammer):

@@ -1,1 +1,1 @@
-"""Processes that compute for the studio's pages, and may be ended at any time."""
+"""Worker processes of the studio, which may be terminated at any time."""

@@ -1,8 +1,8 @@
-"""The inside of a worker: takes orders, does them one by one, and hears meanwhile of newer states.
+"""Worker process: runs orders one by one, and listens for newer states meanwhile.
 
-``python -m printhammer.studio.workers.child`` imports the modules that are named behind it, reads orders from
-its input and writes messages to its output, pickled both: it is started by the studio, whose pipes nobody
-else holds. It ends where its input does, so that nothing computes on behind a studio that was killed.
+``python -m printhammer.studio.workers.child`` imports the modules listed as arguments, reads orders from its
+input and writes messages to its output, both pickled; only the studio holds the other ends of the pipes. The
+process ends with its input, so that no computation outlives a killed studio.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ logger = logging.getLogger(__name__)
 
 
 class Workshop:
-    """Does orders and hands over what comes of them.
+    """Runner of orders.
 
     Parameters
     ----------
     send : callable
-        Takes a message: ``("frame", view, whole, data)``, ``("compiling", sentence)``, empty at its end, and
-        ``("done",)`` after every order.
+        Sends a message: ``("frame", view, whole, data)``, ``("compiling", sentence)``, with an empty sentence
+        at the end, and ``("done",)`` after every order.
     alone : bool, optional
-        Whether the process is for it alone.
+        Whether the process runs nothing else.
     """
 
     def __init__(self, send: Callable[[tuple[Any, ...]], None], *, alone: bool = False) -> None:
@@ -51,17 +51,17 @@ class Workshop:
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
 
     def take(self, order: Order | None) -> None:
-        """Take an order, or None for the end."""
+        """Queue an order; None ends the worker."""
         self._newer.clear()
         self._orders.put(order)
 
     def supersede(self) -> None:
-        """Hear that what is under way is no longer wanted."""
+        """Mark the current order as outdated."""
         self._newer.set()
 
     def run(self) -> None:
-        """Do orders until the end."""
-        # Heavy modules are loaded before the first order comes.
+        """Run orders until the end."""
+        # Load heavy modules before the first order arrives.
         from printhammer.studio.workers.jobs import ROLES
 
         compiling.listen(lambda sentence: self._send(("compiling", sentence)))
@@ -81,32 +81,32 @@ class Workshop:
             self._send(("done",))
 
     def _step_back(self) -> None:
-        """Leave the cores to what is looked at first, where this is a process of its own."""
+        """Lower the priority of this process in favour of the views that are looked at first."""
         if self._alone:
             self._alone = False
             with suppress(AttributeError, OSError):
                 os.nice(5)
 
     def tell(self, data: bytes, view: str, *, whole: bool = True) -> None:
-        """Hand over a frame."""
+        """Send a frame."""
         self._send(("frame", view, whole, data))
 
     def newer(self) -> bool:
-        """Whether there is a newer state."""
+        """Whether a newer state has arrived."""
         return self._newer.is_set()
 
     def rest(self, seconds: float) -> bool:
-        """Wait for a newer state; return whether one has come."""
+        """Wait for a newer state; return whether one arrived."""
         return self._newer.wait(seconds)
 
 
 def main() -> None:
     """Work for the process that holds the other ends of the pipes."""
     with suppress(ValueError, AttributeError):
-        # Ctrl-C is for the studio, which ends its workers.
+        # Ctrl-C is meant for the studio, which ends its workers.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     source, target = sys.stdin.buffer, os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    # What is printed by chance is no message.
+    # Stray prints must not mix with messages.
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     lock = threading.Lock()
 
@@ -127,7 +127,7 @@ def main() -> None:
                     workshop.supersede()
                 else:
                     workshop.take(order)
-        # Whatever is under way, nobody is left to see it.
+        # Nobody is left to receive the result.
         os._exit(0)
 
     threading.Thread(target=listen, daemon=True).start()

@@ -1,4 +1,4 @@
-"""The workers of a studio: lent to the pages one order at a time, ended where they do not come back."""
+"""Pool of workers, lent to the pages for one order at a time, and terminated if they do not return."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 MOST: Final = 3
-"""Workers of a role, at most: one that compiles is no reason for others to wait."""
+"""Largest number of workers per role, so that compilation in one does not block others."""
 
 
 class Crew:
-    """Workers by the roles that they play.
+    """Workers by role.
 
     Parameters
     ----------
     new : callable, optional
-        Makes a worker; by default `printhammer.studio.workers.worker.hire`.
+        Creates a worker; by default `printhammer.studio.workers.worker.hire`.
     """
 
     def __init__(self, new: Callable[[], Worker] = hire) -> None:
@@ -31,7 +31,7 @@ class Crew:
         self._closed = False
 
     def warm(self, *roles: str) -> None:
-        """Have a worker ready for each of some roles, before it is needed."""
+        """Start a worker for each role in advance."""
         for role in roles:
             with self._change:
                 if self._idle.get(role) or self._busy.get(role):
@@ -39,16 +39,16 @@ class Crew:
                 self._idle.setdefault(role, []).append(self._hire())
 
     def lend(self, role: str, key: Any, wanted: Callable[[], bool]) -> Worker | None:
-        """Return a worker that is free, if need be after a while; None once it is no longer wanted.
+        """Return a free worker, possibly after a wait; None once it is no longer needed.
 
         Parameters
         ----------
         role : str
-            What it is to do.
+            Role of the worker.
         key
-            What decides which machine code it needs: while another compiles that, it is waited for.
+            Key of the machine code; while another worker compiles it, wait.
         wanted : callable
-            Whether there is still use for it.
+            Whether the worker is still needed.
         """
         with self._change:
             while wanted() and not self._closed:
@@ -57,7 +57,7 @@ class Crew:
                     if not idle and len(busy) < MOST:
                         idle.append(self._hire())
                     if idle:
-                        # The one that was busy last has loaded what it needs.
+                        # The most recently used worker has loaded the necessary code.
                         worker = next((one for one in reversed(idle) if one.key == key), idle[-1])
                         idle.remove(worker)
                         worker.key = key
@@ -67,7 +67,7 @@ class Crew:
         return None
 
     def give_back(self, role: str, worker: Worker) -> None:
-        """Take a worker back that has done its order."""
+        """Take back a worker that has finished its order."""
         with self._change:
             if worker in self._busy[role]:
                 self._busy[role].remove(worker)
@@ -75,7 +75,7 @@ class Crew:
             self._change.notify_all()
 
     def dismiss(self, role: str, worker: Worker) -> None:
-        """End a worker that is busy, and have another one in its place."""
+        """Terminate a busy worker, and start a replacement."""
         worker.end()
         with self._change:
             if worker in self._busy[role]:
@@ -85,7 +85,7 @@ class Crew:
             self._change.notify_all()
 
     def leave(self, role: str, worker: Worker) -> None:
-        """Let a worker finish what it compiles, which will be needed; nobody waits for the rest."""
+        """Let a worker finish its compilation, whose result will be needed, and then stop."""
 
         def wait() -> None:
             worker.supersede()
@@ -101,7 +101,7 @@ class Crew:
         threading.Thread(target=wait, name="studio-leave", daemon=True).start()
 
     def close(self) -> None:
-        """End all."""
+        """Terminate all workers."""
         with self._change:
             self._closed = True
             workers = [worker for each in (*self._idle.values(), *self._busy.values()) for worker in each]
@@ -111,4 +111,4 @@ class Crew:
 
 
 PATIENT: Final = 1.5
-"""Seconds after which a worker that was told to stop, and does not compile, is ended."""
+"""Time after which a worker that was told to stop, and does not compile, is terminated, s."""

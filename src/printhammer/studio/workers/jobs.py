@@ -1,6 +1,6 @@
-"""The work for one state, in three parts that go on side by side: curves, map, and what is shown in detail.
+"""Jobs of a state, run in parallel: curves, map, and detailed views.
 
-Each is done by a worker of its own, so that curves never wait for a map, nor for what a map compiles.
+Each has its own worker, so that curves never wait for a map or its compilation.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ if TYPE_CHECKING:
     from printhammer.studio.workers.order import Order
 
 REST: Final = 0.3
-"""Seconds without a newer state after which more strobe points and the verdict on a train follow."""
+"""Time without a newer state after which further strobe points and the verdict follow, s."""
 
 
 class Desk(Protocol):
-    """Where a job is done."""
+    """Environment of a job."""
 
     tried: State | None
-    """State whose map was found to end in time."""
+    """State whose map was found to be fast enough."""
 
     def tell(self, data: bytes, view: str, *, whole: bool = True) -> None:
-        """Hand over a frame; `whole` where no better one of the view follows."""
+        """Send a frame; `whole` if no better one of the view follows."""
 
     def newer(self) -> bool:
-        """Whether there is a newer state."""
+        """Whether a newer state has arrived."""
 
     def rest(self, seconds: float) -> bool:
-        """Wait for a newer state; return whether one has come."""
+        """Wait for a newer state; return whether one arrived."""
 
 
 def curves(order: Order, desk: Desk) -> None:
-    """Send the curves of the single run, then its dots; or why the state is refused."""
+    """Send the curves of the single run, then its dots; or the reason to refuse the state."""
     try:
         data, motion = motion_frame(order.state, order.serial, order.outdated)
     except InputError as error:
@@ -61,12 +61,12 @@ def curves(order: Order, desk: Desk) -> None:
 
 
 def frequency_map(order: Order, desk: Desk) -> None:
-    """Send a coarse map, then one in full detail."""
+    """Send a coarse map, then the full map."""
     serial, state = order.serial, order.state
     try:
         desk.tried = try_map(state, desk.tried)
-        # Not given up for a newer state: a coarse map is to arrive while a slider moves. The browser draws
-        # meanwhile, and has another core for that.
+        # A coarse map is never cancelled, so that it arrives while a slider moves; the browser draws
+        # meanwhile on another core.
         desk.tell(map_frame(state, serial, preview_of(state), lambda: False, 1), "map", whole=False)
         desk.tell(map_frame(state, serial, FULL, desk.newer), "map")
     except InputError as error:
@@ -119,4 +119,4 @@ ROLES: Final[dict[str, Callable[[Order, Any], None]]] = {
     "detail": detail,
     "asked": asked,
 }
-"""The jobs by their names."""
+"""Jobs by role."""

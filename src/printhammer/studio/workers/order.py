@@ -1,4 +1,4 @@
-"""What a worker is told to do."""
+"""Orders for workers."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ if TYPE_CHECKING:
 
 
 ASKED: Final = ("curves", "dots", "exponent", "verdict")
-"""What a page may ask of a state that it does not show."""
+"""Questions of a page about a state that it does not show."""
 
 
 class Order(NamedTuple):
-    """What a worker is to do."""
+    """Order for a worker."""
 
     role: str
-    """ "curves", "map" or "detail"; "asked" for a question of the kind that is its only view."""
+    """Role: "curves", "map" or "detail"; "asked" for a question, whose kind is the only view."""
     serial: int
     state: State
     views: tuple[str, ...]
-    """Views to be drawn anew, of those that are the matter of the role."""
+    """Views of the role to be drawn again."""
     outdated: dict[str, str]
-    """Why views that the page shows do not belong to this state, by their names."""
+    """Reasons why displayed views do not belong to this state, by view."""

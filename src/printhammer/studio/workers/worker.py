@@ -1,4 +1,4 @@
-"""A worker as the studio sees it: a process, or a thread where a process would not know a hammer's parts."""
+"""Worker from the studio's side: a process, or a thread if a process would not know a hammer's parts."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 class Worker:
-    """Takes one order at a time; what comes of it lies in `messages`, see `printhammer.studio.workers.child`.
+    """Worker that runs one order at a time; its messages are described in `workers.child`.
 
-    Where it has ended by itself, a message ``("ended",)`` says so.
+    A worker that ended by itself sends a message ``("ended",)``.
     """
 
     def __init__(self) -> None:
@@ -32,19 +32,19 @@ class Worker:
         self.heard = time.monotonic()
 
     def begin(self, order: Order) -> None:
-        """Have an order done."""
+        """Start an order."""
         raise NotImplementedError
 
     def supersede(self) -> None:
-        """Tell it that what it does is no longer wanted."""
+        """Tell the worker that its order is outdated."""
         raise NotImplementedError
 
     def end(self) -> None:
-        """End it, whatever it does."""
+        """Terminate the worker at once."""
         raise NotImplementedError
 
     def next(self, seconds: float) -> tuple[Any, ...] | None:
-        """Return the next message, or None where none comes in some time."""
+        """Return the next message, or None after a timeout."""
         try:
             message = self.messages.get(timeout=seconds)
         except queue.Empty:
@@ -56,24 +56,24 @@ class Worker:
 
     @property
     def compiled(self) -> float:
-        """For how long it has been compiling, s."""
+        """Time for which the worker has been compiling, s."""
         return time.monotonic() - self._since if self.compiling else 0.0
 
     @property
     def silent(self) -> float:
-        """Time since it was heard of, s; none while it compiles."""
+        """Time since the last message, s; 0 while the worker compiles."""
         return 0.0 if self.compiling else time.monotonic() - self.heard
 
 
 class ProcessWorker(Worker):
-    """A process of its own.
+    """Worker in a separate process.
 
     Parameters
     ----------
     modules : sequence of str, optional
-        What it imports first: modules with parts that do not come with the program.
+        Modules to import first: those that register further parts.
     command : tuple of str, optional
-        What the interpreter is started with; it has to end in `printhammer.studio.workers.child.main`.
+        Arguments of the interpreter, which has to run `printhammer.studio.workers.child.main`.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class ProcessWorker(Worker):
         command: tuple[str, ...] = ("-m", "printhammer.studio.workers.child"),
     ) -> None:
         super().__init__()
-        # Found where this process has found it, also where a notebook has changed the path.
+        # Use the import path of this process, which a notebook may have changed.
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self.process = subprocess.Popen(
             (sys.executable, *command, *modules),
@@ -94,16 +94,16 @@ class ProcessWorker(Worker):
         threading.Thread(target=self._listen, name="studio-worker", daemon=True).start()
 
     def begin(self, order: Order) -> None:
-        """Have an order done."""
+        """Start an order."""
         self.heard = time.monotonic()
         self._write(order)
 
     def supersede(self) -> None:
-        """Tell it that what it does is no longer wanted."""
+        """Tell the worker that its order is outdated."""
         self._write(None)
 
     def end(self) -> None:
-        """End it, whatever it does."""
+        """Terminate the process."""
         self.process.kill()
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(5)
@@ -112,7 +112,7 @@ class ProcessWorker(Worker):
 
     def _write(self, content: Order | None) -> None:
         source = self.process.stdin
-        # One that is gone says so by its last message.
+        # A process that is gone reports that by its last message.
         with self._writing, suppress(OSError, ValueError):
             pickle.dump(content, source, pickle.HIGHEST_PROTOCOL)  # type: ignore[arg-type]
             source.flush()  # type: ignore[union-attr]
@@ -127,7 +127,7 @@ class ProcessWorker(Worker):
 
 
 class ThreadWorker(Worker):
-    """A thread of this process, which ends where its work asks whether to go on."""
+    """Worker in a thread of this process, which ends when its work checks whether to continue."""
 
     def __init__(self) -> None:
         from printhammer.studio.workers.child import Workshop
@@ -137,22 +137,22 @@ class ThreadWorker(Worker):
         threading.Thread(target=self._workshop.run, name="studio-worker", daemon=True).start()
 
     def begin(self, order: Order) -> None:
-        """Have an order done."""
+        """Start an order."""
         self.heard = time.monotonic()
         self._workshop.take(order)
 
     def supersede(self) -> None:
-        """Tell it that what it does is no longer wanted."""
+        """Tell the worker that its order is outdated."""
         self._workshop.supersede()
 
     def end(self) -> None:
-        """Have it end when it can."""
+        """Ask the thread to end."""
         self._workshop.take(None)
         self._workshop.supersede()
 
 
 def hire() -> Worker:
-    """Return a new worker: a process, or a thread where parts were registered in the program that runs."""
+    """Return a new worker: a process, or a thread if the running program registered parts."""
     from printhammer.parts import PARTS
 
     modules = {part.__module__ for part in PARTS.values()}
