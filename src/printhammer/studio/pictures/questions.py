@@ -29,7 +29,7 @@ def dots(state: State, serial: int) -> bytes:
 
 
 def exponent(state: State, serial: int) -> bytes:
-    """Return the largest exponent of an endless train over some firings; None if there is none."""
+    """Return the largest exponent of an endless train over some firings; None if it cannot be computed."""
     try:
         check_strobe(state)
     except InputError as error:

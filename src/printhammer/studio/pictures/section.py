@@ -71,7 +71,7 @@ def strobe_frame(
 
 
 def exponent_so_far(state: State, points: int) -> dict[str, Any] | None:
-    """Return the largest exponent over the later half of some firings; None if there is none."""
+    """Return the largest exponent over the later half of some firings; None if it cannot be computed."""
     from printhammer.derivatives.states import strobe_exponent
 
     period = 1.0 / state.rate
