@@ -87,7 +87,7 @@ def struck_everywhere(hammer: ph.Hammer) -> dict[str, list[int]]:
     trial = attempt([Case(hammer, nominal(hammer), rate)], [(0, 1, 2)], limits=ph.Limits(), threads=1)
     chart = ph.frequency_map(hammer, [rate], pulses=3, times=16, threads=1)
     report = ph.quality(hammer, rate, pattern="111")
-    safe = ph.safe_rate(hammer, first=rate, last=rate, step=rate, cycle=False, threads=1)
+    safe = ph.safe_rate(hammer, first=rate, last=rate, step=rate, long=False, threads=1)
     base = Base(
         hammer=hammer,
         drive={"train": {"rate": f"{rate!r} Hz", "pulses": 3}},

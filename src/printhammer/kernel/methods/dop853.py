@@ -37,13 +37,18 @@ if TYPE_CHECKING:
 Point = Any
 """Time, displacement or w, velocity, and the electric state where there is a circuit."""
 
+VANISHING = 1e-280
+"""Sum of squares of error estimates below which an estimate stands for itself."""
+
 
 @compiled
 def combined_error(e5: float, e3: float) -> float:
     """Combine the estimates of order 5 and 3 into one of order 7 (Hairer, Norsett, Wanner, II.10)."""
-    if e5 == 0.0:
-        return 0.0
-    return e5 * e5 / math.sqrt(e5 * e5 + 0.01 * e3 * e3)
+    square = e5 * e5 + 0.01 * e3 * e3
+    # The squares of what has decayed to 1e-150 vanish; a NaN stays one.
+    if square < VANISHING:
+        return abs(e5)
+    return e5 * e5 / math.sqrt(square)
 
 
 @inlined

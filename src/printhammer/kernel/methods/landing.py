@@ -308,7 +308,8 @@ def advance(
         if at_edge:
             h = t_next - t
         x1, v1, a1, error_x, error_v, electric, error_e = whole_step(t, x, v, a, h, law)
-        ratio = error_ratio(error_x, error_v, error_e, mode, control)
+        # Beyond the range of the law the acceleration at the end may be no number, though the errors are.
+        ratio = error_ratio(error_x, error_v, error_e, mode, control) + 0.0 * a1
         if not ratio <= 1.0:
             h *= step_factor(ratio)
             if h < shortest:

@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from printhammer.kernel.single.steps import take_step
     from printhammer.kernel.single.switches import after_step
 
+COINCIDENT = 1e-15
+"""Difference of edges, as a fraction of their time, up to which they coincide."""
+
 STUCK = 1000
 """Steps in a row that do not move time after which a run is given up."""
 
@@ -134,6 +137,12 @@ def run(posed: Any, t_end: float, nodes: Any, contacts: Any, state: Any) -> tupl
         t_next = min(state[C.EDGE], t_end)
         if HAS_CIRCUIT:
             t_next = min(t_next, live[live.size - UNTIL])
+        if 0.0 < t_next - state[C.TIME] <= COINCIDENT * t_next:
+            # Nothing moves between edges that differ by rounding; the drive changes at the later one.
+            state[C.TIME] = t_next
+            after_step(M.EDGE, state, setup, nodes, contacts)
+            note_state(state, setup, nodes)
+            continue
         if t_next <= state[C.TIME]:
             pass_edge(state, setup)
             note_path(state, setup, nodes)
