@@ -26,6 +26,7 @@ ROOMS = (
     "parts",
     "report",
     "results",
+    "run",
     "studio",
     "support",
     "sweep",

@@ -1,1 +1,1 @@
-"""Running a hammer: what is fired, how it moves and what it touches."""
+"""Runs of a hammer: drive, motion and contacts."""

@@ -1,9 +1,10 @@
-"""Machine code that is wanted next, made by a second process while this one makes what is wanted first.
+"""Compilation in a second process of machine code that will be needed next.
 
     python -m printhammer.run.ahead LAWS
 
-compiles, for laws told as JSON, what a motion needs beside its run. It is found on disk afterwards; where it
-is not, be it that the laws are those of a part file or that nothing can be kept, the first process makes it.
+compiles, for laws passed as JSON, the functions that a motion needs besides its run. They are then loaded
+from disk; if that is impossible, because the laws come from a part file or the cache cannot be written, the
+first process compiles them.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ from printhammer.support.threads import thread_count
 
 
 def begin(laws: Laws) -> Callable[[], None]:
-    """Have what a motion needs beside its run compiled by another process, if there is a core for it.
+    """Compile the functions that a motion needs besides its run in another process, if a core is free.
 
     Returns
     -------
     callable
-        Waits for the process, which ends with this one at the latest.
+        Function that waits for the process, which ends with this process at the latest.
     """
     if thread_count(None) < 2:
         return _nothing
@@ -52,7 +53,7 @@ def _nothing() -> None:
 
 
 def prepare(laws: Laws) -> None:
-    """Compile what a motion needs beside its run, by calls on a record of nothing."""
+    """Compile the functions that a motion needs besides its run, by calls on an empty record."""
     kernel = specialise(laws)
     none, nodes, contacts, constants = np.empty(0), np.empty((0, 5)), np.empty((0, 7)), np.zeros(64)
     drive = (none, np.zeros(0, np.int64), np.empty((0, 7)), False, np.zeros(0, np.int64), np.zeros(1))

@@ -1,4 +1,4 @@
-"""Contacts and dots: what the armature touched, and what each firing did; of an ensemble as tables."""
+"""Contacts and dots of a run, and tables of the dots of an ensemble."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 
 class Contact(Declared):
-    """One touch of the pack or the backstop."""
+    """Touch of the pack or the backstop."""
 
     surface: Literal["pack", "backstop"] = part("what is touched")
     t_in: float = scalar("s", "time of touch", more="of the start of the run where it was open already")
@@ -42,10 +42,10 @@ class Contact(Declared):
 
 
 class Dot(Declared):
-    """What one firing did on the paper.
+    """Dot of one firing on the paper.
 
-    The first pack contact after a firing makes its dot, see `printhammer.kernel.model.dots`; a firing
-    without one is a lost dot.
+    The first pack contact after a firing makes its dot, see `printhammer.kernel.model.dots`; a firing without
+    one is a lost dot.
     """
 
     index: int = part("number of the firing, from 0")
@@ -68,13 +68,13 @@ class Dot(Declared):
 
 
 class _Numbers:
-    """Count of the pack contacts of each firing."""
+    """Counter of the pack contacts of each firing."""
 
     def __init__(self) -> None:
         self._counts: dict[int, int] = {}
 
     def count(self, surface: int, initial: bool, fired: int) -> int:
-        """Return the number of the next contact among those of its firing, and count it."""
+        """Return the index of the next contact among those of its firing, and count it."""
         number = contact_number(surface, initial, fired, self._counts.get(fired, 0))
         if number != NO_DOT:
             self._counts[fired] = number + 1
@@ -82,7 +82,7 @@ class _Numbers:
 
 
 def contact_numbers(contacts: Sequence[Contact]) -> list[int]:
-    """Return the number of each contact among those of its firing, `DOT` for what makes a dot."""
+    """Return the index of each contact among those of its firing; `DOT` marks the contact of the dot."""
     numbers = _Numbers()
     return [
         numbers.count(
@@ -95,20 +95,20 @@ def contact_numbers(contacts: Sequence[Contact]) -> list[int]:
 
 
 def step_range(record: Record, row: int) -> tuple[int, int]:
-    """Return the first step of a contact and the one after its last."""
+    """Return the first step of a contact and the step after its last."""
     first = int(record.contacts[row, 5])
     t_out = record.contacts[row, 3]
     last = len(record.nodes) - 1
     if math.isfinite(t_out):
         last = min(last, int(np.searchsorted(record.nodes[:, 0], t_out, side="left")))
     if record.contacts[row, 3] == record.contacts[row, 1]:
-        # An impact on a rigid backstop: the step of no duration between its two nodes.
+        # An impact on a rigid backstop is a step of zero duration between two nodes.
         last = min(first + 1, len(record.nodes) - 1)
     return first, last
 
 
 def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]]:
-    """Return surface and time, s, of every touch of a run; contacts open at its start have none."""
+    """Return surface and time, s, of every touch of a run, except contacts open at its start."""
     return [
         ("pack" if int(row[0]) == PACK_SURFACE else "backstop", float(row[1]))
         for row in record.contacts
@@ -117,10 +117,10 @@ def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]
 
 
 def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> list[Contact]:
-    """Put the recorded contacts together with their peaks and losses.
+    """Combine the recorded contacts with their peaks and losses.
 
-    The increments are those of `printhammer.run.energy.increments_of`; `rigid` tells whether the
-    backstop is.
+    The increments are those of `printhammer.run.energy.increments_of`; `rigid` states whether the backstop is
+    rigid.
     """
     if len(record.contacts) == 0:
         return []
@@ -179,7 +179,7 @@ def loading_works(
 
 
 def dots_of(times: FloatArray, contacts: Sequence[Contact], works: FloatArray, t_end: float) -> list[Dot]:
-    """Return the dots of all firings; firings after `t_end`, s, are left out."""
+    """Return the dots of all firings up to `t_end`, s."""
     owned: dict[int, list[int]] = {}
     for row, (contact, number) in enumerate(zip(contacts, contact_numbers(contacts), strict=True)):
         if number != NO_DOT and contact.firing is not None:
@@ -215,7 +215,7 @@ _FIRINGS: Final = "member firing"
 
 
 class DotTable(Result):
-    """What the firings did, up to the most firings of any member; nan where there is nothing to tell."""
+    """Dots of the members, padded to the largest number of firings; NaN for missing values."""
 
     fired: BoolArray = column("1", "whether there was such a firing, and the run came so far", _FIRINGS)
     fired_at: FloatArray = column("s", "time of the firing", _FIRINGS)
@@ -231,12 +231,12 @@ class DotTable(Result):
 
     @classmethod
     def from_rows(cls, rows: FloatArray, fired_at: FloatArray, reached: FloatArray) -> DotTable:
-        """Make the table of rows of the kernel, shape (members, firings, columns).
+        """Build the table from rows of the kernel, shape (members, firings, columns).
 
         Parameters
         ----------
         rows : array
-            See `printhammer.kernel.model.dots`; NaN where a member has no such firing.
+            Rows of `printhammer.kernel.model.dots`; NaN for missing firings.
         fired_at : array, shape (members, firings)
             Times of the firings, s.
         reached : array, shape (members,)
@@ -258,7 +258,7 @@ class DotTable(Result):
 
 
 class ExtraDots(Result):
-    """Extra contacts of all members, in the order of members, firings and times."""
+    """Extra contacts of all members, ordered by member, firing and time."""
 
     member: IntArray = column("1", "index of the member", "extra")
     firing: IntArray = column("1", "index of the firing of that member", "extra")
@@ -267,12 +267,12 @@ class ExtraDots(Result):
 
     @classmethod
     def from_rows(cls, groups: Sequence[tuple[IntArray, Ragged]]) -> ExtraDots:
-        """Join the rows of extra contacts of several groups, each given with the indices of its members."""
+        """Concatenate the extra contacts of several groups, each with the indices of its members."""
         member = np.concatenate(
             [np.zeros(0, np.int64), *(np.repeat(own, rows.counts) for own, rows in groups)]
         )
         every = np.concatenate([np.zeros((0, layout.DOT_WIDTH)), *(rows.values for _own, rows in groups)])
-        # The rows of a member are in order of time, and so in order of firings.
+        # The rows of a member are ordered by time, hence by firing.
         order = np.argsort(member, kind="stable")
         every = every[order]
         return cls(

@@ -1,7 +1,7 @@
-"""Effort: the tolerance, the threads and the progress of a computation, in one object.
+"""Effort of a computation: tolerance, threads and progress, in one object.
 
-A public function takes them as the keywords `tolerance`, `threads` and `progress`. It is decorated by
-`computation`, which declares and documents the keywords, checks their values once and passes one `Effort` on.
+Public functions accept the keywords `tolerance`, `threads` and `progress`. The decorator `computation`
+declares and documents the keywords, validates their values once and passes one `Effort`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class OfProgress(TypedDict, total=False):
 
 
 class InThreads(OfTolerance, OfThreads):
-    """Keywords of a public function without progress."""
+    """Keywords of a public function without progress reports."""
 
 
 class InOneThread(OfTolerance, OfProgress):
@@ -62,11 +62,11 @@ class Effort:
     """Tolerance, threads and progress of a computation. Only the tolerance changes its result."""
 
     tolerance: float = TOLERANCE
-    """Error allowed in one integration step."""
+    """Error tolerance of one integration step."""
     threads: int | None = None
     """Number of threads; None for one per core."""
     progress: Progress | None = None
-    """Called with the number of steps done and of all."""
+    """Callback of the number of steps done and in total."""
 
     def __post_init__(self) -> None:
         check_tolerance(self.tolerance)
@@ -84,7 +84,7 @@ class Effort:
 
     @property
     def running(self) -> AtFixedTolerance:
-        """Keywords of a run of an ensemble, which has its tolerance already."""
+        """Keywords of a run of an ensemble whose tolerance is already set."""
         return {"threads": self.threads, "progress": self.progress}
 
     def at(self, tolerance: float) -> Effort:
@@ -92,16 +92,16 @@ class Effort:
         return Effort(tolerance, self.threads)
 
     def within(self, begun: int, total: int) -> Effort:
-        """Return the effort of a part of the work, whose progress counts on from `begun` of `total`."""
+        """Return the effort of a part of the work, whose progress starts at `begun` of `total`."""
         return replace(self, progress=shifted(self.progress, begun, total))
 
     def report(self, done: int, total: int) -> None:
-        """Report progress, if it was asked for."""
+        """Report progress to the callback, if any."""
         if self.progress is not None:
             self.progress(done, total)
 
     def mapped(self, function: Callable[[A], B], items: Sequence[A], *, length: int | None = None) -> list[B]:
-        """Return the values of a function at some items, as `printhammer.support.threads.mapped`."""
+        """Map a function over items in threads; see `printhammer.support.threads.mapped`."""
         return mapped(function, items, self.threads, self.progress, length=length)
 
 
@@ -124,12 +124,12 @@ _TYPES: Final = {"tolerance": "float", "threads": "int | None", "progress": "Pro
 
 
 def computation(function: F) -> F:
-    """Let a public function take the keywords of an effort, and pass it one `Effort`.
+    """Decorate a public function to accept the keywords of an effort, and pass it one `Effort`.
 
-    The function has a parameter `effort`, whose default is that of the keywords, and names those it takes by
-    the type of its `**`: `Unpack[Keywords]`, or a dictionary with further keys, which stay in its `**`. The
-    signature and the docstring show the keywords and not the parameter `effort`, by which functions of the
-    package pass theirs on. Entries that the docstring has of its own are kept.
+    The function has a parameter `effort`, whose default supplies those of the keywords; the type of its `**`
+    names the keywords it accepts: `Unpack[Keywords]`, or a dictionary with further keys, which stay in its
+    `**`. Signature and docstring show the keywords instead of the parameter `effort`, which functions of the
+    package use among themselves. Entries already present in the docstring are kept.
     """
     signature = inspect.signature(function)
     *own, rest = signature.parameters.values()
@@ -168,7 +168,7 @@ def computation(function: F) -> F:
 
 
 def _documented(text: str, names: Sequence[str]) -> str:
-    """Return a docstring with entries of the parameters that it lacks, at the end of its Parameters."""
+    """Return a docstring with missing parameter entries added at the end of its Parameters."""
     text = inspect.cleandoc(text)
     ends = [text.find(head) for head in ("\nprogress : ", "\n**firing\n", "\n\nReturns\n-", "\n\nRaises\n-")]
     end = min((place for place in ends if place >= 0), default=len(text))

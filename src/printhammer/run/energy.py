@@ -1,6 +1,6 @@
-"""The work of the coil over a run: net, positive, given back, and its heat.
+"""Energies of a run: work of the coil, and the ledger of all terms.
 
-The energy ledger of a run: what the coil gave, what pack and backstop took, what is stored.
+The ledger sums the work of the coil, the losses in pack and backstop, and the stored energy.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _HEAT_ERROR: Final = 1e-13
 
 
 class CoilWork(Declared):
-    """Work of the coil over one run; its power is (Fm(x, I) - Fm(x, 0)) v."""
+    """Work of the coil over a run; its power is (Fm(x, I) - Fm(x, 0)) v."""
 
     net: float = scalar("J", "integral of the power", more="`coil_work` of the energy ledger")
     positive: float = scalar(
@@ -42,7 +42,7 @@ class CoilWork(Declared):
 
     @property
     def given_back(self) -> float:
-        """Work that the armature does on the coil, J: positive less net."""
+        """Work that the armature does on the coil, J: positive minus net work."""
         return self.positive - self.net
 
 
@@ -54,10 +54,10 @@ def coil_power(hammer: Hammer, x: FloatArray, v: FloatArray, magnet: FloatArray)
 
 
 def coil_work_of(problem: Problem, record: Record) -> CoilWork:
-    """Integrate the power of the coil along a run, each stretch of one sign by itself.
+    """Integrate the power of the coil along a run, separately over stretches of one sign.
 
-    The quadrature is that of the ledger. Steps in which the power changes its sign are split there, so that
-    every integrand is smooth.
+    The quadrature is that of the ledger. Steps in which the power changes sign are split there, so that every
+    integrand is smooth.
     """
     start, end = float(record.nodes[0, 0]), float(record.nodes[-1, 0])
     resistance = problem.hammer.coil_resistance
@@ -131,11 +131,11 @@ def _signs(problem: Problem, record: Record, times: FloatArray) -> FloatArray:
 
 
 _POINTS, _PIECES = 10, 8
-"""Points of the quadrature over the current, and pieces of it."""
+"""Points of the quadrature over the current, and its pieces."""
 
 
 class Ledger(Declared):
-    """Energies of one run, J."""
+    """Energies of a run, J."""
 
     coil_work: float = scalar("J", "integral of (Fm(x, I) - Fm(x, 0)) v dt")
     drive_work: float = scalar("J", "work of a drive that is a force")
@@ -171,7 +171,7 @@ class Ledger(Declared):
 def increments_of(problem: Problem, record: Record) -> FloatArray:
     """Return the integrals of power [J] in every step: coil, drive force, pack, backstop and damping loss.
 
-    Under a voltage also supply, and losses in coil, driver and shorted turn.
+    For a voltage drive also the supply, and losses in coil, driver and shorted turn.
     """
     times = record.nodes[:, 0]
     return problem.quadratures(record, np.arange(len(times) - 1), times[:-1], times[1:])
@@ -193,7 +193,7 @@ def stored_energy(hammer: Hammer, x: float) -> float:
 
 
 def field_energy(problem: Problem, record: Record, row: int) -> float:
-    """Return the energy of the magnetic field that goes with the current at a node, and of a reservoir, J.
+    """Return the energy of the magnetic field of the current at a node, and of a reservoir, J.
 
     E = i lambda - integral of lambda over the current from 0 to i, by Gauss's quadrature.
     """
@@ -222,14 +222,14 @@ def _function(part: Any, name: str) -> Any:
 
 
 def ledger_of(problem: Problem, record: Record, increments: FloatArray) -> Ledger:
-    """Add up a run, given what `increments_of` returns for it."""
+    """Compute the ledger of a run from the result of `increments_of`."""
     sums = [float(math.fsum(column)) for column in increments.T]
     coil, force, pack, backstop, damping = sums[:5]
     supply, copper, driver, eddy = sums[5:] or (0.0, 0.0, 0.0, 0.0)
     field = 0.0
     if problem.laws.circuit:
         field = field_energy(problem, record, -1) - field_energy(problem, record, 0)
-    # Without back-EMF the work of the coil is not the supply's.
+    # Without back-EMF the supply does not provide the work of the coil.
     linked = problem.laws.circuit and winding_of(problem.hammer).back_emf
     start, end = record.nodes[0], record.nodes[-1]
     hammer = problem.hammer

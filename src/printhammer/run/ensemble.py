@@ -1,8 +1,8 @@
 """Ensembles: many runs, integrated together on all cores.
 
-Every member has its own hammer, drive, state, steps and contacts. What is kept of a run is only what is
-asked for, so that memory does not grow with its length. The results of a member do not depend on what else is
-in the ensemble, nor on the number of threads.
+Every member has its own hammer, drive, state, steps and contacts. Only requested results of a run are stored,
+so that memory does not grow with its length. The results of a member do not depend on the other members or on
+the number of threads.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 DISPLAY_TOLERANCE: Final = 5e-7
-"""Tolerance for pictures: displacements are good to about 1e-4 of the stroke."""
+"""Tolerance for pictures: displacements are accurate to about 1e-4 of the stroke."""
 
 Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)
@@ -54,7 +54,7 @@ _TIMES: Final = "member strobe"
 
 
 class Strobes(Result):
-    """States at given times, up to the most times of any member; nan where a run ended before."""
+    """States at given times, padded to the largest number of times; NaN after the end of a run."""
 
     t: FloatArray = column("s", "time", _TIMES)
     x: FloatArray = column("m", "displacement", _TIMES)
@@ -80,18 +80,18 @@ class Strobes(Result):
     )
 
     def entries(self) -> Entries:
-        """Return the states by name, the electric part of them only where there is one."""
+        """Return the states by name, with the electric part only if there is one."""
         return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
 
     @property
     def electric(self) -> FloatArray | None:
-        """Currents and voltage, shape (members, strobes, 3), if there are any."""
+        """Currents and voltage, shape (members, strobes, 3); None without a circuit."""
         parts = [part for part in (self.current, self.turn, self.reservoir) if part is not None]
         return np.stack(parts, axis=2) if parts else None
 
 
 class EnsembleResult(Result):
-    """What is kept of the runs of an ensemble."""
+    """Results of the runs of an ensemble."""
 
     status: IntArray = column("1", "how the run ended", "member", more="0 is ok", codes=STATUS_NAMES)
     reached: FloatArray = column("s", "time at which the run ended", "member")
@@ -109,11 +109,11 @@ class EnsembleResult(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the result is."""
+        """Title of the result, one line."""
         return f"{len(self.status)} runs of an ensemble"
 
     def entries(self) -> Entries:
-        """Return what was asked for; dots by their names, states as `strobe_t`, extra contacts likewise."""
+        """Return the requested results: dots by name, states as `strobe_t` and so on, extra contacts."""
         entries = super().entries()
         if self.x is None:
             del entries["x"]
@@ -125,7 +125,7 @@ class EnsembleResult(Result):
 
     @property
     def ok(self) -> BoolArray:
-        """Which runs went as asked."""
+        """Whether each run reached its end."""
         return np.equal(self.status, OK)
 
     @property
@@ -135,14 +135,15 @@ class EnsembleResult(Result):
 
 
 class Ensemble:
-    """Many runs, integrated together, on all cores.
+    """Many runs, integrated together on all cores.
 
     Parameters
     ----------
     hammers : Hammer or sequence of Hammer
-        One for all members, or one for each.
+        One hammer for all members, or one for each.
     drives : Drive or sequence of Drive
-        Likewise; many trains are cheapest as `printhammer.PulseTrains`.
+        One drive for all members, or one for each; `printhammer.PulseTrains` is the most efficient form of
+        many trains.
     ends : float or array
         End of the runs, s, one for all or one for each.
     states : tuple or array, optional
@@ -152,12 +153,12 @@ class Ensemble:
         the coil and in its shorted turn, A, and the voltage of the supply's capacitor, V; by default there is
         no current, and the capacitor is charged.
     starts : float or array, optional
-        Time of these states, s, not negative, one for all or one for each; by default 0. What was fired
-        before is under way then.
+        Time of these states, s, not negative, one for all or one for each; by default 0. Earlier firings are
+        active at that time.
     tolerance : float, optional
-        Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
+        Error tolerance of one step, in units of the distance from backstop to pack and of a typical speed.
     max_steps : int, optional
-        Steps after which a run is given up, with the status "step limit"; by default 5e7.
+        Largest number of steps of a run, which otherwise ends with the status "step limit"; by default 5e7.
 
     Raises
     ------
@@ -254,10 +255,10 @@ class Ensemble:
 
     @cached_property
     def groups(self) -> list[Group]:
-        """The members, sorted by the laws of their parts."""
+        """Members, grouped by the laws of their parts."""
         fired = Fired(self.drives)
         hammers, hammer_of = self._own_hammers
-        # The kernel of a member follows from its hammer and the form of its drive.
+        # The kernel of a member depends on its hammer and on the form of its drive.
         pairs, first, pair_of = np.unique(
             hammer_of * len(fired.forms) + fired.form_of, return_index=True, return_inverse=True
         )
@@ -282,19 +283,19 @@ class Ensemble:
 
     @cached_property
     def _own_hammers(self) -> tuple[list[Hammer], IntArray]:
-        """The hammers, each object once, and which one is a member's."""
+        """Distinct hammer objects, and the index of each member's hammer."""
         known = {id(hammer): hammer for hammer in self.hammers}
         places = {key: place for place, key in enumerate(known)}
         which = [places[id(hammer)] for hammer in self.hammers]
         return list(known.values()), np.array(which, dtype=np.int64)
 
     def motion(self, member: int) -> Motion:
-        """Return everything about one member.
+        """Return the full motion of one member.
 
         Parameters
         ----------
         member : int
-            Its number.
+            Index of the member.
         """
         from printhammer.run.simulate import simulate
 
@@ -328,23 +329,23 @@ class Ensemble:
         Parameters
         ----------
         dots : bool, optional
-            Keep what each firing did.
+            Whether to store the dots.
         extra : bool, optional
-            Keep every extra contact too; with `dots` only.
+            Whether to store every extra contact; only with `dots`.
         strobes : str or sequence of arrays, optional
-            Keep the state at every firing ("firings"), or at ascending times, s, one array for each member.
+            Times of stored states: every firing ("firings"), or ascending times, s, one array for each
+            member.
         times : array, optional
-            Keep the displacement at these ascending times, s.
+            Ascending times, s, at which the displacement is stored.
         x : float32 array, shape (M, T), optional
-            Where to put it; by default a new array.
+            Array for the displacements; by default a new one.
         threads : int, optional
-            By default as many as there are cores.
+            Number of threads; by default the number of cores.
         progress : callable, optional
-            Called now and then with the number of members done and of all.
+            Called from time to time with the number of members done and in total.
         engine : str, optional
-            "plain": one member at a time; "lanes": side by side, see `printhammer.kernel.lanes`; "auto": in
-            lanes where the laws of the members allow it. Results of the two differ by what the tolerance
-            allows.
+            "plain": one member at a time; "lanes": in vector lanes, see `printhammer.kernel.lanes`; "auto":
+            in lanes if the laws of the members allow it. The two engines agree within the tolerance.
 
         Returns
         -------
@@ -366,7 +367,7 @@ class Ensemble:
         moments = self._moments(strobes)
         jobs = [Job(group, bool(dots), bool(extra), moments, grid, x) for group in self.groups]
         _integrate(jobs, engine, workers, progress)
-        # Members with more extra contacts than there was room for run once more.
+        # Members with more extra contacts than available rows run once more.
         _integrate([job for job in jobs if job.make_room()], engine, workers, None)
         for job in jobs:
             job.finish(x)
@@ -389,7 +390,7 @@ class Ensemble:
         return whole
 
     def _spread(self, rows: Sequence[Ragged]) -> FloatArray:
-        """Return rows of the members of each group as an array (members, rows, columns), filled with NaN."""
+        """Return rows of the members of each group as an array (members, rows, columns), padded with NaN."""
         most = max((own.longest for own in rows), default=0)
         width = max((own.values.shape[1] for own in rows), default=MOST_COLUMNS)
         whole = np.full((self.size, most, width), np.nan)

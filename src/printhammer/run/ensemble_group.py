@@ -1,6 +1,6 @@
-"""Members of an ensemble whose parts have the same laws, as the arrays of the kernel, and their results.
+"""Groups of members with the same laws: the arrays of the kernel, and their results.
 
-What the drives of an ensemble fire, as arrays: a few forms of pulses, and many firing times.
+The drives of an ensemble are arrays, too: a few forms of pulses, and many firing times.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ _NODES: Final = 2048
 _CONTACTS: Final = 256
 MOST_COLUMNS: Final = 6
 _EXTRA: Final = 4
-"""Room for extra contacts of a member, beside one for each firing, before it is known how many there are."""
+"""Rows for extra contacts of a member, in addition to one per firing, before their number is known;
+arbitrary."""
 _STROBE_WIDTH: Final = 4
 _ELECTRIC_WIDTH: Final = 3
 _PIECE: Final = 4 * lane_layout.LANES
@@ -57,12 +58,13 @@ _PIECE: Final = 4 * lane_layout.LANES
 
 
 class Group:
-    """Members with the same laws, overlap rule and kinds of pieces in their waveforms, started alike.
+    """Members with the same laws, overlap rule, kinds of waveform pieces and kind of start.
 
-    All this is decided for each member, so that one kernel serves it in whatever company. `members` are their
-    numbers in the ensemble; `hammers` and `hammer_of` say whose hammer is which, and `fired` is what the
-    drives of all members do. For each member of the ensemble there is a row of `states` (time, displacement,
-    velocity and what is beyond them at the start) and an end, s. No run takes more than `max_steps`.
+    The assignment depends on each member alone, so that its kernel does not depend on the other members.
+    `members` are their indices in the ensemble; `hammers` and `hammer_of` hold the distinct hammers and the
+    index for each member, and `fired` the drives of all members. Each member of the ensemble has a row of
+    `states` (time, displacement, velocity and further components at the start) and an end, s. No run takes
+    more than `max_steps`.
     """
 
     def __init__(
@@ -76,7 +78,7 @@ class Group:
         tolerance: float,
         max_steps: int,
     ) -> None:
-        # Imported late, since it takes numba.
+        # Imported late, since it imports numba.
         from printhammer.kernel.compile.specialise import specialise
         from printhammer.kernel.lanes.batch import Batch
 
@@ -109,7 +111,7 @@ class Group:
         )
 
     def fits_lanes(self) -> bool:
-        """Tell whether there is a kernel for lanes for these members."""
+        """Whether a kernel for lanes exists for these members."""
         from printhammer.kernel.compile.lanes import suits
 
         if self.lane_kinds is None or self.laws.circuit or not suits(self.laws):
@@ -123,7 +125,7 @@ class Group:
 
     @property
     def lane_kernel(self) -> Kernel:
-        """The compiled kernel for lanes."""
+        """Compiled kernel for lanes."""
         from printhammer.kernel.compile.lanes import specialise_lanes
 
         if self.lane_kinds is None:
@@ -132,7 +134,7 @@ class Group:
 
 
 class _Posed(NamedTuple):
-    """The problems that members pose, drives apart: arrays with a row for each, and which is whose, `by`."""
+    """Distinct problems of the members without drives: arrays with a row each, and the row index `by`."""
 
     constants: FloatArray
     controls: FloatArray
@@ -154,7 +156,7 @@ def _posed(
     bounds: list[tuple[float, ...]] = []
     by = np.zeros(len(members), np.int64)
     peaks, peak_of = np.unique(fired.peak_of[members], return_inverse=True)
-    # A capacitor or a diode is the drive's, and lies with the hammer's constants.
+    # Capacitor and diode belong to the drive, but are stored with the constants of the hammer.
     supplies = fired.supply_of.max(initial=0) + 1
     alike = Ragged.sorted_by(
         (hammer_of[members] * len(peaks) + peak_of) * supplies + fired.supply_of[members]
@@ -165,7 +167,7 @@ def _posed(
     for places in map(alike.__getitem__, range(len(alike))):
         own = members[places]
         drive = fired.drives[own[0]]
-        # Sorted by the hammer before all else.
+        # Sorted by hammer first.
         if hammer is not hammers[hammer_of[own[0]]]:
             hammer = hammers[hammer_of[own[0]]]
             static, packed = StaticForce(hammer), constants_of(hammer)
@@ -193,7 +195,7 @@ def _scales(
     first_drive: Drive,
     states: FloatArray,
 ) -> tuple[list[tuple[float, float]], IntArray]:
-    """Return what scales there are among members with the same hammer, and which ones a member has."""
+    """Return the distinct scales of members with the same hammer, and the index for each member."""
     x, v = states[own, 1], states[own, 2]
     if hammer.position is None or hammer.front is None:
         periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
@@ -204,17 +206,17 @@ def _scales(
     way, typical = scales_of(hammer, first_drive, (float(x[0]), 0.0), static)
     if len(own) == 1:
         return [(way, max(typical, abs(float(v[0]))))], np.zeros(1, np.int64)
-    # Only what is faster than the typical speed has scales of its own.
+    # Only displacements or speeds beyond the typical ones have separate scales.
     speeds, which = np.unique(np.maximum(np.abs(v), typical), return_inverse=True)
     return [(way, speed) for speed in speeds.tolist()], which
 
 
 class Job:
-    """One integration of a group: what to keep, and the arrays that it goes to.
+    """Integration of a group: requested results, and their arrays.
 
-    Kept are what each firing did and each extra contact, both if wanted; the states at the `moments`, times
-    in s for each member of the ensemble; and the displacements at the times of the `grid`, s, in `x`, which
-    is that of the whole ensemble and used as it is where the group is the whole.
+    The results are the dots and extra contacts, if requested; the states at the `moments`, times in s for
+    each member of the ensemble; and the displacements at the times of the `grid`, s, in `x`, the array of the
+    whole ensemble, which is used directly if the group is the whole ensemble.
     """
 
     def __init__(
@@ -253,7 +255,7 @@ class Job:
         )
 
     def finish(self, x: npt.NDArray[np.float32]) -> None:
-        """Put the displacements of a group that is not the whole where they belong."""
+        """Copy the displacements of a partial group to their rows."""
         if self.kept.x is not x:
             x[self.group.members] = self.kept.x
 
@@ -268,15 +270,15 @@ class Job:
         return self._rows(self.kept.dot_starts[:-1] + self.group.firings.counts, self.kept.extra)
 
     def _rows(self, begins: IntArray, counts: IntArray) -> Ragged:
-        """Return some of the kept rows of each member, from where they begin."""
+        """Return stored rows of each member, from their starts and counts."""
         starts = starts_of(counts)
         places = np.arange(starts[-1]) + np.repeat(begins - starts[:-1], counts)
         return Ragged(self.kept.dots[places], starts)
 
     def make_room(self) -> bool:
-        """Make room for all extra contacts of members that had too little; whether there are such members.
+        """Allocate rows for all extra contacts of members with too few; return whether there are any.
 
-        They are those of the next integration, which fills their rows once more.
+        The next integration covers these members only, and fills their rows again.
         """
         kept = self.kept
         needed = self.group.firings.counts + kept.extra
@@ -293,9 +295,9 @@ class Job:
         return True
 
     def share_out(self, threads: int) -> int:
-        """Spread the members over pieces so that neighbours do not come together; return their length.
+        """Distribute neighbouring members over different pieces; return the length of a piece.
 
-        Neighbours take about the same time, and a piece is done when its longest member is.
+        Neighbours take about the same time, and a piece takes as long as its longest member.
         """
         count = self.order.size
         pieces = threads * max(1, round(count / (_PIECE * threads)))
@@ -303,18 +305,18 @@ class Job:
         return -(-count // pieces)
 
     def prepare(self, lanes: bool) -> None:
-        """Have the machine code ready, in this thread, before others need it."""
+        """Load the machine code in this thread, before other threads need it."""
         if lanes:
             self.lane_piece(0, 0)
         else:
             self._one_by_one(self.order[:0], prepare=True)
 
     def piece(self, first: int, last: int) -> None:
-        """Integrate some members of the group one by one, in this thread."""
+        """Integrate members of the group one by one, in this thread."""
         self._one_by_one(self.order[first:last])
 
     def lane_piece(self, first: int, last: int) -> None:
-        """Integrate some members of the group side by side, in this thread."""
+        """Integrate members of the group in lanes, in this thread."""
         group = self.group
         which = self.order[first:last]
         left_over = np.empty(which.size, np.int64)
@@ -356,12 +358,12 @@ class Job:
 
 
 class Form(NamedTuple):
-    """What is left of a drive without its firing times.
+    """Form of a drive: everything except its firing times.
 
     Attributes
     ----------
     table : int
-        Number of its segment tables among those of all drives.
+        Index of its segment table among those of all drives.
     replace, force : bool
         Whether a firing cuts off the pulses before it; whether it is a force.
     peak : float
@@ -378,14 +380,14 @@ class Form(NamedTuple):
 
 
 class Fired:
-    """The drives of all members of an ensemble, in the order of the members.
+    """Drives of all members of an ensemble, in the order of the members.
 
     Attributes
     ----------
     drives : sequence of Drive
         The drives themselves.
     forms, form_of : list of Form; int array, shape (members,)
-        What forms there are, and which one is a member's.
+        Distinct forms, and the index for each member.
     firings : Ragged
         Firing times of the members, s.
     begins : int array, shape (all firings,)
@@ -393,7 +395,7 @@ class Fired:
     table_of, peak_of, supply_of : array, shape (members,)
         Table, peak and number of the supply of the form of each member.
     tables, rates, kinds : list
-        The segment tables, and what `closed_form` says of each.
+        Segment tables, and the result of `closed_form` for each.
     """
 
     def __init__(self, drives: Sequence[Drive]) -> None:
@@ -411,7 +413,7 @@ class Fired:
             self.form_of = places[drives.pulse_of]
             self.begins = np.zeros(self.firings.values.size, np.int64)
         else:
-            # Members are often driven by the same object.
+            # Many members often share one drive object.
             known = {id(drive): drive for drive in drives}
             added = {key: (self._add(drive), drive.kernel_arrays()[1]) for key, drive in known.items()}
             self.form_of = np.array([added[id(drive)][0] for drive in drives], dtype=np.int64)
@@ -425,7 +427,7 @@ class Fired:
         self.supply_of = np.array([supplies[form.supply] for form in self.forms])[self.form_of]
 
     def _add(self, drive: Drive) -> int:
-        """Return the number of the form of a drive, a new one if need be."""
+        """Return the index of the form of a drive, appending a new form if necessary."""
         _times, _begins, pieces, replace, force = drive.kernel_arrays()
         content = pieces.tobytes()
         if content not in self._tables:
@@ -449,9 +451,9 @@ class Fired:
 
 
 def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
-    """Return the rates of the pieces of a set of waveforms, and what kinds of pieces there are, for lanes.
+    """Return the rates of the pieces of a set of waveforms, and the kinds of pieces, for lanes.
 
-    None instead of the kinds where the waveforms have more rates than lanes provide for.
+    The kinds are None if the waveforms have more rates than lanes support.
     """
     pieces = table[table[:, 1] != END]
     kind = pieces[:, 1]

@@ -1,4 +1,4 @@
-"""Motion: the result of one run, and what an engineer asks of it."""
+"""Motion: the result of one run."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "drive", "total")
-"""Names of the forces: equations (3), (4), (5), (6), (7), damping of the armature wherever it is, where the
-hammer has any, a drive that is a force, and their sum."""
+"""Names of the forces: equations (3), (4), (5), (6), (7), damping of the armature (if the hammer has any), a
+drive that is a force, and their sum."""
 
 PATHS: Final = ("supply", "chopped", "blocked", "backward")
-"""Paths of the current of a coil: as the supply has it, around through the diode of a chopper, none, and the
-decay of a negative current."""
+"""Paths of the current of a coil: through the supply, through the diode of a chopper, none, and decay of a
+negative current."""
 
 _BISECTIONS: Final = 52
 
 
 MOST_DOTS: Final = 40
-"""Dots that a summary shows; of more, the first and the last."""
+"""Largest number of dots shown in a summary; otherwise the first and last ones. Arbitrary."""
 
 
 def _remark(dot: Dot) -> str:
@@ -67,10 +67,10 @@ def _remark(dot: Dot) -> str:
 
 
 class Motion(Result, fields=False):
-    """The motion of one hammer under one drive, from `printhammer.simulate`.
+    """Motion of one hammer under one drive, from `printhammer.simulate`.
 
-    Everything is computed from the recorded steps when it is first asked for, with the integrator itself,
-    never by interpolation; nothing depends on the output grid.
+    All quantities are computed on first access from the recorded steps, with the integrator itself, never by
+    interpolation; nothing depends on the output grid.
     """
 
     def __init__(self, problem: Problem, record: Record, end: float, times: FloatArray, scheme: str) -> None:
@@ -102,7 +102,7 @@ class Motion(Result, fields=False):
 
     @property
     def message(self) -> str:
-        """One sentence on how the run ended; empty if it went as asked."""
+        """Reason for an early end of the run, in one sentence; empty if the run reached its end."""
         return message_of(self._record, self.hammer)
 
     @property
@@ -112,7 +112,7 @@ class Motion(Result, fields=False):
 
     @property
     def end(self) -> float:
-        """Time of the last state, s: the end asked for, or where the run stopped."""
+        """Time of the last state, s: the requested end, or where the run stopped."""
         return float(self._record.nodes[-1, 0])
 
     @property
@@ -165,7 +165,7 @@ class Motion(Result, fields=False):
 
     @property
     def driven(self) -> Literal["current", "force"]:
-        """What acts on the armature: a current in the coil (A), or a force (N)."""
+        """Quantity that drives the armature: a current in the coil (A), or a force (N)."""
         return "force" if self.drive.quantity == "force" else "current"
 
     def driven_at(self, t: npt.ArrayLike) -> FloatArray:
@@ -175,7 +175,7 @@ class Motion(Result, fields=False):
     def curves_at(
         self, t: npt.ArrayLike
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, Mapping[str, FloatArray]]:
-        """Return all that a picture shows at any times of the run, s, looked up together.
+        """Return all curves of a picture at any times of the run, s, in one pass.
 
         Displacement, m, velocity, m/s, current in the coil, A, or force of the drive, N, voltage across the
         coil, V (zero unless one drives it), and the forces by name, N.
@@ -189,7 +189,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def switchings(self) -> tuple[FloatArray, tuple[str, ...]]:
-        """Times at which the current of the coil took another path, s, and the paths: see `PATHS`."""
+        """Times at which the current of the coil changed its path, s, and the new paths: see `PATHS`."""
         if not self._problem.laws.circuit:
             return np.zeros(0), ()
         times, paths = self._record.nodes[:, 0], self._record.nodes[:, -1]
@@ -236,16 +236,16 @@ class Motion(Result, fields=False):
         return table[:, 0], table[:, 1]
 
     def state_at(self, t: float) -> tuple[float, ...]:
-        """Return the state at a time of the run, s, with which another run can go on: see `simulate`.
+        """Return the state at a time of the run, s, from which another run can continue: see `simulate`.
 
         Displacement, m, velocity, m/s, branch of the pack (-1 outside of it) and memory, m; under a voltage
-        then the currents in the coil and in its shorted turn, A, and the voltage of the supply's capacitor,
-        V. A run that begins with it and with a firing goes on as this one does.
+        also the currents in the coil and in its shorted turn, A, and the voltage of the supply's capacitor,
+        V. A run that begins with this state and with a firing continues exactly as this run does.
 
         Raises
         ------
         InputError
-            The time is outside the run, or the pack has just released the armature for good.
+            The time is outside the run, or the pack has just released the armature permanently.
         """
         (row,) = self._resampled(t)
         node = self._record.nodes[np.searchsorted(self._record.nodes[:, 0], t, side="right") - 1]
@@ -269,7 +269,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def contacts(self) -> Rows[Contact]:
-        """All contacts in order of touch, one open at the start among them; a tuple, shown as a table."""
+        """All contacts in order of touch, including one open at the start; a tuple, shown as a table."""
         rigid = self.hammer.backstop is not None and bool(
             getattr(import_module(self.hammer.backstop.module), "RIGID", False)
         )
@@ -277,18 +277,18 @@ class Motion(Result, fields=False):
 
     @cached_property
     def dots(self) -> Rows[Dot]:
-        """What each firing up to the end of the run did, in order; a tuple, shown as a table."""
+        """Dots of all firings up to the end of the run, in order; a tuple, shown as a table."""
         works = loading_works(self._problem, self._record, self.contacts, self._increments)
         return Rows(dots_of(self.drive.times, self.contacts, works, self.end), Dot)
 
     @cached_property
     def energy(self) -> Ledger:
-        """The energy ledger of the whole run."""
+        """Energy ledger of the whole run."""
         return ledger_of(self._problem, self._record, self._increments)
 
     @cached_property
     def coil_work(self) -> CoilWork:
-        """The work of the coil over the whole run: net, positive, given back, and its heat."""
+        """Work of the coil over the whole run: net, positive, recovered, and its heat."""
         return coil_work_of(self._problem, self._record)
 
     @cached_property
@@ -316,7 +316,7 @@ class Motion(Result, fields=False):
     def peak_after(self, firing: int) -> tuple[float, float] | None:
         """Return time, s, and displacement, m, of the largest local maximum from a firing to the next.
 
-        None if there is none; the position at the firing never counts.
+        The result is None without a maximum; the position at the firing never counts.
         """
         fired = self.drive.times
         if not 0 <= firing < len(fired):
@@ -333,11 +333,11 @@ class Motion(Result, fields=False):
 
     @property
     def title(self) -> str:
-        """One line that says what the motion is."""
+        """Title of the motion, one line."""
         return f"motion of {self.hammer.name}, {self.start:.9g} s to {self.end:.9g} s"
 
     def summary(self) -> Summary:
-        """Return the dots, and status, peak, contacts and energies."""
+        """Summarise dots, status, peak, contacts and energies."""
         lost = len(self.dots) - sum(dot.struck for dot in self.dots)
         state = judged(self.ok, "ok" if self.ok else self.status, "bad")
         missing = f", {styled('bad', f'{lost} lost')}" if lost else ""
@@ -379,7 +379,7 @@ class Motion(Result, fields=False):
         return Summary([Grid(columns, most=MOST_DOTS), "", energies])
 
     def _energy_facts(self) -> list[FactRow]:
-        """Return where the energy came from and went to, and the residual of the ledger."""
+        """Return the energies of the run and the residual of the ledger, for the summary."""
         energy, rows = self.energy, list[FactRow]()
         if self.drive.quantity == "voltage":
             eddies = f" + eddies {quantity(energy.eddy_loss, 'J')}" if energy.eddy_loss else ""
@@ -408,7 +408,7 @@ class Motion(Result, fields=False):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the motion comes from: fingerprints, versions, tolerance."""
+        """Provenance of the motion: fingerprints, versions, tolerance."""
         return provenance(
             hammer=self.hammer,
             drive=self.drive,
@@ -441,7 +441,7 @@ class Motion(Result, fields=False):
         write_parquet(self.to_pandas(), path)
 
     def write(self, path: Path) -> None:
-        """Write the motion: by a name in .json `to_json`, else its record as `save` does."""
+        """Write the motion: for a name in .json like `to_json`, else its record like `save`."""
         if path.suffix.lower() == ".json":
             write_file(path, self.to_json())
         else:
@@ -471,7 +471,7 @@ class Motion(Result, fields=False):
 
 
 def _named(row: Dot | Contact) -> dict[str, Any]:
-    """Return a dot or contact by names such as "flight_time_s"."""
+    """Return a dot or contact as a dictionary with names such as "flight_time_s"."""
     units = {name: note.unit for name, note in columns_of(type(row)).items()}
     return {
         f"{key}_{units[key].replace('/', '_per_')}" if units[key] else key: value

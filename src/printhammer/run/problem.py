@@ -1,6 +1,6 @@
-"""A hammer and a drive made ready for the kernel: laws bound, constants in one array, scales chosen.
+"""Problem for the kernel: a hammer and a drive with laws bound, constants packed and scales chosen.
 
-The only place that turns the objects of the public face into what the kernel works with.
+This module is the only one that converts public objects to arguments of the kernel.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from printhammer.support.arrays import FloatArray
 T = TypeVar("T")
 
 TOLERANCE: Final = 2e-11
-"""Default tolerance: error allowed in one step, in units of the stroke and of a typical speed."""
+"""Default tolerance: error of one step, in units of the stroke and of a typical speed."""
 
 LEAST_TOLERANCE: Final = 1e-15
 LARGEST_TOLERANCE: Final = 1e-5
-"""With larger ones steps would be so long that the curves between their ends say little about the motion."""
+"""Largest tolerance; with larger ones the curves between the ends of steps would be inaccurate."""
 
 MAX_STEPS: Final = 50_000_000
 FAR: Final = 1e4
-"""Distance from the origin, in strokes, beyond which the armature counts as run away."""
+"""Distance from the origin, in strokes, beyond which the armature counts as runaway; arbitrary."""
 
 _NODES: Final = 2048
 _CONTACTS: Final = 256
@@ -57,7 +57,7 @@ def node_width(laws: Laws) -> int:
 
 
 class Record(Declared):
-    """What the kernel recorded of one run; see `printhammer.kernel.single.record`."""
+    """Record of one run by the kernel; see `printhammer.kernel.single.record`."""
 
     status: int = part("code of the status")
     nodes: FloatArray = part(
@@ -76,7 +76,7 @@ class Record(Declared):
 
 
 class Stretch(Declared):
-    """Part of a record, up to a pause or the end; its arrays are overwritten by the next one."""
+    """Part of a record, up to a pause or the end; the next stretch overwrites its arrays."""
 
     status: int = part("code of the status, PAUSED but for the last")
     nodes: FloatArray = part("as in `Record`", more="the first one is the last of the stretch before")
@@ -87,13 +87,13 @@ class Stretch(Declared):
 
 
 class _TooLong(Exception):
-    """A stretch does not fit."""
+    """A stretch does not fit into the arrays."""
 
 
 def fresh_carry(
     start: float, state: tuple[float, float], pause_after: float = math.inf, beyond: Beyond = AT_REST
 ) -> FloatArray:
-    """Return the state with which the kernel's `run` begins, and pauses after so many nodes."""
+    """Return the initial state array of the kernel's `run`, which pauses after `pause_after` nodes."""
     array = np.zeros(carry.SIZE)
     array[carry.TIME] = start
     array[carry.POSITION_NOW], array[carry.VELOCITY] = state
@@ -107,7 +107,7 @@ def fresh_carry(
 
 
 def check_tolerance(tolerance: object) -> None:
-    """Refuse a tolerance with which the integrator does not work."""
+    """Check that the integrator supports a tolerance."""
     if not (isinstance(tolerance, float | int) and LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE):
         raise InputError.of(
             "tolerance", tolerance, f"a number from {LEAST_TOLERANCE:g} to {LARGEST_TOLERANCE:g}"
@@ -158,12 +158,12 @@ def constants_of(hammer: Hammer) -> FloatArray:
 def scales_of(
     hammer: Hammer, drive: Drive, state: tuple[float, float], static: StaticForce | None = None
 ) -> tuple[float, float]:
-    """Return a typical displacement [m] and speed [m/s] of a hammer, by which tolerances are measured.
+    """Return a typical displacement [m] and speed [m/s] of a hammer, the units of tolerances.
 
-    The displacement is the way from the backstop to the pack. Without one of them it is how far the forces
-    would bring the mass in one period of the drive or of its own, or the distance of the initial state. The
-    speed is what the largest force gives the mass over that way. The `static` force is that of the hammer,
-    made here where it is not at hand.
+    The displacement is the distance from the backstop to the pack. If one of them is missing, it is the
+    distance that the forces would move the mass in one period of the drive or of the hammer, or that of the
+    initial state. The speed is what the largest force imparts to the mass over that distance. `static` is the
+    static force of the hammer, computed if not passed.
     """
     if static is None:
         static = StaticForce(hammer)
@@ -194,27 +194,27 @@ def scales_of(
 
 
 def control_of(scales: tuple[float, float], tolerance: float) -> tuple[float, float, float, float]:
-    """Return what the kernel controls its steps by."""
-    # The eighth order is controlled through the estimates of the sixth and the seventh.
+    """Return the step-size control of the kernel: scales, and allowances of the error estimates."""
+    # The eighth order is controlled through the estimates of orders six and seven.
     return (*scales, (10.0 * tolerance) ** (7.0 / 9.0), 10.0 * tolerance)
 
 
 def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float, float, float]:
-    """Return where the force law of a hammer holds, its origin, and how far from it counts as run away."""
+    """Return the displacement range of the force law, the origin, and the distance that counts as runaway."""
     low, high = hammer.magnet.domain if hammer.magnet is not None else (-math.inf, math.inf)
     return (low, high, hammer.origin, FAR * scales[0])
 
 
 class Problem:
-    """One hammer under one drive, ready to be integrated.
+    """Hammer under a drive, ready for integration.
 
     The state, displacement, m, and velocity, m/s, is that at the time `start`, s. The tolerance is the error
-    allowed in one step, in units of the stroke and of a typical speed. In the pack and under a voltage more
-    belongs to the state, which is `beyond`.
+    of one step, in units of the stroke and of a typical speed. In the pack and under a voltage the state has
+    further components, `beyond`.
     """
 
     max_steps: int | None = None
-    """Number of steps after which a run is given up; None: `MAX_STEPS`."""
+    """Largest number of steps of the run; None: `MAX_STEPS`."""
 
     def __init__(
         self,
@@ -236,7 +236,7 @@ class Problem:
         if self.laws.circuit:
             take_supply(self.constants, hammer, drive)
         firings, begins, pieces, self.replace, _force = drive.kernel_arrays()
-        # The kernel is compiled for arrays that may be written to.
+        # The kernel is compiled for writable arrays.
         self.firings = np.array(firings, dtype=np.float64)
         self.begins = np.array(begins, dtype=np.int64)
         self.pieces = np.array(pieces, dtype=np.float64)
@@ -246,13 +246,13 @@ class Problem:
 
     @cached_property
     def kernel(self) -> Kernel:
-        """The compiled kernel for the laws of this hammer."""
+        """Compiled kernel for the laws of this hammer."""
         from printhammer.kernel.compile.specialise import specialise
 
         return specialise(self.laws)
 
     def leave_out(self, surface: Literal["pack", "backstop"]) -> None:
-        """Have the armature never meet a surface: put it out of reach, all forces else being as they were."""
+        """Move a surface out of reach of the armature, leaving all other forces unchanged."""
         away = FAR * self.scales[0]
         if surface == "pack":
             self.constants[layout.FRONT] += away
@@ -260,14 +260,14 @@ class Problem:
             self.constants[layout.POSITION] -= away
 
     def drive_arrays(self) -> tuple[Any, ...]:
-        """Return what the kernel needs of the drive, with working space: see its `Train`."""
+        """Return the kernel's `Train` of the drive, with working space."""
         count = self.firings.size
         under_way, live = np.zeros(count, np.int64), np.zeros(live_size(count))
         return (self.firings, self.begins, self.pieces, self.replace, under_way, live)
 
     @property
     def columns(self) -> int:
-        """Number of columns that `resample` fills."""
+        """Number of columns filled by `resample`."""
         return 15 if self.laws.circuit else 10
 
     @property
@@ -277,16 +277,16 @@ class Problem:
 
     @property
     def linkage_scale(self) -> float:
-        """Flux linkage that a typical current in the coil makes, Wb."""
+        """Flux linkage of a typical current in the coil, Wb."""
         return float(self.constants[layout.LINKAGE_SCALE])
 
     def room(self, count: int) -> FloatArray:
-        """Return an array for so many nodes."""
+        """Return an array for a number of nodes."""
         return np.empty((count, node_width(self.laws)))
 
     def run(self, end: float) -> Record:
         """Integrate to time `end`, s."""
-        # A generous guess; memory that is not written to costs nothing, a repeated run does.
+        # A generous guess: unused memory costs nothing, a repeated run does.
         flights = min(max(end - self.start, 0.0) * self.scales[1] / self.scales[0], _MOST_FLIGHTS)
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
         contact_capacity = _CONTACTS + int(flights)
@@ -310,7 +310,7 @@ class Problem:
         contacts: FloatArray,
         state: FloatArray,
     ) -> tuple[int, int, int, int]:
-        """Run to time `end`, s, or to a pause, from the start or from where `state` says."""
+        """Run to time `end`, s, or to a pause, from the start or from `state`."""
         status, used, touched, steps = self.kernel.run(
             (drive, self.constants, self.control, self.bounds, max_steps),
             float(end),
@@ -321,11 +321,10 @@ class Problem:
         return status, used, touched, steps
 
     def in_stretches(self, end: float, capacity: int, take: Callable[[Iterator[Stretch]], T]) -> T:
-        """Integrate to time `end`, s, and have the record taken in stretches: memory does not grow with it.
+        """Integrate to time `end`, s, and process the record in stretches, so that memory does not grow.
 
-        `take` gets the stretches, of `capacity` nodes at most, one after the other and need not take all;
-        where one contact alone has more nodes than fit, it is called again with longer ones. Returns what it
-        returns.
+        `take` receives an iterator of stretches of at most `capacity` nodes, and need not consume all; if a
+        single contact has more nodes, it is called again with longer stretches. Returns the result of `take`.
         """
         while True:
             try:
@@ -339,12 +338,12 @@ class Problem:
         status = PAUSED
         while status == PAUSED:
             status, used, touched, _steps = self._advance(end, MAX_STEPS, drive, nodes, contacts, state)
-            # A contact begins with a node: where the nodes fit, the contacts do.
+            # A contact begins with a node: if the nodes fit, the contacts fit.
             if used > capacity:
                 raise _TooLong
             yield Stretch(status, nodes[:used], contacts[:touched], float(state[carry.TIME]))
             if touched:
-                # A contact that is open at a pause is the first one of the next stretch.
+                # A contact open at a pause is the first contact of the next stretch.
                 contacts[0] = contacts[touched - 1]
 
     def resample(self, record: Record, times: FloatArray) -> FloatArray:
@@ -375,7 +374,7 @@ class Problem:
 
 
 def message_of(record: Record, hammer: Hammer) -> str:
-    """Return one sentence on how a run ended; empty if it went as asked."""
+    """Describe the early end of a run in one sentence; empty if the run reached its end."""
     if record.status == OK:
         return ""
     time, x = record.nodes[-1, 0], record.nodes[-1, 1]

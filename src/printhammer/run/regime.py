@@ -1,8 +1,8 @@
-"""Regime: this hammer, fired like this, for ever; with every constant in reach by name.
+"""Regime: a hammer under a periodic drive without end, with all constants accessible by name.
 
-The k-th firing of a train is at k times its period; a rate is its period said in another way, 1 / rate.
+The k-th firing of a train is at k times its period; a rate is converted to the period 1 / rate.
 
-The window in which strobe points are drawn, and in whose half-widths their distances are measured.
+`Window` is the window in which strobe points are drawn; distances are measured in its half-widths.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PAPER_X: Final = (38.1e-6, 88.9e-6)
 """Displacements of the window of Fig. 11 of Hendriks (1983), m: 0.0015 to 0.0035 in."""
 
 PAPER_V: Final = (-0.635, 0.635)
-"""Velocities of the same, m/s: -25 to +25 in/s."""
+"""Velocities of the window of Fig. 11, m/s: -25 to +25 in/s."""
 
 PAPER_BACKSTOP: Final = 50.8e-6
 PAPER_FRONT: Final = 203.2e-6
@@ -51,7 +51,7 @@ _PART: Final = 1.0 / 6.0
 
 
 class Window(Declared):
-    """A rectangle in the plane of displacement and velocity."""
+    """Rectangle in the plane of displacement and velocity."""
 
     x: tuple[float, float] = scalar("m", "least and largest displacement")
     v: tuple[float, float] = scalar("m/s", "least and largest velocity")
@@ -67,17 +67,17 @@ class Window(Declared):
 
 
 PAPER_WINDOW: Final = Window(PAPER_X, PAPER_V)
-"""The window of Fig. 11."""
+"""Window of Fig. 11."""
 
 
 def window_of(hammer: Hammer, drive: Drive) -> Window:
     """Return the window of a hammer under a drive.
 
-    That of Fig. 11 for a hammer whose backstop and pack are where the paper has them. For others its
-    half-widths are a sixth of the way from backstop to pack, as in Fig. 11, and a sixth of the speed that
-    the largest force gives the armature over that way; where a hammer lacks one of them and nothing bounds
-    the motion, the whole of its scales (`printhammer.run.problem.scales_of`). As in Fig. 11 the backstop, or
-    the origin, lies a quarter of its width from the left.
+    The window is that of Fig. 11 for a hammer whose backstop and pack are where the paper has them. For other
+    hammers its half-widths are a sixth of the distance from backstop to pack, as in Fig. 11, and a sixth of
+    the speed that the largest force imparts to the armature over that distance; if a hammer lacks one of them
+    and nothing bounds the motion, its scales (`printhammer.run.problem.scales_of`). As in Fig. 11 the
+    backstop, or the origin, lies a quarter of the width from the left.
     """
     place, front = hammer.position, hammer.front
     if (
@@ -96,7 +96,7 @@ _FORCE: Final = ("amplitude", "phase")
 
 
 class Firing(TypedDict, total=False):
-    """What a verb takes beside a hammer to say how it is fired; see `Regime.of`."""
+    """Keywords that state how a hammer is fired; see `Regime.of`."""
 
     period: float | str | None
     rate: float | str | None
@@ -107,15 +107,15 @@ class Firing(TypedDict, total=False):
 
 
 class Fired(Firing, Keywords):
-    """What a verb takes to say how a hammer is fired, beside its effort."""
+    """Keywords that state how a hammer is fired, and the effort."""
 
 
 class FiredAtFixedTolerance(Firing, AtFixedTolerance):
-    """What a verb that chooses its tolerances itself takes to say how a hammer is fired."""
+    """Keywords that state how a hammer is fired, for functions with fixed tolerances."""
 
 
 class Regime(Declared):
-    """A hammer and its periodic drive: a waveform fired every `period`, or an endless force."""
+    """Hammer under a periodic drive: a waveform fired every `period`, or an endless force."""
 
     hammer: Hammer = part("the hammer")
     period: float = scalar("s", "time between firings, or period of the force")
@@ -144,29 +144,28 @@ class Regime(Declared):
         overlap: Overlap | None = None,
         phase: float | None = None,
     ) -> Regime:
-        """Return the regime that the arguments of a verb mean.
+        """Return the regime described by the arguments of a public function.
 
         Parameters
         ----------
         hammer : Hammer or Regime
-            The hammer. A regime stands for itself, and takes no other argument beside it than a phase.
+            The hammer. A regime is returned as it is; only a phase may accompany it.
         period, rate : float or str
-            Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is taken as
-            well.
+            Time between firings, s, or firings per second, Hz; one of the two. Text with a unit is accepted.
         waveform : Waveform, optional
-            What every firing does; by default the waveform of the hammer.
+            Waveform of every firing; by default that of the hammer.
         drive : Drive, optional
-            Instead of a waveform, period and rate: an endless force, whose own period counts.
+            Endless force with a period, instead of waveform, period and rate.
         overlap : str, optional
             "add" or "replace".
         phase : float, optional
-            Part of the period between a firing and the section, from 0 up to but not including 1.
+            Phase of the section after a firing, as a fraction of the period in [0, 1).
 
         Raises
         ------
         InputError
-            There is nothing to fire, a period or rate is not positive or not the only one of the two, the
-            drive is no endless force with a period, or the phase is none.
+            There is no waveform, period and rate are not exactly one positive number, the drive is not an
+            endless force with a period, or the phase is invalid.
         """
         part = 0.0 if phase is None else read_phase(phase)
         if isinstance(hammer, Regime):
@@ -194,18 +193,18 @@ class Regime(Declared):
         waveform_of(hammer, waveform)
         time = period_of_rate(rate) if rate is not None else read_positive(period or 0.0, "s", "period")
         regime = cls(hammer, time, waveform, None, overlap, part)
-        # Refuses what no train can fire: an endless waveform, an unknown rule for overlapping pulses.
+        # The train rejects endless waveforms and unknown overlap rules.
         regime.pulses(1)
         return regime
 
     @classmethod
     def of_firing(cls, hammer: Hammer | Regime, firing: Firing) -> Regime:
-        """Return the regime that the keywords of a verb mean, see `of`."""
+        """Return the regime described by the keywords of a public function; see `of`."""
         return cls.of(hammer, **firing)
 
     @property
     def fired(self) -> Waveform:
-        """What every firing does, or the endless force."""
+        """Waveform of every firing, or the endless force."""
         if self.drive is not None:
             return self.drive.waveform
         return waveform_of(self.hammer, self.waveform)
@@ -217,9 +216,9 @@ class Regime(Declared):
 
     @property
     def is_planar(self) -> bool:
-        """Whether displacement and velocity are all of the state at a section where no current flows.
+        """Whether displacement and velocity are the whole state at a section without current.
 
-        Under a voltage they are not with a shorted turn, nor with a capacitor as the supply.
+        Under a voltage they are not if the coil has a shorted turn, or the supply a capacitor.
         """
         if self.fired.quantity != "voltage":
             return True
@@ -227,7 +226,7 @@ class Regime(Declared):
         return not turn and self.fired.supply().capacitance == 0.0
 
     def check_planar(self) -> None:
-        """Refuse what has more to its state than displacement and velocity."""
+        """Raise InputError if the state has more components than displacement and velocity."""
         if not self.is_planar:
             raise InputError(
                 "the state at a section is displacement and velocity: expected no shorted turn and no"
@@ -237,9 +236,9 @@ class Regime(Declared):
 
     @property
     def memory(self) -> int:
-        """Number of pulses fired before one that can still be under way with it; 0 for an endless force.
+        """Number of earlier pulses that can still be active at a firing; 0 for an endless force.
 
-        A train that has fired so many looks the same at every firing that follows.
+        After that many firings a train looks the same at every later firing.
         """
         if self.drive is not None:
             return 0
@@ -249,20 +248,20 @@ class Regime(Declared):
 
     @property
     def at_firings(self) -> Self:
-        """The same, looked at when it is fired."""
+        """The same regime with the section at the firing."""
         return self if self.phase == 0.0 else replace(self, phase=0.0)
 
     def pulses(self, count: int) -> Drive:
-        """Return a drive of so many pulses from time 0 on, with none before; or the endless force."""
+        """Return a drive of `count` pulses from time 0, with none before; or the endless force."""
         if self.drive is not None:
             return self.drive
         return PulseTrain(self.fired, period=self.period, pulses=count, overlap=self.overlap)
 
     def train(self, firings: int) -> tuple[Drive, float]:
-        """Return a drive that looks the same at so many firings and after them, and the time of the first, s.
+        """Return a drive with identical history at `firings` firings, and the time of the first, s.
 
-        Everything that was fired before is under way then; one more pulse is fired at the end, so that no
-        state depends on where that is.
+        All earlier pulses are active at the first firing; one more pulse is fired at the end, so that no
+        state depends on the position of the end.
         """
         if self.drive is not None:
             return self.drive, float(self.drive.times[0])
@@ -283,7 +282,7 @@ class Regime(Declared):
 
     @property
     def window(self) -> Window:
-        """The window in which strobe points are drawn, and in whose half-widths distances are measured."""
+        """Window in which strobe points are drawn; its half-widths are the unit of distances."""
         return window_of(self.hammer, self.train(1)[0])
 
     def value(self, name: str) -> float:
@@ -345,7 +344,7 @@ class Regime(Declared):
 
     @property
     def names(self) -> list[str]:
-        """Names of all constants that `with_` takes."""
+        """Names of all constants that `with_` accepts."""
         own = self.waveform
         names = [name for name in self.hammer.constants if own is None or not name.startswith(WAVEFORM)]
         if own is not None:
@@ -375,7 +374,7 @@ class Regime(Declared):
 
 
 def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
-    """Return a waveform to fire, by default that of a hammer; InputError where it has none."""
+    """Return the waveform to fire, by default that of the hammer; InputError if there is none."""
     fired = hammer.waveform if waveform is None else waveform
     if fired is None:
         raise InputError(
@@ -385,7 +384,7 @@ def waveform_of(hammer: Hammer, waveform: Waveform | None) -> Waveform:
 
 
 def read_phase(phase: float) -> float:
-    """Read a part of the period."""
+    """Parse a phase, a fraction of the period."""
     part = read_number(phase, "1", "phase")
     if not 0.0 <= part < 1.0:
         raise InputError.of("phase", phase, "a part of the period from 0 up to but not including 1")
@@ -406,11 +405,11 @@ def regimes_of(
     Parameters
     ----------
     hammers : Hammer or Regime, or sequence of them
-        One for all trains, or one for each; regimes take no other argument beside them than a phase.
+        One hammer for all trains, or one for each; only a phase may accompany regimes.
     periods : sequence, optional
         Times between firings, s or text with a unit, one for each train, or a single one for all hammers.
     drives : sequence of Drive, optional
-        Instead of periods: endless forces.
+        Endless forces, instead of periods.
     waveform, overlap, phase
         As for `Regime.of`, for all trains.
     """

@@ -1,8 +1,8 @@
-"""Runs of the paper's two integrators, recorded like those of the default one.
+"""Runs of the paper's two integrators, recorded like those of the default integrator.
 
-Between the ends of its fixed steps such a run has no motion of its own: the cubic through position and
-velocity at both ends stands in for it. Touches lie at the first step end in a contact, since the schemes
-locate nothing.
+Between the ends of fixed steps such a run has no defined motion; the cubic through position and velocity at
+both ends replaces it. A touch is recorded at the first step end inside a contact, since the schemes locate no
+switches.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray, IntArray
 
 READINGS = schemes_1983.READINGS
-"""Ways to read when the short step is taken, see `printhammer.kernel.schemes_1983`."""
+"""Rules for the short step, see `printhammer.kernel.schemes_1983`."""
 
 Reading = schemes_1983.Reading
 Scheme = schemes_1983.Scheme
@@ -32,12 +32,11 @@ _GAUSS = np.polynomial.legendre.leggauss(4)
 
 
 class SchemeProblem(Problem):
-    """One hammer under one drive, to be integrated with a scheme of 1983.
+    """Hammer under a drive, integrated with a scheme of 1983.
 
-    Arguments as for `Problem`, the tolerance of no use; `scale` is a factor on all steps of the paper's
-    schedule, and `reading`, one of `READINGS`, says when its short steps
-    begin and end. InputError where the factor is not positive, or the
-    hammer has damping.
+    Arguments as for `Problem`, with the tolerance ignored; `scale` is a factor on all steps of the paper's
+    schedule, and `reading`, one of `READINGS`, the rule for its short steps. InputError if the factor is not
+    positive, or the hammer has damping.
     """
 
     def __init__(
@@ -101,7 +100,7 @@ class SchemeProblem(Problem):
     ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, str]:
         """Return time, displacement, velocity, mode and memory at moments, s, and the status.
 
-        Where the scheme failed before they are nan, the mode -1.
+        After a failure of the scheme they are NaN, and the mode is -1.
         """
         run = self.integrate(float(moments[-1]), moments)
         t, x, v, memory = np.full((4, moments.size), np.nan)
@@ -115,7 +114,7 @@ class SchemeProblem(Problem):
         return t, x, v, mode, memory, run.status
 
     def run(self, end: float) -> Record:
-        """Integrate to time `end`, s; a run that diverged has the status of a step that cannot be taken."""
+        """Integrate to time `end`, s; a diverged run has the status of a step underflow."""
         run = self.integrate(end)
         nodes = self._nodes(run.t, run.x, run.v)
         return Record(
@@ -127,7 +126,7 @@ class SchemeProblem(Problem):
         return bool(getattr(self._modules.get("backstop"), "RIGID", False))
 
     def _nodes(self, t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-        """Return step ends as nodes, each with the mode that its state is in, as the schemes see it."""
+        """Return step ends as nodes, each with the mode of its state as the schemes see it."""
         position, front = self.hammer.position, self.hammer.front
         keep = np.isfinite(x) & np.isfinite(v)
         nodes = np.zeros((int(keep.sum()), 5))
@@ -222,7 +221,7 @@ class SchemeProblem(Problem):
 
 
 def _contacts(nodes: FloatArray) -> FloatArray:
-    """Return the contacts of a run recorded at step ends, as the kernel records them."""
+    """Return the contacts of a run recorded at step ends, in the format of the kernel."""
     surface = np.where(nodes[:, 3] == M.BACKSTOP, M.BACKSTOP_SURFACE, -1)
     surface = np.where((nodes[:, 3] == M.LOADING) | (nodes[:, 3] == M.UNLOADING), M.PACK_SURFACE, surface)
     changes = np.flatnonzero(np.diff(surface)) + 1

@@ -1,6 +1,6 @@
-"""The one entry to the kernel: a hammer, a drive, and out comes the motion.
+"""Entry point of simulations: from hammer and drive to a motion.
 
-Touches of a surface in a long run: only they are kept, so that memory does not grow with its length.
+`touches_of` stores only the touches of a surface in a long run, so that memory does not grow with its length.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from printhammer.support.arrays import FloatArray
 
 Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
 SCHEMES: Final = get_args(Scheme)
-"""Integrators: located contacts and high order; the two of the paper."""
+"""Integrators: the default, with located contacts and high order; and the two of the paper."""
 
 _FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100
 
@@ -60,10 +60,10 @@ def simulate(
         Displacement, m, and velocity, m/s, or text with units, at time 0; by default the rest state. In the
         pack with the mode and the memory, as in `printhammer.run.ensemble.Strobes`; under a voltage then with
         the current in the coil, A, or with that, the current in its shorted turn, A, and the voltage of the
-        supply's capacitor, V; by default there is no current, and the capacitor is charged.
-        `Motion.state_at` hands out all.
+        supply's capacitor, V; by default there is no current, and the capacitor is charged. `Motion.state_at`
+        returns all components.
     tolerance : float, optional
-        Error allowed in one step, in units of the way from backstop to pack and of a typical speed.
+        Error tolerance of one step, in units of the distance from backstop to pack and of a typical speed.
     points : int, optional
         Number of points of a uniform output grid; by default about a hundred in the time of one flight.
     times : array, optional
@@ -102,11 +102,11 @@ def simulate(
 
 
 def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) -> Callable[[], None]:
-    """Have `callback` called with a sentence before machine code is made; return what ends that.
+    """Register a callback for a sentence before compilation; return a function that unregisters it.
 
-    The sentence tells what is compiled, about how long that takes, and what may follow. Others tell, once,
-    where machine code cannot be kept, or why that on disk does not fit. Where `helped`, a second process
-    compiles as well.
+    The sentence names what is compiled and the expected duration. Further sentences report, once, that
+    machine code cannot be cached, or why cached code does not fit. If `helped`, a second process compiles as
+    well.
     """
     from printhammer.kernel.compile import cache, specialise
     from printhammer.run import ahead
@@ -128,7 +128,7 @@ def end_of_run(hammer: Hammer, drive: Drive, duration: float | str | None) -> fl
     Raises
     ------
     InputError
-        Not a positive number or a time with a unit; none for a drive that does not end.
+        The duration is not a positive number or a time with a unit; or it is missing for an endless drive.
     """
     if duration is None:
         if not math.isfinite(drive.end):
@@ -177,9 +177,10 @@ class Touches(Declared):
 
 
 def touches_of(problem: Problem, surface: Surface, after: float, end: float, most: int) -> Touches:
-    """Return the first touches of a surface in a run, `most` at most, after which it ends.
+    """Return the first touches of a surface in a run, at most `most`, which end the run.
 
-    They count from the time `after`, s, up to the `end` of the run, s; a contact open at its start is none.
+    Touches count from the time `after`, s, up to the `end` of the run, s; a contact open at its start does
+    not count.
     """
 
     def take(stretches: Iterator[Stretch]) -> Touches:

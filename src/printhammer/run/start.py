@@ -1,4 +1,4 @@
-"""The state in which a run begins: the rest state, or one that is checked.
+"""Initial state of a run: the rest state, or a validated state.
 
 In the pack its branch and memory belong to the state, under a voltage the currents of the coil: see `Beyond`.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class Beyond(NamedTuple):
-    """What belongs to a state beside displacement and velocity; by default outside the pack, without current.
+    """Components of a state besides displacement and velocity; by default outside the pack, without current.
 
     The branch of the pack, a place in `printhammer.run.ensemble.MODE_NAMES` or -1 (as follows from
     displacement and velocity), and the latest local maximum in the pack, m; under a voltage the currents in
@@ -42,7 +42,7 @@ class Beyond(NamedTuple):
 
 AT_REST: Final = Beyond()
 FORMS: Final = {2: (), 3: (2,), 4: (0, 1), 5: (2, 3, 4), 7: (0, 1, 2, 3, 4)}
-"""Lengths of a state, and what of `Beyond` follows displacement and velocity in it."""
+"""Lengths of a state, and the fields of `Beyond` that follow displacement and velocity in it."""
 
 STATE: Final = (
     "displacement in m and velocity in m/s; in the pack with branch and memory in m; under a voltage then"
@@ -50,7 +50,7 @@ STATE: Final = (
 )
 
 HELD_BRANCHES: Final = {HELD_LOADING: LOADING, HELD_UNLOADING: UNLOADING}
-"""Branches of the pack on which the armature rests, and those that they are part of."""
+"""Branches of the pack on which the armature rests, and the branches to which they belong."""
 
 _UNITS: Final = ("m", "m/s")
 _UNITS_BEYOND: Final = ("1", "m", "A", "A", "V")
@@ -60,12 +60,12 @@ _BRANCHES = {LOADING: "loading", UNLOADING: "unloading", RELOADING: "reloading"}
 
 
 def read_state(state: Sequence[Any]) -> tuple[float, ...]:
-    """Read a state in any of its forms, in SI or as text with units.
+    """Parse a state in any of its forms, in SI or as text with units.
 
     Raises
     ------
     InputError
-        It has none of these forms, or a text has no unit.
+        The state has none of these forms, or a text has no unit.
     """
     units = (*_UNITS, *(_UNITS_BEYOND[place] for place in FORMS.get(len(state), ())))
     if len(units) != len(state):
@@ -109,13 +109,13 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
 
 
 def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -> Beyond:
-    """Return what of a state follows displacement and velocity, under a drive by a quantity.
+    """Return the components of a state besides displacement and velocity, for a driven quantity.
 
     Raises
     ------
     InputError
-        None of the forms of a state, or not finite; no such branch of the pack; currents without a voltage,
-        or in a shorted turn that the coil has not.
+        The state has none of the valid forms, or is not finite; the branch is unknown; currents are set
+        without a voltage drive, or in a missing shorted turn.
     """
     numbers = tuple(float(number) for number in state or (0.0, 0.0))
     places = FORMS.get(len(numbers))
@@ -147,9 +147,9 @@ def state_beyond(hammer: Hammer, state: Sequence[float] | None, quantity: str) -
 def state_to_begin(
     hammer: Hammer, x: float, v: float, mode: int, memory: float
 ) -> tuple[float, float, float, float] | None:
-    """Return displacement, velocity, branch and memory with which another run goes on where one is in a mode.
+    """Return displacement, velocity, branch and memory from which another run can continue.
 
-    None where none can, since the pack has released the armature.
+    None if no run can, since the pack has released the armature.
     """
     branch = HELD_BRANCHES.get(mode, mode)
     if mode == PACK_RELEASED:
@@ -168,7 +168,8 @@ def check_branch(hammer: Hammer, state: Sequence[float]) -> None:
     Raises
     ------
     InputError
-        No such branch; a displacement outside the pack; a memory that is not a displacement passed before.
+        The branch is unknown, the displacement lies outside the pack, or the memory is not a displacement
+        passed before.
     """
     x, _v, branch, memory = (float(number) for number in state[:4])
     if branch not in _BRANCHES or hammer.front is None:

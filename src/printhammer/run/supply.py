@@ -1,4 +1,4 @@
-"""What the kernel has to know of a supply and of the coil on it, and whether the two make a circuit."""
+"""Supply and coil of a voltage drive: the circuit for the kernel, and its validation."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from printhammer.parts.coil import Winding
 from printhammer.support.arrays import FloatArray
 
 _PLACES: Final = 33
-"""Places on the way of the armature at which the inductance is looked at."""
+"""Positions along the travel of the armature at which the inductance is checked; arbitrary."""
 
 _SHORT: Final = 1e-3
-"""Time, s, in which a coil without resistance is taken to reach its typical current."""
+"""Time, s, in which a coil without resistance is assumed to reach its typical current; arbitrary."""
 
 
 def waveforms_of(drive: Drive) -> tuple[Waveform, ...]:
-    """Return the waveforms that a drive fires, each once."""
+    """Return the distinct waveforms that a drive fires."""
     fired = getattr(drive, "waveforms", None) or (drive.waveform,)
     return tuple(dict.fromkeys(fired))
 
@@ -46,7 +46,7 @@ def winding_of(hammer: Hammer) -> Winding:
     Raises
     ------
     InputError
-        The hammer has no coil, its resistance is not stated, or the magnet's law links no flux.
+        The hammer has no coil, its resistance is not stated, or the magnet's law has no flux linkage.
     """
     coil = hammer.coil
     if not isinstance(coil, Winding) or coil.resistance is None:
@@ -111,7 +111,7 @@ def _law(hammer: Hammer, name: str) -> Any:
 
 
 def typical_current(hammer: Hammer, drive: Drive) -> float:
-    """Return the largest current that a drive by voltage lets flow for long, A."""
+    """Return the largest current that a voltage drive sustains, A."""
     coil = winding_of(hammer)
     largest = 0.0
     for waveform in waveforms_of(drive):
@@ -141,17 +141,17 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
 
 
 def current_scale(hammer: Hammer, drive: Drive) -> float:
-    """Return by what differences of the current in a coil are divided, A: 1 where no voltage drives it."""
+    """Return the scale of differences of the coil current, A: 1 without a voltage drive."""
     return typical_current(hammer, drive) if drive.quantity == "voltage" else 1.0
 
 
 def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
-    """Put the supply, and the scales of current and flux linkage, into the array of constants.
+    """Write the supply, and the scales of current and flux linkage, into the array of constants.
 
     Raises
     ------
     InputError
-        The hammer has no circuit for a voltage, or its flux linkage does not rise with the current.
+        The hammer has no circuit for a voltage, or its flux linkage does not increase with the current.
     """
     coil, supply = winding_of(hammer), supply_of(drive)
     current = typical_current(hammer, drive)
@@ -165,7 +165,7 @@ def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
 
 
 def check_linkage(hammer: Hammer, current: float) -> None:
-    """Refuse a coil whose flux linkage does not rise with the current on the way of the armature."""
+    """Check that the flux linkage of a coil increases with the current along the travel of the armature."""
     coil = winding_of(hammer)
     low = hammer.origin
     ends = [place for place in (hammer.front, hammer.platen) if place is not None]

@@ -1,4 +1,4 @@
-"""Windows of many devices (`printhammer.run.window`), their single pulses run as ensembles."""
+"""Windows of many devices (`printhammer.run.window`), with their single pulses run as ensembles."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from printhammer.support.arrays import FloatArray
 def waits_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> FloatArray:
-    """Return how long runs go on after their last firings, s, as `wait_of`, in the lanes of ensembles.
+    """Return the time from the last firing to the end of each run, s, as `wait_of`, by ensembles.
 
-    One hammer and one waveform for each run, shape (runs,); equal objects are fired once.
+    One hammer and one waveform for each run, shape (runs,); equal objects are simulated once.
     """
     places: dict[tuple[int, int], int] = {}
     pairs: list[tuple[Hammer, Waveform]] = []

@@ -1,9 +1,9 @@
-"""The window of a run: how long it goes on after its last firing, from the device and its waveform.
+"""Window of a run: the time from its last firing to its end, from the device and its waveform.
 
 A single pulse from rest shows how slow a device is. The window starts at 4 ms after the supply is off and is
-doubled until it holds `FLIGHTS` flight times of the single pulse and ends with the armature at rest. So the
-last dot of a run is struck, and its extra contacts are counted, as those of all other dots. The hammer of the
-paper, with a flight time of 0.28 ms, keeps 4 ms. Windows of many devices: `printhammer.run.waits`.
+doubled until it holds `FLIGHTS` flight times of the single pulse and ends with the armature at rest. The last
+dot of a run is then complete, including its extra contacts. The window of the paper's hammer, with a flight
+time of 0.28 ms, is 4 ms. For many devices, see `printhammer.run.waits`.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from printhammer.run.problem import Problem, scales_of
 from printhammer.run.supply import waveforms_of
 
 CYCLE: Final = 4e-3
-"""Least time after the supply is off, s, at which a run ends unless stated otherwise."""
+"""Smallest default time from switch-off of the supply to the end of a run, s."""
 
 FLIGHTS: Final = 3.0
-"""Least length of a window, in flight times of the single pulse; a later dot of a train may fly longer."""
+"""Smallest length of a window, in flight times of the single pulse; a later dot of a train may fly longer."""
 
 _SETTLED: Final = 0.05  # Distance from rest at the end of a window, as a fraction of the way to the pack
 _PATIENCE: Final = 16.0  # Flight times after which a device that does not settle is waited for no longer
@@ -37,7 +37,7 @@ _known: dict[tuple[str, str], float] = {}
 
 
 class Single(NamedTuple):
-    """A single pulse at the end of a window: whether the run went on so far, its flight, where it is then."""
+    """State of a single pulse at the end of a window: completed, flight time, distance from rest."""
 
     ok: bool
     flight: float  # s, NaN without a dot
@@ -46,7 +46,7 @@ class Single(NamedTuple):
 
 
 def least_wait(waveform: Waveform) -> float:
-    """Return the least time from the last firing to the end of a run, s, whatever the device.
+    """Return the smallest time from the last firing to the end of a run, s, for any device.
 
     Under a driver 4 ms after it is off, under a current or a force 4 ms after the firing, or its end.
     """
@@ -55,7 +55,7 @@ def least_wait(waveform: Waveform) -> float:
 
 
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
-    """Return how long a run goes on after its last firing, s; by default of the hammer's own waveform."""
+    """Return the time from the last firing to the end of a run, s; by default for the hammer's waveform."""
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None:
         return CYCLE
@@ -77,17 +77,17 @@ def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
 
 
 def end_of(hammer: Hammer, drive: Drive) -> float:
-    """Return the end of a run under a drive that ends, s: the last firing and the window."""
+    """Return the end of a run under a finite drive, s: the last firing plus the window."""
     return float(drive.times[-1]) + wait_of(hammer, longest_of(drive))
 
 
 def longest_of(drive: Drive) -> Waveform:
-    """Return the waveform of a drive that lasts longest, the first of several."""
+    """Return the longest waveform of a drive, the first one if several are equal."""
     return max(waveforms_of(drive), key=lambda waveform: waveform.support)
 
 
 def has_window(hammer: Hammer, waveform: Waveform) -> bool:
-    """Whether a single pulse of a hammer says how long its runs are: it has a pack, and rests before it."""
+    """Whether a single pulse determines the window of a hammer: it has a pack, and rests before it."""
     if hammer.front is None or not math.isfinite(waveform.support):
         return False
     try:
@@ -106,7 +106,7 @@ def _single(hammer: Hammer, drive: Drive, end: float) -> Single:
 
 
 def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
-    """Whether a window holds the flights that it has to, and the armature is at rest at the end of it."""
+    """Whether a window holds the required flights, and ends with the armature at rest."""
     if not seen.ok:
         return True
     struck = math.isfinite(seen.flight)
@@ -121,6 +121,6 @@ def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the window, s, that is not doubled any more, whatever is seen."""
+    """Return the largest window, s, which is not doubled any further."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
     return least_wait(waveform) + min(_LONGEST * way / speed, _LAST)
