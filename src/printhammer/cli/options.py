@@ -317,4 +317,9 @@ HIGHEST: Final = text("VALUE", "Highest parameter value, with its unit.", flag="
 TOLERANCE: Final = number("Error tolerance of one integration step, relative to stroke and typical speed.")
 THREADS: Final = whole("Number of threads (default: number of cores).")
 UNITS: Final = text("si|inch", "Unit system of the numbers on the terminal.", default=Units.SI, type=Units)
+COLUMNS: Final = text(
+    "COLUMNS",
+    "Columns of the table, counted from 1, with factor and offset: 'time=1, current=2*-10 A/V'"
+    " (default: file TABLE.toml beside it, or its heading).",
+)
 FORCE: Final = switch("Overwrite existing files.", flag="--force")

@@ -84,6 +84,7 @@ def fit_coil(
     bandwidth: float | str | None = None,
     resolution: float | str | None = None,
     robust: bool = True,
+    columns: str | None = None,
 ) -> Fit:
     """Fit constants of the circuit to records of the current, one shot each.
 
@@ -114,6 +115,9 @@ def fit_coil(
         Step of the readings, A; by default the one of which all of them are whole multiples.
     robust : bool, optional
         Whether rows that lie too far off are left out.
+    columns : str, optional
+        What the columns of the table hold, such as "time=1, current=2*-10 A/V"; by default what a file
+        beside it says, and else its heading; see `printhammer.support.tables.columns`.
 
     Raises
     ------
@@ -125,7 +129,7 @@ def fit_coil(
     if not names:
         raise InputError("no constants to find", key="free", expected="one or more, such as coil.inductance")
     place = None if locked is None else read_number(locked, "m", "locked")
-    traces = [read_trace(path, hammer, place, offset is not None) for path in paths]
+    traces = [read_trace(path, hammer, place, offset is not None, columns) for path in paths]
     stated = {"offset": offset, "gain": gain, "delay": delay, "bandwidth": bandwidth}
     errors = read_probe(stated, min(trace.step for trace in traces))
     hammer, start = _start(hammer, names, traces[0])

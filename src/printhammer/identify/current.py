@@ -130,9 +130,11 @@ class Trace(Declared, eq=False):
         return _sampled(self.table, times[order], values[order])
 
 
-def read_trace(path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool) -> Trace:
+def read_trace(
+    path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool, columns: str | None = None
+) -> Trace:
     """Read a record, locked where the argument says, m, or a comment of its file."""
-    table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"})
+    table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"}, columns=columns)
     table.check_times()
     t = table.values["time"]
     recorded = "voltage" in table.values

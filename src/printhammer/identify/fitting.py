@@ -38,8 +38,9 @@ def fit(
         counts with that error, but for "coil".
     **options
         Of the kind; lengths in m or with a unit. All: `robust` (true), whether rows that lie too far off are
-        left out. "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the
-        reading of the displacement sensor at x = 0, or None to fit it. "solenoid": as
+        left out; `columns`, what the columns of the table hold, see `printhammer.support.tables.columns`.
+        "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the reading of
+        the displacement sensor at x = 0, or None to fit it. "solenoid": as
         `printhammer.identify.static.solenoid.fit_solenoid`. "spring": `position`. "pack":
         `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
         `printhammer.identify.static.backstop.Stiffness`. "motion": as

@@ -43,7 +43,10 @@ _HAMMER: Final = opt.text(
     "HAMMER", "Hammer with the constants already known; the start of --into.", is_input=True
 )
 _STRICT: Final = opt.switch("Exit with status 1 if the data reject the law.")
-_PASSED: Final = {"robust": opt.switch("Reject outliers, and list them.", default=True)}
+_PASSED: Final = {
+    "columns": opt.COLUMNS,
+    "robust": opt.switch("Reject outliers, and list them.", default=True),
+}
 _BACKSTOP: Final = opt.quantity(
     "m", "LENGTH", "Position of the backstop, e.g. '0.002 in'.", flag="--backstop"
 )

@@ -48,6 +48,9 @@ def map_(
     measured: Path | None = opt.source(
         "Measured map to compare with (CSV or NetCDF); it sets rates and times that are not set otherwise."
     ),
+    columns: str | None = opt.text(
+        "COLUMNS", "Columns of the measured table, e.g. 'time=1, 500 Hz=2*50 um/V' (default: its heading)."
+    ),
     figure: str | None = opt.choice(
         "8|9", "Figure of the paper whose style the picture follows (default: 9)."
     ),
@@ -62,7 +65,9 @@ def map_(
     from printhammer.results.files import save_dataset
 
     drawn = _number_of(figure, job.outputs, measured)
-    beside = None if measured is None else load_measured_map(measured)
+    if columns is not None and measured is None:
+        raise InputError(f"--columns {columns} is given", key="--columns", expected="it with --measured only")
+    beside = None if measured is None else load_measured_map(measured, columns=columns)
     grid, moments = _axes(beside, lowest, highest, rates, times)
     with job.counting("rates") as tell:
         chart = frequency_map(hammer, grid, times=moments, progress=tell, **passed)

@@ -171,6 +171,7 @@ def fit_motion(
     free: Sequence[str] | None = None,
     robust: bool = True,
     bandwidth: float | None = None,
+    columns: str | None = None,
     earlier: Sequence[Fit] = (),
 ) -> Fit:
     """Fit the mass and what else displacement records of single shots tell.
@@ -193,6 +194,9 @@ def fit_motion(
         touches it.
     robust : bool, optional
         Whether outliers are left out.
+    columns : str, optional
+        What the columns of the table hold, such as "time=1, displacement=2*50 um/V"; by default what a file
+        beside it says, and else its heading; see `printhammer.support.tables.columns`.
     bandwidth : float, optional
         Of the sensor (-3 dB), Hz; by default what a comment ``# bandwidth: 200 kHz`` of a record says, and
         else unlimited. The column of currents is taken to come through a like sensor.
@@ -216,7 +220,7 @@ def fit_motion(
         raise InputError.of("bandwidth", bandwidth, "a positive number", unit="Hz")
     for each in reversed(earlier):
         hammer = each.into(hammer)
-    shots = [read_shot(path, hammer, bandwidth) for path in paths]
+    shots = [read_shot(path, hammer, bandwidth, columns) for path in paths]
     records = _unused(paths, hammer)
     touched = any(shot.touching("backstop") for shot in shots)
     keys = _free_keys(hammer, free, shots, touched=touched)

@@ -71,7 +71,9 @@ class Shot(Declared, eq=False):
         return [touch for touch in self.touches if touch.surface == surface and touch.first > 0]
 
 
-def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) -> Shot:
+def read_shot(
+    path: str | Path, hammer: Hammer, bandwidth: float | None = None, columns: str | None = None
+) -> Shot:
     """Read the record of a single shot and find its contacts.
 
     Parameters
@@ -89,7 +91,7 @@ def read_shot(path: str | Path, hammer: Hammer, bandwidth: float | None = None) 
         The file is no such table, times do not ascend, the record begins too late or ends too early, misses
         the impact, or has too few samples in it.
     """
-    table = read_table(path, {"time": "s", "displacement": "m"}, optional={"current": "A"})
+    table = read_table(path, {"time": "s", "displacement": "m"}, optional={"current": "A"}, columns=columns)
     name, t, x = str(table.path), table.values["time"], table.values["displacement"]
     table.check_times()
     if len(t) < 4 * FEWEST:

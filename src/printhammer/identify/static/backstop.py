@@ -162,7 +162,11 @@ class Stiffness:
 
 
 def fit_backstop(
-    path: str | Path | None = None, *, stiffness: Stiffness | float | None = None, robust: bool = True
+    path: str | Path | None = None,
+    *,
+    stiffness: Stiffness | float | None = None,
+    robust: bool = True,
+    columns: str | None = None,
 ) -> Fit:
     """Find l/k from rebounds, "backstop.stiffness" from the bodies, and "backstop.damping" with both.
 
@@ -182,7 +186,7 @@ def fit_backstop(
                 "the backstop: expected a table of rebounds, or the geometry of its bodies", key="backstop"
             )
         return _of_bodies(k)
-    table = read_table(path, {"impact speed": "m/s", "rebound speed": "m/s"})
+    table = read_table(path, {"impact speed": "m/s", "rebound speed": "m/s"}, columns=columns)
     speed, back = table.values["impact speed"], table.values["rebound speed"]
     for name, column in table.values.items():
         low = int(np.argmin(column))

@@ -167,6 +167,7 @@ def fit_magnet(
     spring: str | Path | None = None,
     zero: float | None = 0.0,
     robust: bool = True,
+    columns: str | None = None,
 ) -> Fit:
     """Fit the magnet, and with it the spring.
 
@@ -182,7 +183,7 @@ def fit_magnet(
         A table cannot be used or is too small, its force never releases the armature, or a constant is not
         told from zero.
     """
-    table = read_table(path, {"displacement": "m", "current": "A", "force": "N"})
+    table = read_table(path, {"displacement": "m", "current": "A", "force": "N"}, columns=columns)
     alone = None if spring is None else read_table(spring, {"displacement": "m", "force": "N"})
     if alone is not None and position is None:
         raise InputError(

@@ -193,7 +193,14 @@ class PackLaw:
         return (float(p[-2]), float(p[-1])) if self.free else (LOADING, UNLOADING)
 
 
-def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, robust: bool = True) -> Fit:
+def fit_pack(
+    path: str | Path,
+    *,
+    thickness: float,
+    exponents: bool = False,
+    robust: bool = True,
+    columns: str | None = None,
+) -> Fit:
     """Fit "pack.stiffness" to a table with the columns ``indentation``, ``force`` and perhaps ``branch``.
 
     The thickness d of the pack, platen less front, is in m. With `exponents` those of loading and unloading
@@ -212,7 +219,9 @@ def fit_pack(path: str | Path, *, thickness: float, exponents: bool = False, rob
             value=thickness,
             expected="more than 0 m",
         )
-    table = read_table(path, {"indentation": "m", "force": "N"}, text={"branch": ("loading", "unloading")})
+    table = read_table(
+        path, {"indentation": "m", "force": "N"}, text={"branch": ("loading", "unloading")}, columns=columns
+    )
     cycles = cycles_of(table)
     check_loading(table, cycles)
     depth, force = table.values["indentation"], table.values["force"]

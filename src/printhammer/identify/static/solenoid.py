@@ -47,7 +47,14 @@ _STARTS: Final = 8
 """Places from which the best constants are sought; the first is an estimate, the others scatter about it."""
 
 
-def fit_solenoid(path: str | Path, *, turns: float, current: float | None = None, robust: bool = True) -> Fit:
+def fit_solenoid(
+    path: str | Path,
+    *,
+    turns: float,
+    current: float | None = None,
+    robust: bool = True,
+    columns: str | None = None,
+) -> Fit:
     """Fit the law `reluctance` to a table of one coil of a number of turns.
 
     The current, A, is that of all rows where the table has no column of it. What is fitted are the
@@ -60,7 +67,7 @@ def fit_solenoid(path: str | Path, *, turns: float, current: float | None = None
         The table cannot be used, is too small, or has neither inductances nor linkages.
     """
     more = {"current": "A", "inductance": "H", "linkage": "Wb", "armature flux": "Wb"}
-    table = read_table(path, {"gap": "m", "force": "N"}, optional=more)
+    table = read_table(path, {"gap": "m", "force": "N"}, optional=more, columns=columns)
     if not turns > 0.0:
         raise InputError.of("turns", turns, "more than 0", written=f"{turns:g}")
     if "current" not in table.values and current is None:

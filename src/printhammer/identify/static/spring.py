@@ -39,7 +39,7 @@ class SpringLaw:
         return np.ones((len(self.travel), 1))
 
 
-def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit:
+def fit_spring(path: str | Path, *, position: float, robust: bool = True, columns: str | None = None) -> Fit:
     """Fit "spring.Bs" and "spring.As" to a table with the columns ``displacement`` and ``force``.
 
     The position b of the backstop is in m; options of all fits are described with
@@ -50,7 +50,7 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True) -> Fit
     InputError
         The table cannot be used, is too small, or its force does not fall along a positive line.
     """
-    table = read_table(path, {"displacement": "m", "force": "N"})
+    table = read_table(path, {"displacement": "m", "force": "N"}, columns=columns)
     x, force = table.values["displacement"], table.values["force"]
     data = Data(
         (table.path,),

@@ -111,6 +111,10 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
     # Where no row is one of numbers, each cell says its own fault.
     begin = next((k for k, (_line, row) in enumerate(rows) if _is_data(row, words)), 1)
     above, data = rows[:begin], rows[begin:]
+    if len(above) > 1 and is_unit_row(above[-1][1]):
+        line, units = above[-1]
+        # Columns at the right without a unit.
+        above[-1] = line, [*units, *[""] * (min(whole[line], len(above[-2][1])) - len(units))]
     width = _width(data, above)
     for line, row in data:
         if not len(row) <= width <= whole[line]:

@@ -317,9 +317,6 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
             array = np.array(numbers) * math.inf
     else:
         array = np.array(numbers, dtype=np.float64) * factor
-    if source.offset:
-        with located(f"{table.where}: {place}", file=table.where, key=place):
-            array = array + parse(source.offset, si)
     # Squares and powers of what no sensor reads are no numbers.
     size = np.abs(array)
     bad = np.flatnonzero((size > LARGEST) | ((size < _TINY) & (np.asarray(numbers) != 0.0)))
@@ -332,6 +329,9 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
             value=cells[row],
             expected=f"a measured value, 0 or one of a magnitude from {_TINY:.2g} to {LARGEST:g} {si}",
         )
+    if source.offset:
+        with located(f"{table.where}: {place}", file=table.where, key=place):
+            array = array + parse(source.offset, si)
     return array
 
 
