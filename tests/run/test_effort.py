@@ -16,7 +16,12 @@ NAMES = ("tolerance", "threads", "progress")
 def verbs() -> list[Callable[..., Any]]:
     """Return the public functions that take keywords of an effort."""
     public = [getattr(ph, name) for name in ph.__all__]
-    return [verb for verb in public if inspect.isfunction(verb) and hasattr(verb, "__wrapped__")]
+    return [verb for verb in public if inspect.isfunction(verb) and "effort" in innermost(verb)]
+
+
+def innermost(verb: Callable[..., Any]) -> list[str]:
+    """Return the parameters of a function below its decorators."""
+    return list(inspect.signature(inspect.unwrap(verb), follow_wrapped=False).parameters)
 
 
 @pytest.mark.parametrize("verb", verbs(), ids=lambda verb: verb.__name__)

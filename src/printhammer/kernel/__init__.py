@@ -1,1 +1,1 @@
-"""The numerical kernel: arrays and numbers only, no units, files or pictures."""
+"""Numerical kernel: arrays and numbers only, without units, files or pictures."""

@@ -32,24 +32,24 @@ Array = NDArray[np.float64]
 Scheme = Literal["trapezoid", "runge-kutta-4"]
 Reading = Literal["look-ahead", "inside", "grid", "no-late-step", "firings"]
 READINGS: Final[tuple[Reading, ...]] = get_args(Reading)
-"""When the short step is taken. "look-ahead": where x < b, or where the next free step would end there.
-"inside": only where x < b, so that the first step into the backstop is a long one. "grid": a free step that
-begins or would end there is made of ten short ones, so that free steps always begin on a grid of 10 us.
-"no-late-step": as the first, with short steps late in the settle-out too. "firings": as the first, and a step
-ends at each firing, where the state of Fig. 11 is read."""
+"""Rules for the short step. "look-ahead": if x < b, or if the next free step would end there. "inside": only
+if x < b, so that the first step into the backstop is a long one. "grid": a free step that begins or would
+end there is divided into ten short ones, so that free steps always begin on a grid of 10 us.
+"no-late-step": like "look-ahead", with short steps late in the settle-out as well. "firings": like
+"look-ahead", and a step ends at each firing, where the state of Fig. 11 is read."""
 
 FREE_STEP = 10e-6
 """Step off the backstop, s."""
 CONTACT_STEP = 1e-6
-"""Step where x < b, or where the next free step would end there, s."""
+"""Step if x < b, or if the next free step would end there, s."""
 LATE_STEP = 20e-6
 """Step in the backstop late in the settle-out, s."""
 LATE_AFTER = 200e-6
-"""Time without leaving the backstop, and without a firing, from which on the settle-out is late, s."""
+"""Time without leaving the backstop, and without a firing, after which the settle-out is late, s."""
 SAME_TIME = 1e-15
-"""Difference of times, s, that is rounding: a firing at the end of a step belongs to the next one."""
+"""Largest difference of times, s, due to rounding: a firing at the end of a step belongs to the next step."""
 NEWTON_LIMIT = 50
-"""Newton iterations after which a step of the trapezoidal rule has failed."""
+"""Newton iterations after which a step of the trapezoidal rule fails; arbitrary."""
 
 LAW_NAMES = (
     "magnet_force",
@@ -61,7 +61,7 @@ LAW_NAMES = (
     "backstop_viscous",
     "backstop_rebound",
 )
-"""Law functions that `integrate` needs."""
+"""Law functions required by `integrate`."""
 
 _STATUS = ("ok", "newton failed", "diverged")
 
@@ -101,7 +101,7 @@ def integrate(
     reload_along_unloading: bool = False,
     far: float = 1.0,
 ) -> SchemeRun:
-    """Integrate one run as in 1983.
+    """Integrate a run as in 1983.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
         firings, begins, segments, fired = table
         longest = segments[segments.shape[0] - 1, 0]
         total = 0.0
-        # Firings before the step are counted already; one or two may lie within it.
+        # Earlier firings are counted already; one or two may lie within the step.
         last = fired[0]
         while last < firings.size and firings[last] <= time + SAME_TIME:
             last += 1
@@ -261,17 +261,17 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
     def trapezoid(
         time: float, x: float, v: float, h: float, peak: float, model: Any
     ) -> tuple[float, float, bool]:
-        # The rule for x, x1 = x + h/2 (v + v1), is put into the one for v: one equation for v1.
+        # Substitute the rule for x, x1 = x + h/2 (v + v1), into the rule for v: one equation for v1.
         half = 0.5 * h
         a = acceleration(time, x, v, peak, model)
         known = v + half * a
         new = v + h * a
-        # The least size keeps the tolerance above rounding where the hammer is at rest.
+        # The smallest size keeps the tolerance above rounding for a hammer at rest.
         size = abs(v) + abs(h * a) + 1e-3
         a1 = acceleration(time + h, x + half * (v + new), new, peak, model)
         residual = new - known - half * a1
         if not math.isfinite(residual):
-            # The first guess is outside the range of a law; this one ends where the step began.
+            # The first guess is outside the range of a law; use the state at the start of the step.
             new = -v
             a1 = acceleration(time + h, x, new, peak, model)
             residual = new - known - half * a1
@@ -282,7 +282,8 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
             if abs(change) <= 1e-10 * size:
                 new -= change
                 return x + half * (v + new), new, True
-            # Halved until the residual falls: the step functions and the stiff backstop would make it cycle.
+            # Halve until the residual decreases: step functions and the stiff backstop would make the
+            # iteration cycle.
             after = math.inf
             for _ in range(20):
                 trial = new - change
@@ -313,7 +314,7 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
         if not at_moments or (moments.size > 0 and moments[0] <= 0.0):
             keep(rows[0], time, place, speed, peak, front)
             n = 1
-        # A remainder of rounding is no step.
+        # A remainder due to rounding is not a step.
         while time < t_end - 1e-9 * steps[1] and not (at_moments and n == moments.size):
             while fired[0] < firings.size and firings[fired[0]] <= time + SAME_TIME:
                 settling_since = max(settling_since, firings[fired[0]])

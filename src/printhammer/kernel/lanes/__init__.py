@@ -1,1 +1,1 @@
-"""Many runs side by side: vector code, and the scalar loop over members."""
+"""Ensembles of runs: vector code in lanes, and the scalar loop over members."""

@@ -1,4 +1,4 @@
-"""Many members as arrays: hammers, drives, starts and ends, and what is kept of each run."""
+"""Members of an ensemble as arrays: hammers, drives, starts and ends, and requested results."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Batch(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """What to keep of M members, and the arrays that it goes to; NaN where a run ended before.
+    """Requested results of M members, and their arrays; NaN after an early end of a run.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""The drive between two of its edges as one closed formula: cubic, two exponentials and a sine.
+"""Drive between two of its edges as one closed formula: cubic, two exponentials and a sine.
 
-Exponentials of the same rate and sines of the same frequency add up to one, so the number of pulses under way
-does not matter.
+Exponentials of equal rate and sines of equal frequency are combined, so that the number of active pulses does
+not matter.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @inlined
 def drive_value(t: float, drive: Any) -> float:
-    """Return the sum of all pulses under way at time `t` [s]: amperes or newtons."""
+    """Return the sum of all active pulses at time `t` [s]: amperes or newtons."""
     s = t - drive[0]
     value = drive[1]
     if EXPONENTIALS > 0:
@@ -35,7 +35,7 @@ def drive_value(t: float, drive: Any) -> float:
 
 @compiled
 def add_up(t: float, live: Any, rates: Any, pool: Any, lane: int) -> None:
-    """Write the pulses under way at time `t` [s] as one formula into the drive rows of a lane.
+    """Combine the active pulses at time `t` [s] into one formula in the drive rows of a lane.
 
     `rates` are the rates of the two exponentials and the angular frequency of the sine of the waveform.
     """

@@ -1,8 +1,8 @@
-"""What happens to a member between two steps of its lane: switches, edges of the drive, samples.
+"""Events of a member between two steps of its lane: switches, edges of the drive, samples.
 
-Scalar code on one lane at a time. A member is a row of numbers `slot` beside its lane: what the steps do not
-need. Whatever is out of the ordinary (a touch without velocity, rest, a range left, a reloading) makes the
-member leave the lanes: :func:`printhammer.kernel.lanes.members.members` then runs it from its beginning.
+Scalar code for one lane at a time. A member has a row of numbers `slot` besides its lane, for data that steps
+do not need. Rare events (a touch without velocity, rest, a range left, a reloading) remove the member from
+the lanes: :func:`printhammer.kernel.lanes.members.members` then runs it from its beginning.
 """
 
 from __future__ import annotations
@@ -36,27 +36,27 @@ MODE_OF = (M.FREE, M.LOADING, M.UNLOADING, M.BACKSTOP)
 
 STAYS = -1
 LEAVES = -2
-"""In place of a pool: the member goes back to the plain kernel."""
+"""Replaces a pool: the member returns to the plain kernel."""
 DONE = -3
 
 
 @inlined
 def place(lane: int) -> int:
-    """Return where the rows of a lane begin in its pool."""
+    """Return the index at which the rows of a lane begin in its pool."""
     return (lane // R.BLOCK) * R.BLOCK_SIZE + lane % R.BLOCK
 
 
 @compiled
 def copy_lane(source: Any, i: int, target: Any, j: int, rows: int) -> None:
-    """Copy the first rows of a lane at place `i` to another pool or place."""
+    """Copy the first rows of a lane at index `i` to another pool or index."""
     for row in range(rows):
         target[row * R.BLOCK + j] = source[row * R.BLOCK + i]
 
 
 @compiled
 def quintic(part: float, h: float, x0: float, v0: float, a0: float, x1: float, v1: float, a1: float) -> float:
-    """Return, at `part` of a step, the quintic through its displacements, velocities, accelerations."""
-    # Remainder over the cubic Taylor polynomial at the start.
+    """Evaluate the quintic through displacements, velocities, accelerations at a fraction of a step."""
+    # Remainder relative to the cubic Taylor polynomial at the start.
     b0 = h * v0
     c0 = 0.5 * h * h * a0
     d = x1 - (x0 + b0 + c0)
@@ -70,9 +70,9 @@ def quintic(part: float, h: float, x0: float, v0: float, a0: float, x1: float, v
 
 @compiled
 def sixth_term(pool: Any, i: int, which: int) -> float:
-    """Return k with which k u^3 (u - 1)^3 corrects the quintic of the latest step off the backstop.
+    """Return the coefficient k of the correction k u^3 (u - 1)^3 of the quintic of the latest step.
 
-    It makes the acceleration in the middle of the step, u = 1/2, that of the force there.
+    The correction makes the acceleration in the middle of the step, u = 1/2, agree with the force there.
     """
     h = pool[R.LENGTH * R.BLOCK + i]
     x0, x1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
@@ -116,14 +116,14 @@ def position_in_step(pool: Any, i: int, which: int, time: float, b: float, sixth
 
 @compiled
 def part_at(pool: Any, i: int, time: float) -> float:
-    """Return at which part of its latest step in s a lane of the contact pool was at a time."""
+    """Return the fraction of its latest step in s at which a lane of the contact pool was at a time."""
     t0, t1 = pool[R.OLD_T * R.BLOCK + i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.OLD_X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.OLD_V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
     a0, a1 = pool[R.OLD_A * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
     h = pool[R.LENGTH * R.BLOCK + i]
     low, high = 0.0, 1.0
-    # The step may reach beyond the end of the contact, where w < 0 and time runs backward.
+    # The step may extend beyond the end of the contact, where w < 0 and time runs backward.
     part = (time - t0) / (t1 - t0) if time < t1 and w1 > 0.0 else 0.5
     for _ in range(60):
         # dt/ds = 2 w, d2t/ds2 = -2 v
@@ -155,9 +155,9 @@ def note_samples(
     x: Any,
     b: float,
 ) -> None:
-    """Take the samples of a lane's latest step before the time `until`, and with `last` at it.
+    """Store the samples of a lane's latest step before the time `until`, and with `last` at it.
 
-    With `fine`, samples take one more force to be exact to an order more.
+    With `fine`, one more force evaluation raises the order of the samples by one.
     """
     m = int(slot[R.MEMBER])
     sample = int(slot[R.NEXT_SAMPLE])
@@ -185,7 +185,7 @@ def note_strobes(
     train: Train,
     hammer: Hammer,
 ) -> None:
-    """Take the strobes of a lane's latest step before the time `until`, and with `last` at it.
+    """Store the strobes of a lane's latest step before the time `until`, and with `last` at it.
 
     A strobe at a node waits for the node's mode, which the next step has.
     """
@@ -214,7 +214,7 @@ def note_strobes(
 
 @compiled
 def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
-    """Begin a backstop contact at w = 0 with velocity `v`."""
+    """Start a backstop contact at w = 0 with velocity `v`."""
     unit = contact_unit(v, control)
     slot[R.UNIT] = unit
     pool[R.X * R.BLOCK + i] = 0.0
@@ -227,7 +227,7 @@ def enter_contact(pool: Any, i: int, v: float, slot: Any, control: Any) -> int:
 
 @compiled
 def enter(pool: Any, i: int, t: float, x: float, v: float, mode: int, h: float, memory: float) -> None:
-    """Begin a mode off the backstop."""
+    """Start a mode off the backstop."""
     pool[R.X * R.BLOCK + i] = x
     pool[R.V * R.BLOCK + i] = v
     pool[R.A * R.BLOCK + i] = lane_acceleration(pool, i, t, x, v, mode, memory)
@@ -238,7 +238,7 @@ def enter(pool: Any, i: int, t: float, x: float, v: float, mode: int, h: float, 
 
 @compiled
 def remember_step(pool: Any, i: int, which: int, slot: Any) -> None:
-    """Keep the step length with which this mode began, for the next time."""
+    """Store the initial step size of this mode for the next time."""
     first = pool[R.FIRST * R.BLOCK + i]
     if first > 0.0:
         if which == R.FREE_POOL:
@@ -261,11 +261,12 @@ def turn_in_pack(
     hammer: Hammer,
     control: Any,
 ) -> int:
-    """Go on after the velocity became zero inside the pack at displacement `x`.
+    """Continue after the velocity became zero inside the pack at displacement `x`.
 
-    As `printhammer.kernel.single.around.reversed_mode`; where the armature would rest, the member leaves.
+    The rule is `printhammer.kernel.single.around.reversed_mode`; an armature that would rest leaves the
+    lanes.
     """
-    # As in the plain kernel: swings too small to be told from rest would never end.
+    # As in the plain kernel: swings too small to distinguish from rest would never end.
     still = R.STILL * control[1] * control[1] / control[0]
     inward = lane_acceleration(pool, i, t, x, 0.0, M.LOADING, 0.0) > 0.0
     if (inward and which == R.LOADING_POOL) or (RELOAD_ALONG_UNLOADING and which == R.UNLOADING_POOL):
@@ -297,7 +298,7 @@ def after_switch(
     hammer: Hammer,
     control: Any,
 ) -> int:
-    """Go on after a switch; return the pool in which, or that the member leaves the lanes."""
+    """Continue after a switch; return the new pool, or that the member leaves the lanes."""
     remember_step(pool, i, which, slot)
     pool[R.T * R.BLOCK + i] = t
     if switch == M.REVERSAL:
@@ -339,7 +340,7 @@ def new_edge(
     train: Train,
     rates: Any,
 ) -> None:
-    """Take over the pieces of the drive that begin at the time of a lane."""
+    """Update the drive at the time of a lane."""
     t = pool[R.T * R.BLOCK + i]
     _first, _last, edge = edges_at(t, train)
     add_up(t, train.live, rates, pool, i)
@@ -354,7 +355,7 @@ def new_edge(
 
 @compiled
 def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Hammer) -> None:
-    """Enter the deepest point so far of a pack contact that is open at the end."""
+    """Record the deepest point so far of a pack contact that is open at the end."""
     dot = int(slot[R.DOT])
     if which == R.LOADING_POOL and dot >= 0:
         deepen_dot(dots, dot, pool[R.X * R.BLOCK + i], hammer)
@@ -364,7 +365,7 @@ def close_member(pool: Any, i: int, which: int, slot: Any, dots: Any, hammer: Ha
 def locate(
     pool: Any, i: int, which: int, hammer: Hammer, live: Drive, control: Control
 ) -> tuple[int, float, float, float]:
-    """Find the switch in the latest step with the plain kernel: its name, time, displacement, velocity.
+    """Locate the switch in the latest step with the plain kernel: code, time, displacement, velocity.
 
     In the contact pool w instead of the displacement; NO_SWITCH or UNRESOLVED instead of a name.
     """

@@ -1,8 +1,8 @@
-"""How a lane comes to end its step on a switch: guess where, step there, close the small rest.
+"""Ending the step of a lane on a switch: guess the position, step there, close the remainder.
 
-The guess comes from the quintic of the step that held the switch; the step that follows it is an ordinary one
-of the lane. The rest is closed with the derivatives at its end; where that is not good enough, the plain
-kernel locates the switch.
+The guess comes from the quintic of the step that contained the switch; the next step is an ordinary one of
+the lane. The derivatives at its end close the remainder; if that is not accurate enough, the plain kernel
+locates the switch.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.forces import Hammer
 
 CLOSE = 1e-3
-"""Largest rest, in lengths of the step, that is closed with the derivatives."""
+"""Largest remainder, as a fraction of the step, that the derivatives may close."""
 
 GOES_ON = -1
-"""In place of a switch: the lane has to take another step before one can tell."""
+"""Replaces a switch: the lane has to take another step before the decision."""
 
 
 @inlined
@@ -40,19 +40,19 @@ def ends_of_step(pool: Any, i: int, sign: float) -> tuple[float, float, float, f
 
 @inlined
 def rises_in_step(pool: Any, i: int, level: float, sign: float) -> int:
-    """Tell whether sign * x rises through sign * `level` in the latest step, see `rises_through`."""
+    """Decide whether sign * x rises through sign * `level` in the latest step, see `rises_through`."""
     return rises_through(*ends_of_step(pool, i, sign), sign * level)
 
 
 @inlined
 def level_part(pool: Any, i: int, level: float, sign: float) -> float:
-    """Return the part of the latest step where sign * x rises through sign * `level`."""
+    """Return the fraction of the latest step at which sign * x rises through sign * `level`."""
     return position_root(*ends_of_step(pool, i, sign), sign * level, 1.0)
 
 
 @compiled
 def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the switch inside the latest step in free flight, and the part of the step where it may be."""
+    """Return the switch inside the latest step in free flight, and its estimated fraction of the step."""
     down = rises_in_step(pool, i, hammer[POSITION], -1.0)
     up = rises_in_step(pool, i, hammer[FRONT], 1.0)
     if M.UNRESOLVED in (down, up):
@@ -71,7 +71,7 @@ def guess_free(pool: Any, i: int, hammer: Hammer) -> tuple[int, float]:
 
 @compiled
 def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the switch inside the latest step in the pack, and the part of the step where it may be."""
+    """Return the switch inside the latest step in the pack, and its estimated fraction of the step."""
     h = pool[R.LENGTH * R.BLOCK + i]
     turn = -1.0 if which == R.UNLOADING_POOL else 1.0
     v0, a0 = turn * pool[R.V * R.BLOCK + i], turn * pool[R.A * R.BLOCK + i]
@@ -95,7 +95,7 @@ def guess_in_pack(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, f
 
 @compiled
 def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
-    """Return the switch inside the latest step in the backstop, and the part of the step where it may be."""
+    """Return the switch inside the latest step in the backstop, and its estimated fraction of the step."""
     t0, t1 = pool[i], pool[R.NEW_T * R.BLOCK + i]
     w0, w1 = pool[R.X * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v0, v1 = pool[R.V * R.BLOCK + i], pool[R.NEW_V * R.BLOCK + i]
@@ -119,7 +119,7 @@ def guess_in_contact(pool: Any, i: int) -> tuple[int, float]:
 
 @compiled
 def guess(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
-    """Return the switch inside the latest step of a lane, and the part of the step where it may be."""
+    """Return the switch inside the latest step of a lane, and its estimated fraction of the step."""
     if which == R.CONTACT_POOL:
         return guess_in_contact(pool, i)
     if which == R.FREE_POOL:
@@ -129,7 +129,7 @@ def guess(pool: Any, i: int, which: int, hammer: Hammer) -> tuple[int, float]:
 
 @compiled
 def aim(pool: Any, i: int, slot: Any, switch: int, part: float) -> None:
-    """Have the next step of a lane end where the switch is thought to be."""
+    """Make the next step of a lane end at the estimated switch."""
     slot[R.SAVED_STEP] = pool[R.FOLLOWING * R.BLOCK + i]
     slot[R.ATTEMPTS] = 0.0
     pool[R.H * R.BLOCK + i] = part * pool[R.LENGTH * R.BLOCK + i]
@@ -140,7 +140,7 @@ def aim(pool: Any, i: int, slot: Any, switch: int, part: float) -> None:
 def land(
     pool: Any, i: int, which: int, slot: Any, hammer: Hammer, control: Any
 ) -> tuple[int, float, float, float]:
-    """Close the rest between the end of a lane's step and the switch it aims at.
+    """Close the remainder between the end of a lane's step and the targeted switch.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def land(
     h = pool[R.LENGTH * R.BLOCK + i]
     t, x = pool[R.NEW_T * R.BLOCK + i], pool[R.NEW_X * R.BLOCK + i]
     v, a = pool[R.NEW_V * R.BLOCK + i], pool[R.NEW_A * R.BLOCK + i]
-    # A tenth of the smaller allowance is the tolerance; the next order is far below what is closed.
+    # A tenth of the smaller allowance is the tolerance; the next order is far below the remainder.
     allowed = 10.0 * control[3] * control[0]
     if which == R.CONTACT_POOL:
         if switch == M.EDGE:

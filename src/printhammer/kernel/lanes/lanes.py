@@ -1,9 +1,9 @@
-"""Many runs side by side: members in the same mode take their steps together, each with its own length.
+"""Vector lanes: members in the same mode step together, each with its own step size.
 
-A thread has up to `LANES` members under way. They lie in pools, one for each mode; a sweep takes one step in
-every lane of every pool, then looks after the lanes in which something happened. A member that is done makes
-room for the next. No member's numbers depend on any other's: blocks are always computed in full, idle lanes
-included, by the same machine code.
+A thread has up to `LANES` active members. They are stored in pools, one per mode; a sweep takes one step in
+every lane of every pool, then handles the lanes with events. A finished member makes room for the next. The
+numbers of a member do not depend on other members: blocks are always computed in full, including idle lanes,
+by the same machine code.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ if TYPE_CHECKING:
 
 
 FINE = 1e-6
-"""Allowance of the order 7 estimate below which samples are taken with care."""
+"""Allowance of the order 7 estimate below which samples are computed with the extra force evaluation."""
 
 
 @compiled
 def place_constants(
     pool: Any, i: int, hammer: Hammer, control: Any, bounds: Any, rates: Any, most_steps: float
 ) -> None:
-    """Write what belongs to a member's hammer and waveform into a lane."""
+    """Write the constants of a member's hammer and waveform into a lane."""
     for row in range(R.RATES_WIDTH):
         pool[(R.RATES + row) * R.BLOCK + i] = rates[row]
     at = R.HAMMER * R.BLOCK + i
@@ -102,7 +102,7 @@ def begin_member(
     control: Any,
     slot: Any,
 ) -> int:
-    """Put a member at its start into a lane; return its pool, or that the lanes are not for it."""
+    """Write the initial state of a member into a lane; return its pool, or that lanes do not support it."""
     t, x, v = state[0], state[1], state[2]
     scale = control[0] / control[1]
     slot[R.FREE_STEP] = 0.02 * scale
@@ -144,7 +144,7 @@ def begin_member(
 
 @inlined
 def step_block(which: int, pool: Any, begin: int) -> None:
-    """Take a step in every lane of a block, idle ones included."""
+    """Take a step in every lane of a block, including idle ones."""
     if which == R.FREE_POOL:
         free_block(pool, begin)
     elif which == R.LOADING_POOL:
@@ -166,7 +166,7 @@ def look_after(
     under_way: Any,
     live: Any,
 ) -> int:
-    """Do what the event of a lane asks for; return the pool where the member goes on."""
+    """Handle the event of a lane; return the next pool of the member."""
     m = int(slot[R.MEMBER])
     row = batch.hammer_of[m]
     hammer, control = batch.hammers[row], control_of(batch, row)
@@ -326,11 +326,11 @@ def lanes(
             return left
         for p in range(R.POOLS):
             pool = pools[p]
-            # From the last lane to the first: what fills a gap has had its step.
+            # From the last lane to the first: the lane moved into a gap has had its step.
             top = counts[p] - 1
             for lane in range(top, -1, -1):
                 if lane == top or lane % R.BLOCK == R.BLOCK - 1:
-                    # The rows of a block are at hand right after its step.
+                    # The rows of a block are in the cache right after its step.
                     step_block(p, pool, (lane // R.BLOCK) * R.BLOCK_SIZE)
                 i = place(lane)
                 if pool[R.EVENT * R.BLOCK + i] == 0.0:

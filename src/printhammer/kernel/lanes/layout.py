@@ -1,24 +1,23 @@
-"""Where things lie in a pool of lanes: one flat array of blocks, each of rows of `BLOCK` lanes.
+"""Layout of a pool of lanes: one flat array of blocks, each of rows of `BLOCK` lanes.
 
 All members in a pool are in the same mode. A row holds one quantity of all lanes of its block, so that a loop
 over lanes reads and writes side by side; the rows of a block lie together.
 """
 
 LANES = 256
-"""Members that a thread has under way; capacity of every pool."""
+"""Active members of a thread; capacity of every pool."""
 
 BLOCK = 16
-"""Lanes in one pass of the compiled loops."""
+"""Lanes in one iteration of the compiled loops."""
 
 MANY_STEPS, SHORT = 2e4, 1e-12
-"""Steps after which a member leaves the lanes whose steps have become short, in parts of the time since 0.
+"""Number of steps, and ratio of step to elapsed time, at which a member leaves the lanes.
 
-Where a law runs away, steps become shorter and shorter without ever becoming too short; the plain kernel
-knows what becomes of it.
+At a runaway, steps become ever shorter without underflow; the plain kernel determines the status.
 """
 
 STALLED = 200.0
-"""Events in a row that do not move time after which a member leaves the lanes.
+"""Number of consecutive events that do not advance time, after which a member leaves the lanes.
 
 A switch that has to be located takes four attempts and at most some forty halvings of the step.
 """
@@ -26,7 +25,7 @@ A switch that has to be located takes four attempts and at most some forty halvi
 STILL = 1e-8
 """Acceleration, in typical speeds over typical times, at which a member about to rest leaves the lanes."""
 
-# The constants of a hammer, in the places that `layout` gives them otherwise.
+# Constants of a hammer, in the places that `layout` defines otherwise.
 INVERSE_MASS = 0
 POSITION = 1
 FRONT = 2
@@ -45,9 +44,9 @@ PLACES = {
 }
 """First place and number of places of the constants of each part."""
 
-# The drive between two of its edges, in the order: time of reference, constant, amplitudes of two
-# exponentials, higher coefficients of the cubic, amplitude and phase of the sine; then what the waveform
-# alone determines, the rates of the exponentials and the angular frequency of the sine.
+# The drive between two of its edges: reference time, constant, amplitudes of two exponentials, higher
+# coefficients of the cubic, amplitude and phase of the sine; then data of the waveform alone: rates of the
+# exponentials and angular frequency of the sine.
 DRIVE_WIDTH = 9
 RATES_WIDTH = 3
 
@@ -77,21 +76,21 @@ FIRST = 9
 """Step that followed the first one in this mode, 0 before that."""
 STEPS = 10
 LANDING = 11
-"""The switch on which the step under way is to end; 0 for none."""
+"""Switch at which the current step is to end; 0 for none."""
 DRIVE = 12
 EXPONENTIAL_DRIVE = DRIVE + 4
-"""Rows that a member takes along from pool to pool, with a drive of nothing but exponentials, come before."""
+"""Number of rows that a member with an exponential drive takes to another pool."""
 ANY_DRIVE = DRIVE + DRIVE_WIDTH
-"""Rows that a member takes along with any drive come before this one."""
+"""Number of rows that a member with any drive takes to another pool."""
 RATES = ANY_DRIVE
 CONTROL = RATES + RATES_WIDTH
 LOWEST = CONTROL + 4
 HIGHEST = CONTROL + 5
 MOST_STEPS = CONTROL + 6
-"""Steps after which the member leaves the lanes."""
+"""Number of steps after which the member leaves the lanes."""
 HAMMER = CONTROL + 7
 OWN = HAMMER + CONSTANTS
-"""Rows that belong to the member's waveform and hammer come before this one."""
+"""Rows of the member's waveform and hammer come before this one."""
 
 OLD_T = OWN
 OLD_X = OWN + 1
@@ -111,7 +110,7 @@ ROWS = OWN + 11
 BLOCK_SIZE = ROWS * BLOCK
 POOL_SIZE = BLOCK_SIZE * (LANES // BLOCK)
 
-# Columns of a slot: what a member has beside its lane.
+# Columns of a slot: data of a member outside its lane.
 MEMBER = 0
 NEXT_SAMPLE = 1
 NEXT_STROBE = 2
@@ -119,7 +118,7 @@ FREE_STEP = 3
 PACK_STEP = 4
 CONTACT_STEP = 5
 UNIT = 6
-"""Unit of s of the backstop contact under way; 0 for one under way since the start."""
+"""Unit of s of the current backstop contact; 0 for one open since the start."""
 DOT = 7
 """Row of the open pack contact among the dots and extra contacts of the member, -1 for none."""
 END = 8
@@ -130,16 +129,16 @@ SAVED_STEP = 11
 NEXT_TIME = 12
 """Time of the next strobe, infinity if there is none."""
 EVENT_TIME = 13
-"""Time at which the latest event was looked after."""
+"""Time of the latest handled event."""
 EVENTS = 14
-"""How many events in a row did not move time."""
+"""Number of consecutive events that did not advance time."""
 EXTRA = 15
 """Number of extra contacts so far."""
 SLOT_WIDTH = 16
 
-# Events, to be added up.
+# Events, bit flags to be added.
 SWITCH = 1.0
-"""The step may hold a switch and has not been made valid."""
+"""The step may contain a switch and has not been accepted."""
 SAMPLED = 2.0
 AT_EDGE = 4.0
 STUCK = 8.0

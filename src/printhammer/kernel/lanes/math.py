@@ -1,4 +1,4 @@
-"""Elementary functions without branches or calls, for loops that the compiler turns into vector code.
+"""Elementary functions without branches or calls, for loops that the compiler vectorises.
 
 The laws of the parts are compiled for lanes with this module in the place of :mod:`math`. Sources: Cody and
 Waite, Software Manual for the Elementary Functions (1980), for the reductions; the polynomials are Taylor and
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         raise NotImplementedError
 
     def from_bits(value: int) -> float:
-        """Return the floating-point number that an integer's 64 bits stand for."""
+        """Return the floating-point number with the 64 bits of an integer."""
         raise NotImplementedError
 
 
@@ -38,7 +38,7 @@ pi = math.pi
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH = 6.93147180369123816490e-01
 _LN2_LOW = 1.90821492927058770002e-10
-# Adding and taking away 1.5 * 2^52 rounds to the nearest whole number.
+# Adding and subtracting 1.5 * 2^52 rounds to the nearest integer.
 _ROUND = 6755399441055744.0
 
 
@@ -69,7 +69,7 @@ def sqrt(x: float) -> float:
 
 @inlined
 def isnan(x: float) -> bool:
-    """Tell whether `x` is not a number."""
+    """Whether `x` is not a number."""
     return x != x  # noqa: PLR0124
 
 
@@ -103,7 +103,7 @@ def exp(x: float) -> float:
 def log(x: float) -> float:
     """Return the natural logarithm of a normal number; NaN below 0, minus infinity at 0."""
     b = bits(x)
-    # The exponent such that the rest lies between sqrt(1/2) and sqrt(2).
+    # Choose the exponent such that the mantissa lies between sqrt(1/2) and sqrt(2).
     k = (b - 0x3FE6A09E667F3BCD) >> 52
     m = from_bits(b - (k << 52))
     f = m - 1.0

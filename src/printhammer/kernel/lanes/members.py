@@ -1,7 +1,7 @@
-"""Many runs one after the other, each to its end: what is asked for is kept, the record is not.
+"""Scalar loop over members: each run goes to its end, only requested results are stored.
 
-A run is integrated in stretches that fit the working space; after each, dots, strobes and samples are taken
-from its record.
+A run is integrated in stretches that fit the working space; after each, dots, strobes and samples are
+extracted from its record.
 """
 
 from __future__ import annotations

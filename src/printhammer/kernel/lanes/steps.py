@@ -1,8 +1,8 @@
-"""One step of every lane of a block, in each pool: loops without branches that the compiler vectorises.
+"""One step of every lane of a block, in each pool: branch-free loops that the compiler vectorises.
 
-A step that cannot hold a switch and keeps the tolerance is made valid at once; the rest is left to
-:mod:`printhammer.kernel.lanes.events`. Whether a step may hold a switch is told by the control points of its
-quintic (position) and cubic (velocity) in the basis of Bernstein: they enclose the curve.
+A step that cannot contain a switch and meets the tolerance is accepted at once; the rest is left to
+:mod:`printhammer.kernel.lanes.events`. The Bernstein coefficients of the quintic (position) and cubic
+(velocity) enclose the curve, and show whether a step may contain a switch.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def hammer_at(pool: Any, i: int) -> Any:
 
 @inlined
 def factor(ratio: float) -> float:
-    """Return the factor for the next step length after an error `ratio`; the least one if not finite."""
+    """Return the factor for the next step size after an error `ratio`; the smallest one if not finite."""
     f = 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))
     f = min(5.0, max(0.2, f))
     return f if ratio < 1e6 else 0.2
@@ -65,7 +65,7 @@ def factor(ratio: float) -> float:
 def settle(
     pool: Any, i: int, start: State, h: float, end: State, ratio: float, sure: bool, edge: bool, outside: bool
 ) -> None:
-    """Make a step valid or not, and write down what it brought."""
+    """Accept or reject a step, and store its results."""
     t, x, v, a = start
     t1, x1, v1, a1 = end
     small = ratio <= 1.0
@@ -96,7 +96,7 @@ def settle(
     event += R.SAMPLED if (valid and t1 >= pool[R.SAMPLE * BLOCK + i]) else 0.0
     event += R.AT_EDGE if (valid and edge) else 0.0
     most = pool[R.MOST_STEPS * BLOCK + i]
-    # In the backstop lengths are in s, which says nothing about time.
+    # In the backstop step sizes are in s, unrelated to time.
     most = min(most, R.MANY_STEPS) if abs(t1 - t) < R.SHORT * abs(t1) else most
     stuck = not (small or following > 1e-14 * scale) or steps > most
     event = R.STUCK if (stuck or (small and outside)) else event
@@ -105,10 +105,10 @@ def settle(
 
 @inlined
 def step_ratio(pool: Any, i: int, error_x: float, error_v: float) -> float:
-    """Return the error estimate of a step off the backstop over what is allowed; not finite stays so."""
+    """Return a step's error estimate off the backstop relative to the allowance, possibly not finite."""
     ratio_x = abs(error_x) / pool[R.CONTROL * BLOCK + i]
     ratio_v = abs(error_v) / pool[(R.CONTROL + 1) * BLOCK + i]
-    # A sum instead of the larger one keeps a NaN of either.
+    # A sum instead of the maximum propagates a NaN of either.
     worst = max(ratio_x, ratio_v) + 0.0 * (ratio_x + ratio_v)
     allowance = R.CONTROL + 3 if HAS_DAMPING else R.CONTROL + 2
     return float(worst / pool[allowance * BLOCK + i])

@@ -1,1 +1,1 @@
-"""Integration methods, and finding where a step meets a switch."""
+"""Integration methods, and location of switches within a step."""

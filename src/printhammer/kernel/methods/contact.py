@@ -29,7 +29,7 @@ ContactState = Any
 """Time, w, velocity, dv/ds."""
 
 PHASE_LIMIT = 2.0
-"""Largest phase of the contact's own oscillation in one step; from about 5 on the method is unstable."""
+"""Largest phase of the contact oscillation in one step; beyond about 5 the method is unstable."""
 
 
 @compiled
@@ -40,9 +40,9 @@ def contact_rate(w: float, v: float, t: float, hammer: Hammer, drive: Drive) -> 
 
 @compiled
 def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
-    """Return the ds after which a time `left` [s] has passed where a force holds the armature there.
+    """Return the ds in which a time `left` [s] passes if a force holds the armature in the backstop.
 
-    The root of 2 w ds - v ds^2 - kv ds^3 / 3 = left, whose left side rises throughout.
+    It is the root of 2 w ds - v ds^2 - kv ds^3 / 3 = left, whose left side increases monotonically.
     """
     ds = 0.0
     for _ in range(60):
@@ -56,10 +56,10 @@ def length_while_pushed_in(left: float, w: float, v: float, kv: float) -> float:
 
 @compiled
 def length_of(left: float, w: float, v: float, kv: float) -> float:
-    """Return about the ds after which a time `left` [s] has passed in the backstop, for a correction of s.
+    """Return the approximate ds in which a time `left` [s] passes in the backstop, for a correction of s.
 
-    It solves dt = 2 w ds - v ds^2, whose root stays regular where the armature leaves, w = 0; the next term
-    is added where it counts and the armature does not leave.
+    It solves dt = 2 w ds - v ds^2, whose root stays regular at release, w = 0; the next term is included if
+    it matters and the armature does not leave.
     """
     under_root = max(w * w - v * left, 0.0)
     if w > 0.0 and under_root > 0.0:
@@ -76,7 +76,7 @@ def length_of(left: float, w: float, v: float, kv: float) -> float:
 def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, drive: Drive) -> float:
     """Return the s at which a step in the backstop from time `t0` reaches time `t` [s].
 
-    A time after that of leaving gives the s of leaving.
+    A time after the release yields the s of the release.
     """
     left = t - t0
     if left <= 0.0:
@@ -94,9 +94,9 @@ def s_at(t: float, t0: float, w0: float, v0: float, kv0: float, hammer: Hammer, 
 
 @inlined
 def longest_contact_step(w: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the step length in s that the stiffness of the contact at compression ``w**2`` allows.
+    """Return the largest step in s allowed by the contact stiffness at compression ``w**2`` [m].
 
-    And the circuit of the coil, if there is one.
+    The circuit of the coil, if any, limits the step as well.
     """
     if w <= 0.0:
         return math.inf
@@ -116,7 +116,7 @@ def longest_contact_step(w: float, hammer: Hammer, drive: Drive) -> float:
 
 @compiled
 def contact_scales(w: float, v: float, h: float, control: Control) -> tuple[float, float, float]:
-    """Return the scales of errors in time, w and velocity that follow from those of `control`."""
+    """Return the error scales of time, w and velocity that follow from those of `control`."""
     return control[0] / control[1], control[0] / (2.0 * max(w, abs(v) * h)), control[1]
 
 
@@ -170,7 +170,7 @@ def reach_time(
         if w1 > 0.0:
             rest = (target - t1) / (2.0 * w1)
             if abs(rest) * (abs(v1) + abs(kv1) * abs(rest)) <= 1e-9 * w1:
-                # Second order in the small rest: w and t are then exact to rounding.
+                # Second order in the small remainder: w and t are then exact to rounding.
                 rest += 0.5 * v1 * rest * rest / w1
                 w_end = w1 - v1 * rest - 0.5 * kv1 * rest * rest
                 return target, w_end, v1 + kv1 * rest, kv1
@@ -182,7 +182,7 @@ def reach_time(
 
 @called
 def end_push(start: ContactState, h: float, upper: float, hammer: Hammer, drive: Drive) -> ContactState:
-    """Return the state at which the backstop lets go, inside `upper` of a step of `h`, found by bisection."""
+    """Return the state at which the backstop releases, inside `upper` of a step of `h`, by bisection."""
     t, w, v, kv = start
     low, high = 0.0, upper
     for _ in range(60):
@@ -227,7 +227,7 @@ def contact_switch(
 def electric_in_contact(
     start: ContactState, t: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, Electric]:
-    """Return the s after which a step in the backstop reaches time `t` [s], and the electric state there."""
+    """Return the s at which a step in the backstop reaches time `t` [s], and the electric state there."""
     s = s_at(t, start[0], start[1], start[2], start[3], hammer, drive)
     step = whole_contact_step(start[0], start[1], start[2], start[3], s, hammer, drive, M.ANY_SCALES)
     rest = t - step[0]

@@ -1,9 +1,9 @@
-"""Where in a step the path of the coil's current changes, or an armature held at rest comes free.
+"""Location, within a step, of a change of the current's path or of the end of a rest.
 
-What is looked for is the first root of a gap, a smooth function of the state that is positive while things
-stay as they are: see `printhammer.kernel.model.circuit.path_gap`. The cubic through the gaps and their slopes
-at both ends of a step tells by its Bernstein coefficients whether one lies inside; how far these are from a
-straight line measures how well the cubic can be believed. The root is located with the integrator.
+The target is the first root of a gap, a smooth function of the state that is positive until the change: see
+`printhammer.kernel.model.circuit.path_gap`. The Bernstein coefficients of the cubic through the gaps and
+slopes at both ends of a step show whether a root lies inside; their deviation from a straight line measures
+the reliability of the cubic. The root is located with the integrator.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.pulses import Drive
 
 STILL = 1e-12
-"""Share of the scales below which the motion in one characteristic time counts as none."""
+"""Motion in one characteristic time that counts as none, as a fraction of the scales."""
 
 BEGUN = 1e-9
-"""Gap at the start of a step that counts as none: a path that has just been entered."""
+"""Gap at the start of a step that counts as zero, for a path just entered."""
 
 SHARE = 1e-5
-"""Share of a step over which the slope of a gap is taken."""
+"""Fraction of a step over which the slope of a gap is computed."""
 
 PATH_GAP, REST_GAP = 0, 1
-"""Which gap: of the path of the current, of the rest of the armature."""
+"""Kind of gap: path of the current, or rest of the armature."""
 
 
 @compiled
 def closes(g0: float, d0: float, g1: float, d1: float) -> int:
-    """Tell whether a gap closes in a step, from its values and slopes, times the step, at both ends.
+    """Decide whether a gap closes in a step, from its values and slopes, times the step, at both ends.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def closes(g0: float, d0: float, g1: float, d1: float) -> int:
     """
     b1, b2 = g0 + d0 / 3.0, g1 - d1 / 3.0
     if g0 <= BEGUN:
-        # The slope at the start is no better known than the gap.
+        # The slope at the start is no more accurate than the gap.
         if g1 > BEGUN:
             return M.NO_SWITCH if b2 > 0.0 else M.UNRESOLVED
         if g1 >= -BEGUN:
@@ -65,7 +65,7 @@ def closes(g0: float, d0: float, g1: float, d1: float) -> int:
 
 @inlined
 def rest_gap(a: float, mode: int, control: Control) -> float:
-    """Return a number that is positive while the acceleration leaves an armature at rest."""
+    """Return a gap that is positive while the acceleration keeps an armature at rest."""
     unit = control[1] * control[1] / control[0]
     if mode == M.RESTING:
         return -a / unit
@@ -76,7 +76,7 @@ def rest_gap(a: float, mode: int, control: Control) -> float:
 def gap_at(
     which: int, t: float, x: float, v: float, electric: Electric, law: ForceLaw, live: Any, control: Control
 ) -> float:
-    """Return a gap off the backstop."""
+    """Return the value of a gap off the backstop."""
     mode, memory, hammer, _drive = law
     if which == PATH_GAP:
         return path_gap(x, v, electric, hammer, live)
@@ -113,7 +113,7 @@ def gap_and_change(
 def land_on_gap(
     which: int, start: Any, h: float, upper: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, Electric]:
-    """Return the state at which a gap closes inside `upper` of a step of `h`: t, x, v, a, electric state."""
+    """Return the state at which a gap closes within `upper` of a step of `h`: t, x, v, a, electric state."""
     t, x, v, a = start
     live = law.drive[0]
     low, high = 0.0, upper
@@ -131,10 +131,10 @@ def land_on_gap(
                 break
         x1, v1, a1, _ex, _ev, e1, _ee = whole_time_step(t, x, v, a, middle * h, law)
         gap = gap_at(which, t + middle * h, x1, v1, e1, law, live, control)
-        # A rest ends where the armature is driven off, not where nothing drives it yet.
+        # A rest ends where the armature is driven off, not where the driving force vanishes.
         if gap > 0.0 or (which == REST_GAP and gap == 0.0):
             low, low_gap = middle, gap
-            # The weight of an end that stays is halved: the Illinois rule.
+            # Illinois rule: halve the weight of an end that stays.
             high_gap *= 0.5 if side == 1 else 1.0
             side = 1
         else:
@@ -152,7 +152,7 @@ def land_on_gap(
 def circuit_switch(
     start: Any, end: Any, electric: Electric, law: ForceLaw, control: Control
 ) -> tuple[int, Any, Electric]:
-    """Look for a switch of the circuit, or the end of a rest, in a step off the backstop that ends so.
+    """Search a step off the backstop for a switch of the circuit, or the end of a rest.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""One step of the Runge-Kutta method DOP853: in time, and in the regularised variables of a backstop contact.
+"""One step of the Runge-Kutta method DOP853, in time or in the regularised variables of the backstop.
 
 In the backstop, delta = b - x and the force holds delta^1.5, which is not smooth at delta = 0. With w =
 sqrt(delta) and a new independent variable s, dt = 2 w ds, the motion obeys

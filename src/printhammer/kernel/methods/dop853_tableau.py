@@ -13,7 +13,7 @@ _LONGEST = 9
 
 
 def _row(*weights: float) -> tuple[float, ...]:
-    """Return weights, followed by zeros: a sum over rows of one length is compiled once for all of them."""
+    """Pad weights with zeros: sums over rows of equal length are compiled once."""
     return weights + (0.0,) * (_LONGEST - len(weights))
 
 

@@ -1,10 +1,9 @@
-"""Whether and where a quintic crosses a level: the search for switches inside one step.
+"""Crossing of a level by a quintic: the search for switches within a step.
 
-The quintic takes position, velocity and acceleration at both ends of a step from the integrator. Its
-Bernstein coefficients bound it (convex hull) and those of its derivative bound the number of its extrema
-(variation diminishing, G. Farin, *Curves and Surfaces for CAGD*, ch. 5), so that a step on which two
-crossings could hide is recognised from six numbers. The quintic only says where to look; the switch itself is
-located with the integrator.
+Position, velocity and acceleration at both ends of a step define the quintic. Its Bernstein coefficients
+bound it (convex hull) and those of its derivative bound the number of its extrema (variation diminishing, G.
+Farin, *Curves and Surfaces for CAGD*, ch. 5), so that six numbers show whether a step could hide two
+crossings. The quintic provides an initial guess; the integrator locates the switch itself.
 """
 
 from __future__ import annotations
@@ -13,12 +12,13 @@ from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model.modes import NEAR_TOUCH, NO_SWITCH, REACHED_FRONT, UNRESOLVED
 
 MARGIN = 1e-3
-"""Distance to a level, in lengths of the control polygon, within which an extremum is located first."""
+"""Distance to a level, in units of the control polygon's length, within which an extremum is located first.
+"""
 
 
 @compiled
 def sign_changes(d0: float, d1: float, d2: float, d3: float, d4: float) -> int:
-    """Count the sign changes in a sequence of five numbers, zeros left out."""
+    """Count the sign changes in a sequence of five numbers, ignoring zeros."""
     changes = 0
     last = 0.0
     for d in (d0, d1, d2, d3, d4):
@@ -45,7 +45,7 @@ def control_points(
 def rises_through(
     x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float, level: float
 ) -> int:
-    """Tell whether the quintic, at or below `level` at its start, rises through it.
+    """Decide whether the quintic, at or below `level` at its start, rises through the level.
 
     Returns
     -------
@@ -72,7 +72,7 @@ def rises_through(
 
 @compiled
 def turns_down(x0: float, v0: float, a0: float, x1: float, v1: float, a1: float, h: float) -> int:
-    """Tell whether the velocity, not negative at the start, becomes negative.
+    """Decide whether the velocity, not negative at the start, becomes negative.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def position_root(
         if not (low < s < high):
             s = 0.5 * (low + high)
         r = 1.0 - s
-        # De Casteljau, the last two levels written out: value and slope together.
+        # De Casteljau with the last two levels written out: value and slope together.
         r4, s4 = r * r * r * r, s * s * s * s
         left = (
             r4 * x0 + 4.0 * r * r * r * s * p1 + 6.0 * r * r * s * s * p2 + 4.0 * r * s * s * s * p3 + s4 * p4
@@ -125,7 +125,7 @@ def velocity_root(v0: float, a0: float, v1: float, a1: float, h: float) -> float
     """Return the fraction of the step in (0, 1] at which the cubic of the velocity falls to zero."""
     c2 = 3.0 * (v1 - v0) - h * (2.0 * a0 + a1)
     c3 = 2.0 * (v0 - v1) + h * (a0 + a1)
-    # From rest, the root at the start is divided out.
+    # From rest, divide out the root at the start.
     at_rest = v0 == 0.0
     low, high = 0.0, 1.0
     s = v0 / (v0 - v1) if v0 != v1 else 0.5

@@ -1,9 +1,8 @@
-"""One controlled step off the backstop that ends exactly on the first switch, if there is one inside it.
+"""One controlled step off the backstop that ends exactly on the first switch inside it, if any.
 
-After a step is accepted, its quintic tells whether a switch lies inside (see the module `hermite`).
-If so, the step is repeated from its start with the length that the quintic suggests, and the small rest is
-closed with the exact derivatives at that point: the displacement of the switch is exact, its time as good as
-the integrator.
+After a step is accepted, its quintic shows whether a switch lies inside (see the module `hermite`). If so,
+the step is repeated from its start with the length suggested by the quintic, and the exact derivatives close
+the small remainder: the displacement of the switch is exact, its time as accurate as the integrator.
 """
 
 from __future__ import annotations
@@ -38,12 +37,12 @@ State = Any
 """Time, position, velocity, acceleration."""
 
 FAILED = -1
-"""In place of a switch: no step, however short, has a finite error below the tolerance."""
+"""Replaces a switch: no step, however short, has a finite error below the tolerance."""
 
 
 @inlined
 def takes_velocity(mode: int) -> bool:
-    """Tell whether the force off the backstop depends on the velocity."""
+    """Whether the force off the backstop depends on the velocity."""
     return HAS_DAMPING or HAS_CIRCUIT or (HAS_PACK and not MEMORY and mode == M.LOADING)
 
 
@@ -61,7 +60,7 @@ def plain_step(
 def whole_step(
     t: float, x: float, v: float, a: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Do as `plain_step`; return also the electric state at the end, and its error in its scales."""
+    """Like `plain_step`, with the electric state at the end, and its error in units of its scales."""
     if HAS_CIRCUIT:
         return whole_time_step(t, x, v, a, h, law)
     x1, v1, a1, error_x, error_v = plain_step(t, x, v, a, h, law)
@@ -70,7 +69,7 @@ def whole_step(
 
 @compiled
 def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, control: Control) -> float:
-    """Return the error estimate of a step over what is allowed; NaN stays NaN.
+    """Return the ratio of a step's error estimate to the allowance; NaN stays NaN.
 
     That of the electric state is in units of its scales. `control` is (scale of x, scale of v, allowance of
     the order 6 estimate, allowance of the order 7 estimate).
@@ -94,10 +93,10 @@ def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, contr
 
 @compiled
 def step_factor(ratio: float) -> float:
-    """Return the factor for the next step length after an error `ratio`: a NaN or infinity shortens most."""
+    """Return the factor for the next step size after an error `ratio`; NaN or infinity shortens most."""
     if not ratio < 1e6:
         return 0.2
-    # The eighth root by three square roots, a power would cost as much as half a step.
+    # The eighth root as three square roots; a power would cost as much as half a step.
     return min(5.0, max(0.2, 0.85 / math.sqrt(math.sqrt(math.sqrt(max(ratio, 1e-7))))))
 
 
@@ -163,9 +162,9 @@ def land_on_reversal(
 
 @called
 def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
-    """Return the longest step [s] that is stable for small oscillations about the present place.
+    """Return the largest step [s] that is stable for small oscillations about the present position.
 
-    Near rest all errors are below the tolerance, those of an unstable step too, until they have grown to it.
+    Near rest all errors are below the tolerance, including those of an unstable step at first.
     """
     t, x, v, _a = start
     mode, memory, hammer, drive = law
@@ -190,7 +189,7 @@ def longest_still_step(start: State, law: ForceLaw, control: Control) -> float:
 
 @compiled
 def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
-    """Return the sign function of a contact that may let go: positive while it pushes."""
+    """Return the sign function of a contact that may release: positive while it pushes."""
     if mode == M.BACKSTOP_RELEASED:
         return backstop_switch(hammer[BACKSTOP_PART:MAGNET], math.sqrt(max(hammer[POSITION] - x, 0.0)), v)
     return pack_switch(hammer[PACK:BACKSTOP_PART], x, v)
@@ -198,7 +197,7 @@ def pushes(x: float, v: float, mode: int, hammer: Hammer) -> float:
 
 @compiled
 def lets_go_or_takes_hold(x: float, v: float, mode: int, hammer: Hammer) -> bool:
-    """Tell whether a contact that may let go no longer does what its mode says."""
+    """Whether a contact that may release no longer matches its mode."""
     number = pushes(x, v, mode, hammer)
     return number > 0.0 if mode in (M.PACK_RELEASED, M.BACKSTOP_RELEASED) else number < 0.0
 
@@ -225,7 +224,7 @@ def land_on_push(start: State, h: float, upper: float, law: ForceLaw, control: C
 def level_switch(
     start: State, end: State, h: float, level: float, sign: float, law: ForceLaw, control: Control
 ) -> tuple[int, float, float]:
-    """Look for sign * x rising through sign * `level` in a step: a code, the fraction, a bound of it."""
+    """Search a step for sign * x rising through sign * `level`: a code, the fraction, a bound on it."""
     x0, v0, a0 = sign * start[1], sign * start[2], sign * start[3]
     x1, v1, a1 = sign * end[1], sign * end[2], sign * end[3]
     code = rises_through(x0, v0, a0, x1, v1, a1, h, sign * level)
@@ -246,7 +245,7 @@ def level_switch(
 def first_switch(
     start: State, end: State, h: float, law: ForceLaw, peak: float, control: Control
 ) -> tuple[int, float, float, float, float]:
-    """Find the first switch inside a step: its name, fraction, upper bound, level and direction."""
+    """Find the first switch inside a step: its code, fraction, upper bound, level and direction."""
     mode, hammer = law.mode, law.hammer
     switch, fraction, upper, level, sign = M.NO_SWITCH, 2.0, 1.0, 0.0, 1.0
     if (

@@ -71,7 +71,7 @@ WEIGHTS = (
 def powers(
     t: float, x: float, v: float, w: float, mode: int, memory: float, hammer: Hammer, drive: Drive
 ) -> tuple[float, float, float, float, float]:
-    """Return the powers [W] of coil and drive force, and those that pack, backstop and damping take away."""
+    """Return the powers [W] of coil and drive force, and those dissipated by pack, backstop and damping."""
     value = value_at(t, x, hammer, drive)
     coil = 0.0
     force = 0.0
@@ -90,9 +90,9 @@ def powers(
 
 @compiled
 def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[float, float, float, float]:
-    """Return the powers [W] that the supply gives, and that coil, driver and shorted turn turn into heat.
+    """Return the powers [W] of the supply, and those dissipated by coil, driver and shorted turn.
 
-    A supply's own resistance and the diodes are the driver's.
+    The internal resistance of the supply and the diodes belong to the driver.
     """
     live, electric = drive
     current = coil_current(x, electric, hammer, live)
@@ -102,7 +102,7 @@ def electric_powers(t: float, x: float, hammer: Hammer, drive: Drive) -> tuple[f
         turn = hammer[TURN_RESISTANCE] * around * around
     supply, driver = 0.0, 0.0
     if hammer[CAPACITANCE] > 0.0:
-        # Of a reservoir for several coils the part of one.
+        # Of a reservoir shared by several coils, the share of one coil.
         charging = (hammer[CHARGED] - electric[2]) / hammer[CHARGING]
         supply += hammer[CHARGED] * charging / hammer[COILS]
         driver += hammer[CHARGING] * charging * charging / hammer[COILS]
@@ -200,7 +200,7 @@ def quadratures(
                 for k in range(4):
                     out[row, 5 + k] += share * terms[k]
         if mode == M.BACKSTOP_RELEASED:
-            # The backstop has let go: what it still stores is lost as it creeps back.
+            # The energy still stored in a released backstop is lost as it recovers.
             first_x, _v, _w = state_in_step(low, t0, x0, v0, mode, kept, hammer, start)
             last_x, _v, _w = state_in_step(high, t0, x0, v0, mode, kept, hammer, start)
             out[row, 3] = energy_behind(first_x, hammer) - energy_behind(last_x, hammer)

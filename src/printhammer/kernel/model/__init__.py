@@ -1,1 +1,1 @@
-"""The model: laws, force sum, modes, drive at an instant, and slopes of the laws."""
+"""Model: laws, force sum, modes, drive at an instant, and derivatives of the laws."""

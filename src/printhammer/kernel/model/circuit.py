@@ -63,22 +63,23 @@ if TYPE_CHECKING:
 Hammer = Any
 
 Electric = Any
-"""Flux linkage of the coil, that of the shorted turn [Wb], voltage of the reservoir [V]; or nothing."""
+"""Flux linkage of the coil and of the shorted turn [Wb], voltage of the reservoir [V]; or the empty tuple."""
 
 SOURCE, CHOPPED, BLOCKED, BACKWARD = 0.0, 1.0, 2.0, 3.0
-"""Paths of the current: as the piece says; around through the diode; none; decay of a negative current."""
+"""Paths of the current: through the source, through the diode of a chopper, none, decay of a negative
+current."""
 
 PATH = 1
 UNTIL = 2
 """Places in `live`, counted from its end."""
 
 STILL_SHARE = 1e-12
-"""Share of the scales that may change in one characteristic time in a circuit that counts as at rest."""
+"""Largest change in one characteristic time of a circuit at rest, as a fraction of the scales."""
 
 
 @inlined
 def driven(live: Any, electric: Electric) -> Drive:
-    """Return what the forces need of the drive."""
+    """Return the drive argument of the force functions."""
     if HAS_CIRCUIT:
         return live, electric
     return live
@@ -92,14 +93,14 @@ def path_of(live: Any) -> float:
 
 @inlined
 def take_path(live: Any, path: float, until: float) -> None:
-    """Put the current on a path."""
+    """Set the path of the current."""
     live[live.size - PATH] = path
     live[live.size - UNTIL] = until
 
 
 @inlined
 def kind_of(live: Any) -> float:
-    """Return the kind of the piece under way; -1 if there is none."""
+    """Return the kind of the active piece; -1 without one."""
     return float(live[3]) if live[0] > 0.0 else -1.0
 
 
@@ -122,7 +123,7 @@ def linkage_at(x: float, current: float, hammer: Hammer) -> float:
 
 @inlined
 def coil_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the current in the coil [A]; none flows in a path that is blocked."""
+    """Return the current in the coil [A]; zero on a blocked path."""
     if path_of(live) == BLOCKED:
         return 0.0
     if hammer[TURN_RESISTANCE] > 0.0:
@@ -132,7 +133,7 @@ def coil_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> flo
 
 @inlined
 def magnetising_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the current [A] that the magnet sees: in the coil, and in the shorted turn if there is one."""
+    """Return the magnetising current [A]: that of the coil plus that of the shorted turn, if any."""
     if hammer[TURN_RESISTANCE] > 0.0:
         return current_at(x, electric[1], hammer)
     return coil_current(x, electric, hammer, live)
@@ -155,7 +156,7 @@ def source_of(t: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[
 
 @inlined
 def open_rate(x: float, v: float, electric: Electric, hammer: Hammer) -> float:
-    """Return the rate of the flux linkage [V] while no current flows in the coil."""
+    """Return the rate of the flux linkage [V] if no current flows in the coil."""
     if hammer[TURN_RESISTANCE] > 0.0:
         return float(-hammer[TURN_RESISTANCE] * current_at(x, electric[1], hammer))
     if hammer[COUPLED] != 0.0:
@@ -197,7 +198,7 @@ def electric_rates(
 
 @inlined
 def moved(electric: Electric, pause: float, rates: Electric) -> Electric:
-    """Return the electric state after a pause [s] in which its rates stay."""
+    """Return the electric state after a pause [s] with constant rates."""
     return (
         electric[0] + pause * rates[0],
         electric[1] + pause * rates[1],
@@ -207,7 +208,7 @@ def moved(electric: Electric, pause: float, rates: Electric) -> Electric:
 
 @compiled
 def electric_at_rest(x: float, hammer: Hammer) -> tuple[float, float, float]:
-    """Return the electric state without current, the reservoir full."""
+    """Return the electric state without current, with a full reservoir."""
     linkage = linkage_at(x, 0.0, hammer)
     return linkage, linkage, hammer[CHARGED]
 
@@ -238,7 +239,7 @@ def turn_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> flo
 
 @compiled
 def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float, float, float]:
-    """Return the electric state next to `electric` in which no current flows in the coil."""
+    """Return the electric state with zero coil current, and other components as in `electric`."""
     if hammer[TURN_RESISTANCE] > 0.0:
         return electric[1], electric[1], electric[2]
     return linkage_at(x, 0.0, hammer), electric[1], electric[2]
@@ -246,7 +247,7 @@ def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float
 
 @inlined
 def path_may_change(live: Any) -> bool:
-    """Tell whether anything but an edge can put the current on another path."""
+    """Whether the path of the current can change other than at an edge."""
     kind = kind_of(live)
     if kind == SWITCHED_PIECE:
         return path_of(live) != SOURCE or not math.isinf(live[6])
@@ -255,7 +256,7 @@ def path_may_change(live: Any) -> bool:
 
 @compiled
 def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return a number, of the order of one, that is positive while the path of the current stays."""
+    """Return a gap of order one that is positive as long as the path of the current is kept."""
     kind, path = kind_of(live), path_of(live)
     scale = hammer[CURRENT_SCALE]
     if kind == SWITCHED_PIECE:
@@ -279,7 +280,7 @@ def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) 
 
 @compiled
 def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Put the current on the path that follows where the gap has closed; return the electric state there."""
+    """Select the path that follows once the gap has closed; return the electric state there."""
     path = path_of(live)
     if kind_of(live) == DECAY_PIECE:
         if path == BLOCKED:
@@ -301,7 +302,7 @@ def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any)
 
 @compiled
 def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Put the current on its path where a piece begins, or an off-time ends; return the electric state."""
+    """Select the path at the start of a piece, or at the end of an off-time; return the electric state."""
     current = coil_current(x, electric, hammer, live)
     kind = kind_of(live)
     if kind == SWITCHED_PIECE and current >= live[6]:
@@ -318,7 +319,7 @@ def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: An
 
 @compiled
 def is_quiet(t: float, x: float, time_scale: float, electric: Electric, hammer: Hammer, live: Any) -> bool:
-    """Tell whether the circuit of an armature at rest stays as it is until the next edge."""
+    """Whether the circuit of an armature at rest remains unchanged until the next edge."""
     kind = kind_of(live)
     if kind != -1.0 and kind < SWITCHED_PIECE:
         return False
@@ -330,7 +331,7 @@ def is_quiet(t: float, x: float, time_scale: float, electric: Electric, hammer: 
 
 @compiled
 def fastest_rate(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the largest decay rate of the circuit [1/s] about the present state."""
+    """Return the largest decay rate of the circuit [1/s], linearised about the present state."""
     if path_of(live) == BLOCKED and hammer[TURN_RESISTANCE] == 0.0:
         return 0.0
     current = magnetising_current(x, electric, hammer, live)

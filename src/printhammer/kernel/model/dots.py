@@ -1,4 +1,4 @@
-"""The rule by which a contact makes a dot, and where the numbers of a dot lie in its row.
+"""Rule by which a contact makes a dot, and the columns of a dot's row.
 
 A pack contact belongs to the latest firing at or before its touch. The first contact of a firing makes its
 dot, later ones are extra contacts. A contact that is open at the start of a run belongs to no firing.
@@ -26,22 +26,22 @@ DOT_WIDTH = 6
 DOT = 0
 """Number of the contact that makes the dot of its firing; extra contacts have 1, 2, and so on."""
 NO_DOT = -1
-"""In place of a number: the contact belongs to no firing."""
+"""Marks a contact that belongs to no firing."""
 
 
 def contact_number(surface: int, initial: bool, fired: int, earlier: int) -> int:
-    """Return the number of a contact among the pack contacts of its firing, `NO_DOT` if it has none.
+    """Return the index of a contact among the pack contacts of its firing, or `NO_DOT`.
 
     Parameters
     ----------
     surface : int
-        Code of what is touched.
+        Code of the surface.
     initial : bool
         Whether the contact was open at the start of the run.
     fired : int
         Index of the latest firing at or before the touch, -1 if there is none.
     earlier : int
-        Number of contacts counted for that firing before.
+        Number of earlier contacts of that firing.
     """
     if surface != PACK_SURFACE or initial or fired < 0:
         return NO_DOT
@@ -49,7 +49,7 @@ def contact_number(surface: int, initial: bool, fired: int, earlier: int) -> int
 
 
 def firing_before(t: float, firings: Any) -> int:
-    """Return the index of the latest firing at or before time `t` [s], -1 if there is none."""
+    """Return the index of the latest firing at or before time `t` [s], or -1."""
     low, high = 0, firings.size
     while low < high:
         middle = (low + high) // 2

@@ -1,6 +1,6 @@
-"""The force sum, equation (2), in each mode: plain scalar functions of the bound laws.
+"""Force sum, equation (2), in each mode: plain scalar functions of the bound laws.
 
-The hammer's constants travel as one array, see :mod:`printhammer.kernel.model.layout`.
+The constants of the hammer are in one array, see :mod:`printhammer.kernel.model.layout`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 @inlined
 def value_at(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the value of the drive, or the current [A] that a coil circuit makes of it."""
+    """Return the value of the drive, or the current [A] of a coil circuit."""
     if HAS_CIRCUIT:
         return magnetising_current(x, drive[1], hammer, drive[0])
     return drive_value(t, drive)

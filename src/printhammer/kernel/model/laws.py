@@ -1,4 +1,4 @@
-"""What a compiled kernel is bound to: the laws of one hammer's parts, and choices fixed at compile time.
+"""Laws to which a compiled kernel is bound, and choices fixed at compile time.
 
 The functions and flags below are declarations. The modules listed in
 :data:`printhammer.kernel.compile.specialise.TEMPLATES` import them for the type checker only; at run time
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Laws:
-    """The modules that hold the laws of one hammer, and the choices fixed at compile time.
+    """Modules with the laws of one hammer, and the choices fixed at compile time.
 
     Attributes
     ----------
@@ -68,39 +68,39 @@ FORCE_DRIVE: bool
 PACK_PULLS: bool
 BACKSTOP_PULLS: bool
 RELOAD_ALONG_UNLOADING: bool
-# In variational equations only: whether constants force them, what of a column changes between switches, and
-# the row at which a circuit's part of it begins.
+# For variational equations only: whether constants force them, the number of rows that change between
+# switches, and the first row of a circuit.
 FORCED: bool
 CHANGING: int
 ELECTRIC_ROW: int
-# In lanes only: what the drive consists of.
+# For lanes only: the pieces of which the drive consists.
 EXPONENTIALS: int
 CUBIC: bool
 SINE: bool
 
-# Each takes the packed constants of its part first.
+# The packed constants of the part are the first argument of each function.
 magnet_force: Law2
 """Net force of permanent magnet and coil [N] at a displacement [m] and a current [A]."""
 magnet_energy: Law1
-"""Energy [J] at a displacement [m], of which minus the slope is the magnet force at zero current."""
+"""Potential energy [J] at a displacement [m]: minus its slope is the magnet force at zero current."""
 magnet_linkage: Law2
 """Flux linkage [Wb] at a displacement [m] and a current [A], of the same coenergy as the force."""
 magnet_emf: Law2
-"""Its slope with displacement [Wb/m], which is that of the force with current [N/A]."""
+"""Slope of the flux linkage with displacement [Wb/m], equal to that of the force with current [N/A]."""
 magnet_inductance: Law2
-"""Its slope with current [H]."""
+"""Slope of the flux linkage with current [H]."""
 magnet_current: Law3
-"""Current [A] at a displacement [m] at which it and an inductance [H] make a flux linkage [Wb]."""
+"""Current [A] at a displacement [m] at which magnet and an inductance [H] produce a flux linkage [Wb]."""
 spring_force: Law1
 """Force of the spring [N] at a displacement [m]."""
 spring_energy: Law1
-"""Energy [J] at a displacement [m], of which minus the slope is the spring force."""
+"""Potential energy [J] at a displacement [m]: minus its slope is the spring force."""
 damping_force: Law1
 """Force of the damping of the armature [N] at a velocity [m/s]; differentiable."""
 pack_loading: Law2
 """Force of the pack [N] on the loading branch, negative where it pushes; of displacement and velocity."""
 pack_memory: Law1
-"""What `pack_unloading` needs of the latest local maximum [m]."""
+"""Memory of the latest local maximum [m], passed to `pack_unloading`."""
 pack_unloading: Law3
 """Force of the pack [N] on the unloading branch; of displacement, velocity and memory."""
 pack_switch: Law2

@@ -1,4 +1,4 @@
-"""Where the constants of a hammer lie in the one array that the kernel works with.
+"""Layout of the hammer's constants in the single array of the kernel.
 
 Inverse mass, position of the backstop and front of the pack come first, then the packed constants of damping,
 spring, pack, backstop, coil with its supply, and magnet, each from a fixed place on: sixteen places each,
@@ -26,33 +26,34 @@ PLACES = {
     "magnet": MAGNET,
 }
 ROOM = {"damping": SPRING - DAMPING, "spring": 16, "pack": 16, "backstop": 16, "coil": SUPPLY - COIL}
-"""Number of constants that a part may have; a magnet any."""
+"""Number of constants available to a part; unlimited for a magnet."""
 
-# The coil, from COIL on.
+# Coil, from COIL on.
 RESISTANCE, INDUCTANCE, TURN_RESISTANCE, LEAKAGE, COUPLED = range(COIL, COIL + 5)
 """Resistance [ohm], constant inductance [H], resistance [ohm] and leakage [H] of a shorted turn, or 0, and
 whether the magnet's flux is linked: 1 or 0."""
-# Its supply, from SUPPLY on.
+# Supply of the coil, from SUPPLY on.
 DIODE, SERIES, CAPACITANCE, CHARGING, CHARGED, COILS, CURRENT_SCALE, LINKAGE_SCALE = range(SUPPLY, SUPPLY + 8)
 """Voltage of the diode in which a chopped current circulates [V], resistance of an ideal source [ohm],
 capacitance of a reservoir [F] or 0, the resistance [ohm] and the voltage [V] from which it is charged, number
 of coils on it; typical current [A] and flux linkage [Wb], by which errors are measured."""
 
 CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
-"""Kinds of the rows of a table of pieces, see `printhammer.kernel.model.pulses`; the last ends a waveform."""
+"""Kinds of rows in a table of pieces, see `printhammer.kernel.model.pulses`; END marks the end of a waveform.
+"""
 SWITCHED_PIECE, DECAY_PIECE, RESERVOIR_PIECE = 4.0, 5.0, 6.0
-"""Kinds of the rows of a driver, see `printhammer.kernel.model.circuit`."""
+"""Kinds of rows of a driver, see `printhammer.kernel.model.circuit`."""
 
 
 NODE_WIDTH = 5
 """Columns of a node of a record, see `printhammer.kernel.single.record`."""
 ELECTRIC = NODE_WIDTH
-"""First of the four further columns of a node in a kernel with a coil circuit: electric state and path."""
+"""First of the four additional columns of a node with a coil circuit: electric state and path."""
 CIRCUIT_NODE_WIDTH = NODE_WIDTH + 4
 
 
 class Train(NamedTuple):
-    """A drive of n firings, see `printhammer.kernel.model.pulses`, and working space for a pass over it.
+    """Drive of n firings, see `printhammer.kernel.model.pulses`, with working space for a pass over it.
 
     Attributes
     ----------
@@ -78,7 +79,7 @@ class Train(NamedTuple):
 
 
 class ForceLaw(NamedTuple):
-    """What the force off the backstop depends on beside time, displacement and velocity."""
+    """Arguments of the force off the backstop besides time, displacement and velocity."""
 
     mode: int
     memory: float

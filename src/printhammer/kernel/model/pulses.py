@@ -1,14 +1,14 @@
-"""The drive at an instant, and the instants at which one of its pieces begins or ends.
+"""Drive at an instant, and the instants at which one of its pieces begins or ends.
 
-A drive is n firing times and the waveform of each: a table of pieces ``[start, kind, p0, p1, p2, p3]``, of
-which the last, of kind `END`, holds the end of support; the other kinds are those of `piece_value`. The
-tables of different waveforms lie one after the other, the one with the longest support last; a firing is told
-by the row at which its table begins. The pieces under way are known by their rows, not by comparing times, so
-that an instant exactly on an edge belongs to the piece that begins there.
+A drive consists of n firing times and the waveform of each: a table of pieces ``[start, kind, p0, p1, p2,
+p3]``, of which the last, of kind `END`, holds the end of support; `piece_value` defines the other kinds. The
+tables of different waveforms are concatenated, the one with the longest support last; a firing refers to the
+row at which its table begins. Active pieces are identified by their rows, not by comparing times, so that an
+instant exactly on an edge belongs to the piece that begins there.
 
-While a run goes on, the pieces under way are kept side by side in one array ``live``: their number, then
-seven values each, ``[firing, start, kind, p0, p1, p2, p3]``. It is rewritten at every edge; all the force sum
-needs is in it.
+During a run, the active pieces are kept in one array ``live``: their number, then seven values each,
+``[firing, start, kind, p0, p1, p2, p3]``. It is rewritten at every edge, and is the only data on the drive
+that the force sum needs.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def piece_value(row: Any, i: int, s: float) -> float:
 
 @compiled
 def piece_rate(row: Any, i: int, s: float) -> float:
-    """Return the rate of a piece in time, as `piece_value`."""
+    """Return the time derivative of a piece; see `piece_value`."""
     kind, p1, p2, p3 = row[i], row[i + 2], row[i + 3], row[i + 4]
     if kind == EXPONENTIAL_PIECE:
         return float(-p1 * p2 * math.exp(-p2 * s))
@@ -54,7 +54,7 @@ def piece_rate(row: Any, i: int, s: float) -> float:
 
 @compiled
 def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
-    """Return the change of a piece, as `piece_value`, with `changes` of p0 to p3 from place `j` on."""
+    """Return the derivative of a piece, see `piece_value`, along `changes` of p0 to p3 from place `j` on."""
     kind, p1, p2, p3 = row[i], row[i + 2], row[i + 3], row[i + 4]
     d0, d1, d2, d3 = changes[j], changes[j + 1], changes[j + 2], changes[j + 3]
     if kind == EXPONENTIAL_PIECE:
@@ -67,7 +67,7 @@ def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
 
 @inlined
 def sum_of_pulses(t: float, drive: Drive) -> float:
-    """Return the sum of at least one pulse under way."""
+    """Return the sum of the active pulses, of which there is at least one."""
     total = 0.0
     i = 1
     for _ in range(int(drive[0])):
@@ -78,7 +78,7 @@ def sum_of_pulses(t: float, drive: Drive) -> float:
 
 @inlined
 def drive_value(t: float, drive: Drive) -> float:
-    """Return the sum of all pulses under way at time `t` [s]: amperes or newtons."""
+    """Return the sum of all active pulses at time `t` [s]: amperes or newtons."""
     if drive[0] == 0.0:
         return 0.0
     return sum_of_pulses(t, drive)
@@ -91,11 +91,11 @@ def pass_edges(
     first: int,
     last: int,
 ) -> tuple[int, int, float]:
-    """Begin and end all pieces whose edge is not after time `t` [s] and rewrite `live`.
+    """Start and end all pieces whose edge is not after time `t` [s], and rewrite `live`.
 
-    Pulses before `first` have ended, those from `last` on have not been fired; pulse p between them is in the
-    piece ``under_way[p]``, which is the end of its table where it ended before an older one. With `replace`,
-    a firing cuts off the pulses before it.
+    Pulses before `first` have ended, those from `last` on have not been fired; pulse p in between is in the
+    piece ``under_way[p]``, which is the end of its table if it ended before an older pulse. With `replace`, a
+    firing cuts off earlier pulses.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def pass_edges(
 
 @compiled
 def edges_at(t: float, train: Train) -> tuple[int, int, float]:
-    """Do as `pass_edges` does from the start, but leave out the pulses that ended before time `t` [s]."""
+    """Like `pass_edges` from the start, but without the pulses that ended before time `t` [s]."""
     firings, pieces = train.firings, train.pieces
     # The last table has the longest support.
     oldest = t - pieces[pieces.shape[0] - 1, 0]
@@ -144,6 +144,6 @@ def edges_at(t: float, train: Train) -> tuple[int, int, float]:
             low = middle + 1
         else:
             high = middle
-    # One more than needed: a pulse may end at `t` by rounding.
+    # One more than necessary: by rounding a pulse may end at `t`.
     low = max(low - 1, 0)
     return pass_edges(t, train, low, low)

@@ -1,4 +1,4 @@
-"""The one table of transitions: what each switch of each mode leads to, and how a variation jumps there."""
+"""Table of transitions: the mode that follows each switch, and the jump of a variation there."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from printhammer.kernel.model import modes as M
 
 NO_JUMP = 0
-"""Where a contact lets go or takes hold its force is zero."""
+"""The force is zero where a contact releases or takes hold."""
 AT_FRONT = 1
 AT_POSITION = 2
 AT_PEAK = 3
@@ -28,7 +28,7 @@ TRANSITIONS: Final = (
     (M.RELOADING, M.REACHED_PEAK, M.LOADING, AT_PEAK),
     (M.LOADING, M.REVERSAL, M.UNLOADING, TURN),
     (M.RELOADING, M.REVERSAL, M.UNLOADING, TURN),
-    # A reversal on the front itself ends the contact; of the others, the forces tell which it is.
+    # A reversal on the front itself ends the contact; elsewhere the forces decide.
     (M.RELOADING, M.REVERSAL, M.FREE, AT_FRONT),
     (M.UNLOADING, M.REVERSAL, M.UNLOADING, TURN),
     (M.UNLOADING, M.REVERSAL, M.RELOADING, TURN),
@@ -38,12 +38,12 @@ TRANSITIONS: Final = (
     (M.BACKSTOP, M.PUSH_ENDED, M.BACKSTOP_RELEASED, NO_JUMP),
     (M.BACKSTOP_RELEASED, M.PUSH_BEGAN, M.BACKSTOP, NO_JUMP),
 )
-"""Mode, the switch that ends it, the mode that follows, and how a variation jumps there."""
+"""Mode, switch that ends it, mode that follows, and jump of a variation."""
 
 FOLLOWING = np.full((len(M.MODE_NAMES), M.PUSH_BEGAN + 1), -1)
-"""The mode after a switch, by mode and switch; after a reversal where the wire goes out again."""
+"""Mode after a switch, by mode and switch; after a reversal, the mode of an armature that leaves."""
 JUMPS = np.full((len(M.MODE_NAMES), len(M.MODE_NAMES)), NO_JUMP)
-"""The jump between two modes; of unloading to unloading, only where the local maximum is a new one."""
+"""Jump between two modes; from unloading to unloading only if the local maximum is a new one."""
 
 for _mode, _switch, _following, _jump in reversed(TRANSITIONS):
     FOLLOWING[_mode, _switch] = _following

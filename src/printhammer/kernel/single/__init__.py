@@ -1,1 +1,1 @@
-"""One run of one hammer, its record, and what is read from that."""
+"""One run of one hammer, its record, and quantities computed from the record."""

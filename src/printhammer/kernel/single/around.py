@@ -1,4 +1,4 @@
-"""What the loop of a run asks before and after a step: modes, lengths of steps, ends of the range."""
+"""Checks of the run loop before and after a step: modes, step sizes, limits of the range."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def time_to_level(distance: float, v: float, a: float) -> float:
 
 @compiled
 def sensible_step(h: float, x: float, v: float, a: float, mode: int, hammer: Hammer) -> float:
-    """Shorten a step that would overshoot the backstop or the pack front by far."""
+    """Shorten a step that would overshoot the backstop or the pack front considerably."""
     if HAS_BACKSTOP and mode == M.FREE:
         height = x - hammer[POSITION]
         if height > 0.0:
@@ -97,12 +97,12 @@ def out_of_bounds(x: float, bounds: Any) -> int:
 
 @compiled
 def left_range(start: State, end: State, law: ForceLaw, control: Control, bounds: Any) -> tuple[bool, State]:
-    """Tell whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
+    """Whether a step from `start` to `end` leaves the range, even briefly, and the state there."""
     h = end[0] - start[0]
     for side in range(2):
         bound = bounds[side]
         sign = 1.0 if side == 1 else -1.0
-        # A backstop that does not lie outside the range keeps the armature off its lower end.
+        # A backstop inside the range keeps the armature off its lower end.
         if math.isinf(bound) or h <= 0.0 or (HAS_BACKSTOP and side == 0 and law.mode == M.FREE):
             continue
         if start[1] == bound and sign * end[1] > sign * bound:
@@ -137,7 +137,7 @@ def reversed_mode(
         again = acceleration(t, x, 0.0, M.UNLOADING, memory, hammer, drive) > 0.0
         return (M.RELOADING if again else M.UNLOADING), peak, memory
     # As printed, the loading branch is the stronger one below the peak: the wire goes in again only if the
-    # other forces overcome it, else this point is at once a new local maximum.
+    # other forces overcome it; otherwise this point is a new local maximum.
     if acceleration(t, x, 0.0, M.LOADING, memory, hammer, drive) > 0.0:
         return M.LOADING, peak, memory
     return M.UNLOADING, x, pack_memory(hammer[PACK:BACKSTOP_PART], x)
@@ -145,9 +145,9 @@ def reversed_mode(
 
 @compiled
 def kick_into_backstop(t: float, a: float, t_next: float, control: Control) -> tuple[float, float, float]:
-    """Return time, w and velocity shortly after a touch without velocity, the contact force still negligible.
+    """Return time, w and velocity shortly after a touch without velocity, with negligible contact force.
 
-    The regularised equations stand still at w = v = 0.
+    The regularised equations are stationary at w = v = 0.
     """
     depth = 1e-15 * control[0]
     pause = min(math.sqrt(2.0 * depth / -a), t_next - t)

@@ -1,7 +1,7 @@
-"""The state of a run: one array of numbers with named places, on which every phase of the run works.
+"""State of a run: one array of numbers with named places, shared by every phase of the run.
 
-A run that pauses leaves all that it needs in the array; the next call with the same array and drive continues
-to the bit as if there had been no pause.
+A run that pauses leaves its complete state in the array; the next call with the same array and drive
+continues exactly as without the pause.
 
 For a run that begins the caller sets `TIME`, `POSITION_NOW`, `VELOCITY`; `STATE` to `FRESH`, or to
 `ON_BRANCH` for one that begins inside the pack on the branch `MODE` with the latest local maximum at `PEAK`
@@ -26,7 +26,7 @@ ROOT = 8
 ROOT_RATE = 9
 """dv/ds in the backstop."""
 MEMORY_NOW = 10
-"""What the law of the pack remembers of the latest local maximum."""
+"""Memory of the pack law for the latest local maximum."""
 STEP = 11
 """Length of the next step [s], in the backstop in s of the regularised variables."""
 FREE_STEP = 12
@@ -36,16 +36,16 @@ CONTACT_STEP = 14
 STARTED = 15
 """Mode of the latest step."""
 ENTERED = 16
-"""Whether the rate in the backstop has to be computed anew."""
+"""Whether the rate in the backstop has to be recomputed."""
 WAIT = 17
-"""How long to wait before an armature at rest is looked at again [s]."""
+"""Waiting time before an armature at rest is checked again [s]."""
 STUCK = 18
-"""Number of steps in a row that did not move time."""
+"""Number of consecutive steps that did not advance time."""
 TIME_BEFORE = 19
 FIRST = 20
 LAST = 21
 EDGE = 22
-"""First and last firing under way, time of the next edge of the drive [s]."""
+"""First and last active firing, time of the next edge of the drive [s]."""
 STEPS = 23
 ELECTRIC = 24
 PATH = 27
@@ -57,7 +57,7 @@ TOUCHED = 31
 SIZE = 32
 
 SHORTEST_WAIT = 0.005
-"""Shortest wait, in characteristic times, before an armature at rest is looked at again."""
+"""Shortest wait, in characteristic times, before an armature at rest is checked again; arbitrary."""
 
 FRESH = 0.0
 GOES_ON = 1.0
@@ -65,7 +65,7 @@ ON_BRANCH = 2.0
 
 
 class Setup(NamedTuple):
-    """What stays as it is during a run.
+    """Data that stay constant during a run.
 
     Attributes
     ----------

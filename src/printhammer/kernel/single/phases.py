@@ -1,4 +1,4 @@
-"""What the phases of a run share: parts of its state, the forces in it, the record of it."""
+"""Functions shared by the phases of a run: components of its state, forces, and record."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def electric_of(state: State) -> Electric:
 
 @inlined
 def keep_electric(electric: Electric, state: State) -> None:
-    """Put an electric state into the state of the run."""
+    """Store an electric state in the state of the run."""
     if HAS_CIRCUIT:
         for j in range(3):
             state[C.ELECTRIC + j] = electric[j]
@@ -48,7 +48,7 @@ def keep_electric(electric: Electric, state: State) -> None:
 
 @inlined
 def electric_at_start(x: float, hammer: Hammer, state: State, live: Any) -> Electric:
-    """Return the electric state in which a run begins or goes on, the current on its path."""
+    """Return the electric state at the start or continuation of a run, with the current on its path."""
     if HAS_CIRCUIT:
         if state[C.STATE] == C.GOES_ON:
             take_path(live, state[C.PATH], state[C.UNTIL])
@@ -64,7 +64,7 @@ def electric_at_start(x: float, hammer: Hammer, state: State, live: Any) -> Elec
 
 @inlined
 def keep_path(state: State, live: Any) -> None:
-    """Keep the path of the current for the run to go on."""
+    """Store the path of the current for the continuation of the run."""
     if HAS_CIRCUIT:
         state[C.PATH] = path_of(live)
         state[C.UNTIL] = live[live.size - UNTIL]
@@ -92,7 +92,7 @@ def rate_in_backstop(state: State, setup: Setup) -> None:
 
 @inlined
 def pass_edge(state: State, setup: Setup) -> None:
-    """Take over the pieces of the drive that begin or end now."""
+    """Update the drive at an edge: pieces that begin or end now."""
     train = setup.train
     first, last, edge = pass_edges(state[C.TIME], train, int(state[C.FIRST]), int(state[C.LAST]))
     state[C.FIRST], state[C.LAST], state[C.EDGE] = first, last, edge
@@ -104,14 +104,14 @@ def pass_edge(state: State, setup: Setup) -> None:
 
 @inlined
 def note_path(state: State, setup: Setup, nodes: Any) -> None:
-    """Give the latest node the electric state."""
+    """Write the electric state to the latest node."""
     if HAS_CIRCUIT:
         note_circuit(nodes, int(state[C.USED]), electric_of(state), path_of(setup.train.live))
 
 
 @inlined
 def note_node(mode: int, kept: float, state: State, setup: Setup, nodes: Any) -> None:
-    """Add a node to the record, from which on `mode` holds."""
+    """Append a node to the record, from which `mode` is valid."""
     state[C.USED] = add_node(
         nodes, int(state[C.USED]), state[C.TIME], state[C.POSITION_NOW], state[C.VELOCITY], mode, kept
     )
@@ -120,7 +120,7 @@ def note_node(mode: int, kept: float, state: State, setup: Setup, nodes: Any) ->
 
 @inlined
 def note_state(state: State, setup: Setup, nodes: Any) -> None:
-    """Add a node to the record, with what its mode keeps beside displacement and velocity."""
+    """Append a node to the record, with the memory of its mode."""
     mode = int(state[C.MODE])
     kept = 0.0
     if mode == M.BACKSTOP:

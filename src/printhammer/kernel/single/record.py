@@ -1,4 +1,4 @@
-"""The record of a run: nodes at the ends of all steps, and contacts.
+"""Record of a run: nodes at the ends of all steps, and contacts.
 
 A node is ``[time, position, velocity, mode, memory]``: the mode and memory hold from this node to the next;
 memory is the displacement of the latest local maximum in the pack, w = sqrt(b - x) in the backstop, else
@@ -38,7 +38,7 @@ def add_node(nodes: Rows, used: int, t: float, x: float, v: float, mode: int, me
 
 @compiled
 def note_circuit(nodes: Rows, used: int, electric: Any, path: float) -> None:
-    """Give the latest node its electric state and the path of the current."""
+    """Write the electric state and the path of the current to the latest node."""
     i = min(used, nodes.shape[0]) - 1
     for j in range(3):
         nodes[i, ELECTRIC + j] = electric[j]
@@ -47,7 +47,7 @@ def note_circuit(nodes: Rows, used: int, electric: Any, path: float) -> None:
 
 @compiled
 def relabel_node(nodes: Rows, used: int, mode: int) -> None:
-    """Give the latest node another mode, which holds until the next."""
+    """Change the mode of the latest node, which is valid until the next."""
     nodes[min(used, nodes.shape[0]) - 1, 3] = mode
 
 
@@ -77,7 +77,7 @@ def close_contact(contacts: Rows, used: int, t: float, v: float) -> None:
 
 @compiled
 def carry_contact(contacts: Rows, mode: int) -> int:
-    """Keep the contact in row 0 that goes on after a pause in `mode`; return the number of contacts."""
+    """Move the contact that continues after a pause in `mode` to row 0; return the number of contacts."""
     if mode == FREE:
         return 0
     contacts[0, 5] = -1.0

@@ -1,7 +1,7 @@
-"""States and forces at any times of a recorded run.
+"""States and forces at arbitrary times of a recorded run.
 
-The state inside a step is one shortened step of the same method from the node before it: no interpolation
-formula, and no dependence on the output grid.
+The state inside a step is one shortened step of the same method from the preceding node: there is no
+interpolation formula, and no dependence on the output grid.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ if TYPE_CHECKING:
 
 GOLDEN = 0.3819660112501051
 SAMPLES = 4
-"""Samples in each step of a contact among which its largest depth and force are looked for."""
+"""Samples in each step of a contact in the search for its largest depth and force; arbitrary."""
 
 
 @compiled
 def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
-    """Return what the unloading branch needs of the local maximum `kept` at a node."""
+    """Return the memory of the pack law for the local maximum `kept` of a node."""
     if HAS_PACK and MEMORY and mode in (M.UNLOADING, M.RELOADING, M.HELD_UNLOADING):
         return pack_memory(hammer[PACK:BACKSTOP_PART], kept)
     return 0.0
@@ -69,7 +69,7 @@ def memory_of(mode: int, kept: float, hammer: Hammer) -> float:
 
 @compiled
 def branch_of(mode: int) -> int:
-    """Return the mode whose force acts in `mode`, which may be one of rest."""
+    """Return the mode whose force acts in `mode`, which may be a mode of rest."""
     if mode == M.HELD:
         return M.BACKSTOP
     if mode == M.HELD_LOADING:
@@ -100,7 +100,7 @@ def state_in_step(
 
 @compiled
 def drive_at(node: Any, live: Any) -> Drive:
-    """Return what the forces need of the drive at a node, whose pieces are in `live`."""
+    """Return the drive argument of the force functions at a node, with its pieces in `live`."""
     if HAS_CIRCUIT:
         take_path(live, node[ELECTRIC + 3], math.inf)
         return live, (node[ELECTRIC], node[ELECTRIC + 1], node[ELECTRIC + 2])
@@ -126,7 +126,7 @@ def electric_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Elect
 
 @compiled
 def drive_in_step(t: float, node: Any, hammer: Hammer, drive: Drive) -> Drive:
-    """Return what the forces need of the drive at time `t` [s] in the step that begins at a node."""
+    """Return the drive argument of the force functions at time `t` [s] in the step that begins at a node."""
     if HAS_CIRCUIT:
         return drive[0], electric_in_step(t, node, hammer, drive)
     return drive
@@ -147,7 +147,7 @@ def resample(
     times : float64 array, shape (n,)
         Ascending, inside the run [s].
     nodes, train, hammer
-        As recorded and given in :func:`printhammer.kernel.single.run.run`.
+        As recorded by, and passed to, :func:`printhammer.kernel.single.run.run`.
     out : float64 array, shape (n, 10), with a coil circuit (n, 15)
         Displacement, velocity, drive (current or force), magnet, spring, pack, elastic and viscous force of
         the backstop, damping force, mode; then coil current, voltage across the coil, flux linkage, voltage
@@ -267,7 +267,7 @@ def peaks_of(
         peak_time += (nodes[best[0] + 1, 0] - nodes[best[0], 0]) * best[1] / SAMPLES
     for which in range(2):
         i, j = best if which == 0 else strongest
-        # The extremum lies beside the best sample, perhaps in the step before or after it.
+        # The extremum lies next to the best sample, possibly in an adjacent step.
         for beside in range(-1, 2):
             k = i + beside
             if k < begin or k >= end or (beside < 0 and j > 0) or (beside > 0 and j < SAMPLES):
@@ -296,7 +296,7 @@ def peaks(
     hammer: Hammer,
     out: Any,
 ) -> None:
-    """Fill `out`, shape (m, 3), with what `peaks_of` tells of all recorded contacts."""
+    """Fill `out`, shape (m, 3), with `peaks_of` for all recorded contacts."""
     train = Train(*train)
     for row in range(contacts.shape[0]):
         out[row, 0], out[row, 1], out[row, 2] = peaks_of(contacts[row], nodes, train, hammer)

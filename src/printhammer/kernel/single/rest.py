@@ -1,4 +1,4 @@
-"""An armature at rest, on a rigid backstop or inside the pack: until when the forces leave it there."""
+"""Armature at rest, on a rigid backstop or inside the pack: the time at which the forces end the rest."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def rest_ends(
     t: float, x: float, pause: float, lowest: float, highest: float, law: ForceLaw
 ) -> tuple[bool, float]:
-    """Tell whether the acceleration at rest leaves the range from `lowest` to `highest` within `pause` [s].
+    """Decide whether the acceleration at rest leaves the range [`lowest`, `highest`] within `pause` [s].
 
     Returns
     -------
@@ -45,5 +45,5 @@ def rest_ends(
 
 @compiled
 def goes_on_in(a: float, mode: int) -> bool:
-    """Tell whether an armature at rest inside the pack goes on along the branch of its mode."""
+    """Whether an armature at rest inside the pack continues along the branch of its mode."""
     return (mode == UNLOADING and a < 0.0) or (mode == RELOADING and a > 0.0)

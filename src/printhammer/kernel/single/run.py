@@ -43,7 +43,7 @@ COINCIDENT = 1e-15
 """Difference of edges, as a fraction of their time, up to which they coincide."""
 
 STUCK = 1000
-"""Steps in a row that do not move time after which a run is given up."""
+"""Number of consecutive steps without progress in time after which a run stops; arbitrary."""
 
 
 @inlined

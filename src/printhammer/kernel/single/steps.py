@@ -41,7 +41,7 @@ BRANCHES = (M.UNLOADING, M.LOADING, M.RELOADING)
 
 @inlined
 def stillness(control: Any) -> float:
-    """Return the acceleration [m/s2] below which an armature without velocity rests."""
+    """Return the acceleration [m/s2] below which an armature without velocity stays at rest."""
     return float(STILL * control[1] / (control[0] / control[1]))
 
 
@@ -67,7 +67,7 @@ def take_step(state: State, setup: Setup, t_next: float, nodes: Any) -> tuple[in
 
 @inlined
 def circuit_is_quiet(state: State, setup: Setup) -> bool:
-    """Tell whether the circuit of an armature at rest stays as it is until the next edge."""
+    """Whether the circuit of an armature at rest remains unchanged until the next edge."""
     if HAS_CIRCUIT:
         control = setup.control
         return is_quiet(
@@ -133,7 +133,7 @@ def backstop_step(state: State, setup: Setup, t_next: float, still: float, nodes
 
 @inlined
 def reverse(state: State, setup: Setup) -> None:
-    """Take the mode that follows where the velocity is zero inside the pack."""
+    """Select the mode that follows when the velocity is zero inside the pack."""
     mode, peak, memory = reversed_mode(
         state[C.TIME],
         state[C.POSITION_NOW],
@@ -148,7 +148,7 @@ def reverse(state: State, setup: Setup) -> None:
 
 @inlined
 def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) -> int:
-    """Let an armature rest while forces leave it there; return the switch, or `HOLDS`."""
+    """Keep an armature at rest while the forces allow it; return the switch, or `HOLDS`."""
     mode, t, x = int(state[C.MODE]), state[C.TIME], state[C.POSITION_NOW]
     time_scale = setup.control[0] / setup.control[1]
     pause = t_next - t
@@ -176,7 +176,7 @@ def wait(state: State, setup: Setup, t_next: float, still: float, nodes: Any) ->
 
 @inlined
 def step_at_rest(state: State, setup: Setup, t_next: float, nodes: Any) -> int:
-    """Take a step of the circuit under an armature at rest, whose current changes."""
+    """Take a step of the circuit with the armature at rest, while its current changes."""
     mode, x = int(state[C.MODE]), state[C.POSITION_NOW]
     held = mode
     if mode != M.RESTING:

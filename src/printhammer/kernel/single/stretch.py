@@ -1,4 +1,4 @@
-"""What is kept of one stretch of a run: dots, strobes and samples, taken from its record.
+"""Results of one stretch of a run: dots, strobes and samples, extracted from its record.
 
 A strobe is the whole state at an instant: displacement [m], velocity [m/s], mode, and what the mode
 remembers, the latest local maximum in the pack [m].
@@ -41,7 +41,7 @@ contact_number = compiled(D.contact_number)
 
 @compiled
 def clear_dots(dots: Any) -> None:
-    """Make all dots lost ones, without extra contacts."""
+    """Mark all dots as lost, without extra contacts."""
     for i in range(dots.shape[0]):
         dots[i, D.CONTACTS] = 0.0
         for j in range(D.CONTACTS + 1, D.DOT_WIDTH):
@@ -52,7 +52,7 @@ def clear_dots(dots: Any) -> None:
 def open_dot(
     dots: Any, extra: int, surface: int, initial: bool, t: float, v: float, firings: Any
 ) -> tuple[int, int]:
-    """Count a contact that begins at time `t` with velocity `v` for its firing and enter it into its row.
+    """Count a contact that begins at time `t` with velocity `v` for its firing, and write its row.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def open_dot(
 
 @compiled
 def deepen_dot(dots: Any, row: int, x: float, hammer: Hammer) -> None:
-    """Note a reversal at displacement `x` [m] in a row if it is the deepest so far."""
+    """Record a reversal at displacement `x` [m] in a row if it is the deepest so far."""
     if not dots[row, D.DEPTH] >= x - hammer[FRONT]:
         dots[row, D.DEPTH] = x - hammer[FRONT]
         dots[row, D.FORCE] = -pack_force(x, 0.0, LOADING, 0.0, hammer)
@@ -106,7 +106,7 @@ def note_dots(
     train: Train,
     hammer: Hammer,
 ) -> int:
-    """Enter the pack contacts of a stretch into the rows of its member.
+    """Write the pack contacts of a stretch to the rows of its member.
 
     Returns the number of its extra contacts so far, given as `extra` before.
     """
@@ -140,7 +140,7 @@ def note_states(
     train: Train,
     hammer: Hammer,
 ) -> tuple[int, int]:
-    """Fill strobes and samples from the numbers `strobe` and `sample` on, as far as a stretch goes.
+    """Fill strobes and samples from the indices `strobe` and `sample` on, up to the end of a stretch.
 
     An instant at which a stretch ends belongs to the next one, if there is one. Returns the numbers of the
     first strobe and sample that are left.
@@ -187,7 +187,7 @@ def note_states(
 
 @compiled
 def blank_states(strobes: Any, strobe: int, strobe_end: int, x: Any, sample: int, sample_end: int) -> None:
-    """Put NaN where a run ended before."""
+    """Fill with NaN after an early end of the run."""
     for i in range(strobe, strobe_end):
         for j in range(strobes.shape[1]):
             strobes[i, j] = np.nan

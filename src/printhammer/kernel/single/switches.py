@@ -1,4 +1,4 @@
-"""What follows a step that ends in a switch: an edge of the drive, another path, another mode."""
+"""Handling of the switch that ends a step: an edge of the drive, another path, another mode."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @inlined
 def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
-    """Go on after the switch in which a step ended."""
+    """Continue after the switch in which a step ended."""
     if switch == M.EDGE:
         pass_edge(state, setup)
         accelerate(state, setup)
@@ -69,13 +69,13 @@ def after_step(switch: int, state: State, setup: Setup, nodes: Any, contacts: An
 
 @inlined
 def follow(switch: int, state: State) -> None:
-    """Take the mode that follows a switch."""
+    """Select the mode that follows a switch."""
     state[C.MODE] = FOLLOWING[int(state[C.MODE]), switch]
 
 
 @inlined
 def open_now(surface: int, state: State, contacts: Any) -> None:
-    """Begin a contact."""
+    """Record the start of a contact."""
     state[C.TOUCHED] = open_contact(
         contacts,
         int(state[C.TOUCHED]),
@@ -89,13 +89,13 @@ def open_now(surface: int, state: State, contacts: Any) -> None:
 
 @inlined
 def close_now(state: State, contacts: Any) -> None:
-    """End the latest contact."""
+    """Record the end of the latest contact."""
     close_contact(contacts, int(state[C.TOUCHED]), state[C.TIME], state[C.VELOCITY])
 
 
 @inlined
 def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> None:
-    """Go on after a touch of the backstop; a rigid one throws the armature back at once, or it rests."""
+    """Continue after a touch of the backstop; a rigid one reverses the armature at once, or it rests."""
     open_now(M.BACKSTOP_SURFACE, state, contacts)
     if RIGID:
         hammer = setup.hammer
@@ -115,10 +115,10 @@ def reach_backstop(state: State, setup: Setup, nodes: Any, contacts: Any) -> Non
 
 @inlined
 def reach_front(state: State, setup: Setup, contacts: Any) -> None:
-    """Go on after the armature has come to the front of the pack."""
+    """Continue after the armature has reached the front of the pack."""
     v = max(state[C.VELOCITY], 0.0)
     state[C.VELOCITY] = v
-    # A touch without velocity opens a contact only if the armature is pushed on.
+    # A touch without velocity opens a contact only if the forces push the armature on.
     if v > 0.0 or acceleration_in(M.FREE, v, state, setup) > 0.0:
         open_now(M.PACK_SURFACE, state, contacts)
         follow(M.REACHED_FRONT, state)
@@ -126,7 +126,7 @@ def reach_front(state: State, setup: Setup, contacts: Any) -> None:
 
 @inlined
 def leave(switch: int, state: State, setup: Setup, contacts: Any) -> None:
-    """Go on after the armature has left a surface, exactly there."""
+    """Continue after the armature has left a surface, at the exact position."""
     hammer = setup.hammer
     close_now(state, contacts)
     state[C.POSITION_NOW] = hammer[POSITION] if switch == M.LEFT_BACKSTOP else hammer[FRONT]

@@ -1,8 +1,9 @@
-"""The coil circuit in the variational equations: slopes of its current and rates, and its switches.
+"""Coil circuit in the variational equations: derivatives of its current and rates, and its switches.
 
-At a fixed flux linkage the current goes with the displacement, as di/dx = -emf / L and di/d lambda = 1 / L,
-L the differential inductance, and with it the force. While no current flows in a coil without a shorted turn
-its linkage is that of the magnet, and no component of the state. The derivation is in docs/tangent.md.
+At a fixed flux linkage the current depends on the displacement by di/dx = -emf / L and di/d lambda = 1 / L,
+with L the differential inductance, and so does the force. While no current flows in a coil without a shorted
+turn, its linkage is that of the magnet, and not a component of the state. The derivation is in
+docs/tangent.md.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.slopes import field_slope
 
 CURRENT_SPACING = 1e-3
-"""Of the scale of the current."""
+"""Step of difference quotients, as a fraction of the scale of the current."""
 
 
 @inlined
@@ -80,13 +81,13 @@ def electric_at_node(node: Any) -> Electric:
 
 @inlined
 def main_linkage(electric: Electric, hammer: Hammer) -> float:
-    """Return the flux linkage [Wb] that the magnet sees."""
+    """Return the flux linkage [Wb] of the magnet."""
     return float(electric[1] if hammer[TURN_RESISTANCE] > 0.0 else electric[0])
 
 
 @inlined
 def couples(hammer: Hammer, live: Any) -> bool:
-    """Tell whether a current that the flux linkage makes can flow."""
+    """Whether a current driven by the flux linkage can flow."""
     return path_of(live) != BLOCKED or hammer[TURN_RESISTANCE] > 0.0
 
 
@@ -95,7 +96,7 @@ def force_with_current(x: float, current: float, hammer: Hammer) -> float:
     """Return the slope of the magnet's force with the current [N/A]."""
     if hammer[COUPLED] != 0.0:
         return float(magnet_emf(hammer[MAGNET:], x, current))
-    # A law whose flux is not linked need not know its own slope; one-sided where a table ends.
+    # A law without linked flux need not know its own slope; one-sided at the end of a table.
     spacing = CURRENT_SPACING * hammer[CURRENT_SCALE]
     for turn in range(3):
         side = (CENTRAL + turn) % 3
@@ -109,9 +110,9 @@ def force_with_current(x: float, current: float, hammer: Hammer) -> float:
 
 @called
 def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float, float]:
-    """Return the slopes of the magnetising current with displacement [A/m] and main linkage [A/Wb].
+    """Return the derivatives of the magnetising current with displacement [A/m] and main linkage [A/Wb].
 
-    And that of the force with the current [N/A].
+    The third value is the derivative of the force with the current [N/A].
     """
     if not couples(hammer, live):
         return 0.0, 0.0, 0.0
@@ -125,7 +126,7 @@ def current_slopes(x: float, electric: Electric, hammer: Hammer, live: Any) -> t
 
 @inlined
 def whole_field_slope(x: float, y: Any, setting: Setting) -> float:
-    """Return the slope [N/m] of magnet and spring force, the current going with a fixed flux linkage."""
+    """Return the slope [N/m] of magnet and spring force at fixed flux linkage."""
     scales, bounds, hammer, live, _forcing = setting
     value = value_at(y[V.TIME], x, hammer, driven(live, electric_in(y)))
     field = field_slope(x, value, scales, bounds, hammer)
@@ -147,7 +148,7 @@ def coil_change(dx: float, linkage: float, turn: float, slopes: Any, hammer: Ham
 
 @called
 def current_change(x: float, electric: Electric, live: Any, k: int, forcing: Forcing) -> float:
-    """Return the change of the magnetising current [A] with a constant, at a fixed place and linkage."""
+    """Return the derivative of the magnetising current [A] with a constant, at fixed position and linkage."""
     varied = forcing.varied
     hammer = varied[k, V.MIDDLE]
     if not forcing.of_hammer[k] & V.CIRCUIT_MOVES or not couples(hammer, live):
@@ -161,7 +162,7 @@ def current_change(x: float, electric: Electric, live: Any, k: int, forcing: For
 
 @compiled
 def coil_change_of(x: float, electric: Electric, live: Any, k: int, forcing: Forcing) -> float:
-    """Return the change of the current in the coil [A] with a constant, at a fixed place and linkages."""
+    """Return the derivative of the coil current [A] with a constant, at fixed position and linkages."""
     hammer = forcing.varied[k, V.MIDDLE]
     if path_of(live) == BLOCKED:
         return 0.0
@@ -173,7 +174,7 @@ def coil_change_of(x: float, electric: Electric, live: Any, k: int, forcing: For
 
 @compiled
 def linkage_change(x: float, k: int, forcing: Forcing) -> float:
-    """Return the change of the linkage without current [Wb] with a constant, at a fixed place."""
+    """Return the derivative of the linkage without current [Wb] with a constant, at a fixed position."""
     if not forcing.of_hammer[k] & V.CIRCUIT_MOVES:
         return 0.0
     total = 0.0
@@ -233,7 +234,7 @@ def circuit_pace(x: float, y: Any, setting: Setting) -> float:
 
 @compiled
 def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
-    """Let the linkage go with the displacement where no current flows; clear what the circuit has not."""
+    """Tie the linkage to the displacement while no current flows; clear unused rows of the circuit."""
     hammer = setting.hammer
     has_turn = hammer[TURN_RESISTANCE] > 0.0
     for k in range(columns.shape[1]):
@@ -252,7 +253,7 @@ def hold_linkage(x: float, columns: Any, path: float, setting: Setting) -> None:
 
 @compiled
 def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
-    """Return the change [A] of the current at which the present path ends."""
+    """Return the derivative [A] of the current at which the present path ends."""
     if kind_of(live) != SWITCHED_PIECE:
         return 0.0
     if path_of(live) == SOURCE:
@@ -262,7 +263,7 @@ def threshold_change(live: Any, k: int, forcing: Forcing) -> float:
 
 @called
 def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Carry the columns through a change of the current's path between edges; tell whether differentiable.
+    """Propagate the columns through a change of the current's path between edges; return whether smooth.
 
     The current is continuous there, and so are all forces; only the rate of the coil's linkage jumps.
     """
@@ -305,7 +306,7 @@ def pass_path(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
 
 @compiled
 def pass_edge_of_driver(after: Any, columns: Any, setting: Setting) -> None:
-    """Carry the columns through an edge of the drive, which is at a fixed time."""
+    """Propagate the columns through an edge of the drive at a fixed time."""
     for k in range(columns.shape[1]):
         columns[ELECTRIC_ROW + V.ELECTRICS, k] = 0.0
     hold_linkage(after[1], columns, after[ELECTRIC + 3], setting)

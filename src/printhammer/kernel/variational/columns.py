@@ -48,14 +48,14 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.supply import add_supply
 
 LONGEST_PHASE = 0.75
-"""Largest phase in one step of the oscillation that a change of the state makes."""
+"""Largest phase, in one step, of the oscillation of a perturbation."""
 
 
 @compiled
 def force_slopes(
     y: Any, mode: int, memory: float, peak: float, peaks: Any, setting: Setting
 ) -> tuple[float, float, float, float, float, float]:
-    """Return the slopes of the forces at `y`: displacement or w, velocity, time.
+    """Return the derivatives of the forces at `y`: with displacement or w, velocity, time.
 
     `peaks` is what the unloading branch needs of local maxima about `peak`, as `note_memories` has it.
 
@@ -124,9 +124,9 @@ def column_rates(
 
 @compiled
 def longest_step(mode: int, memory: float, peak: float, work: Any, setting: Setting) -> float:
-    """Return the longest step from row START of `work` that follows a change of the state closely.
+    """Return the largest step from row START of `work` that resolves a perturbation of the state.
 
-    The run's own steps follow the state: near rest, where that hardly moves, they are longer.
+    The run's own steps follow the state: near rest, where it hardly moves, they are longer.
     """
     if HAS_CIRCUIT and RESTING <= mode <= HELD_UNLOADING:
         rate = circuit_pace(work[V.START, 0], work[V.START], setting)
@@ -169,7 +169,7 @@ def column_step(
 
 @compiled
 def take_in(work: Any, columns: Any) -> None:
-    """Put what of the columns changes between switches in row START of `work`."""
+    """Copy the rows that change between switches into row START of `work`."""
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
         for i in range(V.STATE):
@@ -180,7 +180,7 @@ def take_in(work: Any, columns: Any) -> None:
 
 @compiled
 def bring_back(work: Any, columns: Any) -> None:
-    """Take it out of there."""
+    """Copy these rows back into the columns."""
     for k in range(columns.shape[1]):
         j = V.FIRST_COLUMN + CHANGING * k
         for i in range(V.STATE):

@@ -1,4 +1,4 @@
-"""Columns of a variational equation carried along a recorded run, in a second pass over its nodes.
+"""Columns of a variational equation propagated along a recorded run, in a second pass over its nodes.
 
 A run that does not ask for them pays nothing.
 """
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 @compiled
 def copy_columns(columns: Any, out: Any) -> None:
-    """Put columns elsewhere."""
+    """Copy columns."""
     for i in range(columns.shape[0]):
         for k in range(columns.shape[1]):
             out[i, k] = columns[i, k]
@@ -68,7 +68,7 @@ def unit_of(row: int, scales: Any, hammer: Hammer) -> float:
 
 @compiled
 def orthonormalise_with_circuit(columns: Any, scales: Any, hammer: Hammer, grown: Any) -> None:
-    """Do as `orthonormalise` with all components of the state."""
+    """Like `orthonormalise`, with all components of the state."""
     count = columns.shape[0]
     for k in range(columns.shape[1]):
         for i in range(count):
@@ -95,9 +95,9 @@ def orthonormalise_with_circuit(columns: Any, scales: Any, hammer: Hammer, grown
 
 @compiled
 def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
-    """Make the columns orthogonal and of length one, in units of `scales`; add what was taken to `grown`.
+    """Orthonormalise the columns in units of `scales`; add the logarithms of their lengths to `grown`.
 
-    Gram-Schmidt; a column of which nothing is left is replaced and counts as shrunk without bound.
+    Gram-Schmidt; a column without a remainder is replaced and counts as shrunk without bound.
     """
     for k in range(columns.shape[1]):
         columns[0, k] /= scales[0]
@@ -128,7 +128,7 @@ def orthonormalise(columns: Any, scales: Any, grown: Any) -> None:
 
 @compiled
 def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> None:
-    """Enter state, columns and their growth at a mark; at the first mark the columns begin."""
+    """Store state, columns and their growth at a mark; the columns begin at the first mark."""
     columns, work, track, states, changes, growth, _passed = carried
     hammer = setting.hammer
     mode = int(node[3])
@@ -160,7 +160,7 @@ def note_mark(node: Any, initial: Any, setting: Setting, carried: Carried) -> No
 
 @compiled
 def scale_or_note(factor: float, renormalise: bool, columns: Any, setting: Setting, grown: Any) -> None:
-    """Put a factor, given by its logarithm, back into the columns, or note it with their growth."""
+    """Multiply the columns by a factor, passed as its logarithm, or add it to their growth."""
     if renormalise:
         for k in range(columns.shape[1]):
             grown[k] += factor
@@ -215,7 +215,7 @@ def flow(
         The columns, and what is noted of them.
     """
     train = Train(*train)
-    # Without forcing nothing of it may travel through the calls: that alone would cost a tenth.
+    # Without forcing no trace of it may pass through the calls: that alone would cost a tenth.
     forcing: Any = ()
     if FORCED:
         forcing = Forcing(*forced_by)
@@ -264,7 +264,7 @@ def flow(
             copy_columns(columns, passed[asked, 0])
         if not pass_node(node, after, columns, setting):
             track[SMOOTH] = 0.0
-        # At its end a run puts the current on the path with which another begins.
+        # At its end a run puts the current on the path with which the next stretch begins.
         if HAS_CIRCUIT and not (ended and i + 2 == count):
             if t_end >= edge:
                 pass_edge_of_driver(after, columns, setting)

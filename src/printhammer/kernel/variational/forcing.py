@@ -1,4 +1,4 @@
-"""What constants do to the forces, at a fixed state and time: the forcing term of the variational equations.
+"""Forcing of the variational equations: derivatives of the forces with constants, at a fixed state.
 
 The slope a_c of the acceleration with a constant is added to the rate of dv, and each energy grows by the
 change of its power. In the backstop the force is a function of w = sqrt(b - x), whose change is that of place
@@ -97,7 +97,7 @@ def drive_change(t: float, drive: Drive, delayed: Any) -> float:
 
 @inlined
 def force_with_value(x: float, value: float, hammer: Hammer, drive: Drive, forcing: Forcing) -> float:
-    """Return the slope of magnet and drive force with the drive: N/A, or 1 for a drive that is a force."""
+    """Return the slope of magnet and drive force with the drive: N/A, or 1 for a force drive."""
     if HAS_CIRCUIT:
         return force_with_current(x, value, hammer)
     if drive[0] == 0.0:
@@ -156,7 +156,7 @@ def damping_change(v: float, k: int, forcing: Forcing) -> float:
 
 @compiled
 def note_changed_memories(peak: float, forcing: Forcing) -> None:
-    """Keep what the unloading branch needs of `peak` [m], at a fixed depth."""
+    """Store the memory of the pack law for `peak` [m], at a fixed depth, for shifted constants."""
     varied, moves, of_hammer, memories = forcing.varied, forcing.moves, forcing.of_hammer, forcing.memories
     for k in range(of_hammer.size):
         if of_hammer[k] & V.PACK_MOVES:
@@ -237,7 +237,7 @@ def stored_change(x: float, dx: float, k: int, hammer: Hammer, forcing: Forcing)
 def add_forcing(
     rates: Any, y: Any, columns: Any, mode: int, memory: float, slopes: Any, setting: Setting
 ) -> None:
-    """Add what constants do to the `rates` of the columns at `y`, and fill in those of the energies.
+    """Add the effect of constants to the `rates` of the columns at `y`, and fill in those of the energies.
 
     `slopes` are those of `printhammer.kernel.variational.columns.force_slopes` there.
     """
@@ -282,7 +282,7 @@ def add_forcing(
             push, lost = contact_changes(w, v, k, forcing)
         elif indented:
             surface = moves[k, FRONT]
-            # A pack gives nothing back: its whole push is loss.
+            # A pack returns nothing: its whole work is loss.
             push = pack_change(x, v, mode, k, forcing)
             lost = push
         change = pace * (change + push) - (push_x + push_peak) * surface

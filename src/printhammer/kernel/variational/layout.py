@@ -1,4 +1,4 @@
-"""Where things lie in a column of a variational equation and in the working space that carries columns.
+"""Layout of a column of a variational equation, and of the working space.
 
 A column is the change of the motion, all at one time, per unit of an initial change or of a constant: of the
 `STATE` components of the state, displacement [m] and velocity [m/s]; of the latest local maximum in the pack
@@ -41,9 +41,9 @@ GROWN = 2
 
 # Forcing: each constant changes the array of the hammer's constants, the firing times and the waveforms.
 SPACING = 1e-3
-"""Share of a constant, or of its scale, by which it is changed to see what it does."""
+"""Step of difference quotients with constants, as a fraction of the constant or its scale."""
 MIDDLE = 4
-"""Row of `varied` with the constants as they are."""
+"""Row of `varied` with the unchanged constants."""
 VARIED = 9
 """Rows of `varied`: row 4 + j holds the constants with j times `SPACING` of the change."""
 FIELD_MOVES, PACK_MOVES, BACKSTOP_MOVES, DAMPING_MOVES, CIRCUIT_MOVES = 1, 2, 4, 8, 16
@@ -80,7 +80,7 @@ class Forcing(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """Columns on their way along a run, and what is noted of them at marks and wanted nodes.
+    """Columns during their propagation along a run, and their values at marks and requested nodes.
 
     Without forcing a column has r = 3 rows, with it 8; with a circuit four more.
 
@@ -111,7 +111,7 @@ class Carried(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """What stays the same along a run."""
+    """Data that stay constant along a run."""
 
     scales: Any
     bounds: Any
@@ -121,7 +121,7 @@ class Setting(NamedTuple):
 
 
 def electric_row(forced: bool) -> int:
-    """Return the first of the rows of a column that a circuit has."""
+    """Return the first row of the circuit in a column."""
     return ROWS if forced else ENERGY
 
 

@@ -1,8 +1,8 @@
-"""Slopes of the force laws, by differences of fourth order that stay on one side of every kink.
+"""Derivatives of the force laws, by differences of fourth order on one side of every kink.
 
-A part need not state its derivatives. In the middle of a law's range the five-point formula is central, at
-an end of the range, at a surface and beside a kink it is one-sided. The spacings below make the truncation
-and the rounding about equally small, some 1e-12 of the slope. M. Abramowitz and I. A. Stegun, *Handbook of
+A part need not state its derivatives. In the middle of a law's range the five-point formula is central, at an
+end of the range, at a surface and beside a kink it is one-sided. The spacings below make the truncation and
+the rounding about equally small, some 1e-12 of the slope. M. Abramowitz and I. A. Stegun, *Handbook of
 Mathematical Functions* (1964), table 25.2.
 """
 
@@ -37,17 +37,17 @@ if TYPE_CHECKING:
     )
 
 FIELD_SPACING = 2e-4
-"""Of the scale of displacement."""
+"""Step, as a fraction of the scale of displacement."""
 NEAR_END = 1e-3
-"""Of the distance from an end of the range, which may be a pole of the law."""
+"""Step, as a fraction of the distance from an end of the range, which may be a pole of the law."""
 DEPTH_SPACING = 3e-4
-"""Of the depth in the pack, of whose high powers the law may consist."""
+"""Step, as a fraction of the depth in the pack, whose law may have high powers of the depth."""
 LEAST_DEPTH_SPACING = 1e-7
-"""Of the scale of displacement."""
+"""Smallest step in the pack, as a fraction of the scale of displacement."""
 ROOT_SPACING = 1e-3
-"""Of w in the backstop, or of a hundredth of the root of the scale of displacement."""
+"""Step, as a fraction of w in the backstop, or of a hundredth of the root of the displacement scale."""
 SPEED_SPACING = 1e-3
-"""Of the scale of velocity."""
+"""Step, as a fraction of the scale of velocity."""
 
 BACKWARD, CENTRAL, FORWARD = 0, 1, 2
 OFFSETS = np.array([[0.0, -1.0, -2.0, -3.0, -4.0], [-2.0, -1.0, 1.0, 2.0, 0.0], [0.0, 1.0, 2.0, 3.0, 4.0]])
@@ -73,7 +73,7 @@ def field_slope(x: float, value: float, scales: Any, bounds: Any, hammer: Hammer
     """
     to_end = min(x - bounds[0], bounds[1] - x)
     spacing = min(FIELD_SPACING * scales[0], NEAR_END * max(to_end, NEAR_END * scales[0]))
-    # As the arithmetic has it, so that the points lie where the formula takes them to be.
+    # Recompute the step in floating point, so that the points lie where the formula assumes them.
     spacing = (x + spacing) - x
     side = CENTRAL
     if x - 2.0 * spacing < bounds[0]:
@@ -146,13 +146,13 @@ def pack_slopes(
 
 @inlined
 def peak_spacing(peak: float, hammer: Hammer) -> float:
-    """Return by how much a local maximum is moved to see what the unloading branch makes of it [m]."""
+    """Return the step of a local maximum [m] for the derivative of the unloading branch."""
     return float((peak + DEPTH_SPACING * (peak - hammer[FRONT])) - peak)
 
 
 @compiled
 def note_memories(memories: Any, peak: float, hammer: Hammer) -> None:
-    """Fill `memories`, five places, with what the unloading branch needs of local maxima about `peak` [m]."""
+    """Fill `memories`, five places, with the memory of the pack law for local maxima about `peak` [m]."""
     spacing = peak_spacing(peak, hammer)
     for k in range(5):
         memories[k] = pack_memory(hammer[PACK:BACKSTOP_PART], peak + OFFSETS[CENTRAL, k] * spacing)

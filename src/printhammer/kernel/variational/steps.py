@@ -1,4 +1,4 @@
-"""Columns carried from one node of a recorded run to the next, in motion and at rest."""
+"""Columns propagated from one node of a recorded run to the next, in motion and at rest."""
 
 from __future__ import annotations
 
@@ -66,12 +66,13 @@ if TYPE_CHECKING:
     )
 
 GRADING = 1.0 / 64.0
-"""Shortest share of a step after a touch of the pack, whose slope is not smooth there."""
+"""Shortest first step after a touch of the pack, whose slope is not smooth there, as a fraction of the step.
+"""
 
 
 @compiled
 def begin_step(node: Any, work: Any) -> None:
-    """Put the state at a node in row START of `work`."""
+    """Copy the state at a node into row START of `work`."""
     work[START, 0] = node[4] if int(node[3]) == M.BACKSTOP else node[1]
     work[START, 1] = node[2]
     work[START, TIME] = node[0]
@@ -104,7 +105,7 @@ def length_in_contact(
 
 @compiled
 def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -> float:
-    """Return by how much a constant moves the place where the armature rests [m]."""
+    """Return the derivative of the rest position with a constant [m]."""
     scales, bounds, hammer, live, forcing = setting
     x, mode, moves = node[1], int(node[3]), forcing.moves
     if mode == M.RESTING:
@@ -131,7 +132,7 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
 
 @compiled
 def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
-    """Let the columns die out for `pause` [s] about a place of rest in the backstop.
+    """Let the columns decay for `pause` [s] about a rest position in the backstop.
 
     The linear oscillator with the slopes of that place, in closed form. Returns the logarithm of a factor
     taken out of the columns.
@@ -161,7 +162,7 @@ def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
 
 @compiled
 def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> float:
-    """Carry the columns through a rest from `t` to `t_to` [s]; what was before it is forgotten, or dies out.
+    """Propagate the columns through a rest from `t` to `t_to` [s]; earlier perturbations vanish or decay.
 
     Returns the logarithm of a factor taken out of the columns.
     """
@@ -189,7 +190,7 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
 
 @compiled
 def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Carry the columns through a rest from `t` to `t_to` [s] while the circuit goes on.
+    """Propagate the columns through a rest from `t` to `t_to` [s] while the circuit evolves.
 
     An armature held in the backstop still moves about its place; anywhere else it stays there. Returns the
     logarithm of a factor taken out of the columns.
@@ -200,7 +201,7 @@ def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any,
         grown = rest(t, t_to, node, columns, setting)
         if hammer[CAPACITANCE] == 0.0:
             return grown
-        # A reservoir is charged meanwhile, at a pace of its own.
+        # Meanwhile a reservoir is charged, with its own time constant.
         fall = math.exp(-(t_to - t) / (hammer[CHARGING] * hammer[CAPACITANCE]))
         for k in range(columns.shape[1]):
             columns[0, k] *= math.exp(grown)
@@ -226,7 +227,7 @@ def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any,
 
 @compiled
 def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: Setting) -> None:
-    """Carry the columns through the step that only gets the regularised equations going."""
+    """Propagate the columns through the step that starts the regularised equations."""
     hammer, drive, forcing = setting.hammer, setting.drive, setting.forcing
     x, pause = node[1], t_to - t
     if HAS_CIRCUIT:
@@ -251,14 +252,14 @@ def set_in(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: S
 
 @compiled
 def add_stored(sign: float, columns: Any, work: Any, hammer: Hammer, forcing: Forcing) -> None:
-    """Add to the loss in a backstop that has let go what it still stores: in closed form."""
+    """Add the energy still stored in a released backstop to its loss: in closed form."""
     for k in range(columns.shape[1]):
         columns[BACKSTOP_LOSS, k] += sign * stored_change(work[START, 0], columns[0, k], k, hammer, forcing)
 
 
 @compiled
 def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Carry state and columns from the time in row START of `work` to `t_to` [s], in the step from `node`.
+    """Propagate state and columns from row START of `work` to `t_to` [s], in the step from `node`.
 
     Returns the logarithm of a factor taken out of the columns.
     """
@@ -272,7 +273,7 @@ def carry(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: 
 
 @compiled
 def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, setting: Setting) -> float:
-    """Do as `carry`, but for a linkage that goes with the displacement."""
+    """Like `carry`, except for a linkage tied to the displacement."""
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_in(work[START])), setting.forcing
     t = work[START, TIME]
     if t_to <= t:
@@ -289,7 +290,7 @@ def carry_state(t_to: float, node: Any, after: Any, columns: Any, work: Any, set
         work[START, TIME] = t_to
         set_in(t, t_to, node, columns, work, setting)
         return 0.0
-    # What a backstop that has let go still stores is lost as it creeps back.
+    # The energy still stored in a released backstop is lost as it recovers.
     if FORCED and HAS_BACKSTOP and mode == M.BACKSTOP_RELEASED:
         add_stored(1.0, columns, work, hammer, forcing)
     take_in(work, columns)

@@ -1,4 +1,4 @@
-"""What constants do to the circuit of the coil: the forcing of its part of the columns, and edges that move.
+"""Derivatives of the coil circuit with constants: the forcing of its rows, and moving edges.
 
 At a fixed state and time the rates of the electric state change with the resistances, the voltages and the
 current that a linkage makes; an edge that comes later lets the rates before it last longer.
@@ -66,7 +66,7 @@ def source_changes(t: float, live: Any, k: int, forcing: Forcing) -> tuple[float
 
 @called
 def add_supply(rates: Any, y: Any, count: int, x: float, setting: Setting) -> None:
-    """Add what constants do to the `rates` of the electric changes at `y`."""
+    """Add the effect of constants to the `rates` of the electric rows at `y`."""
     hammer, live, forcing = setting.hammer, setting.drive, setting.forcing
     moves, pace, t, electric = forcing.moves, rates[V.TIME], y[V.TIME], electric_in(y)
     has_turn, blocked = hammer[TURN_RESISTANCE] > 0.0, path_of(live) == BLOCKED
@@ -99,7 +99,7 @@ def add_supply(rates: Any, y: Any, count: int, x: float, setting: Setting) -> No
 
 @compiled
 def latest_edge(t: float, train: Train, first: int, last: int) -> tuple[int, int]:
-    """Return pulse and piece that begin latest of those which `pass_edges` has still to pass; or -1."""
+    """Return pulse and piece that begin latest of those that `pass_edges` has still to pass; or -1."""
     pulse, begun = -1, -1
     for p in range(first, last):
         piece = train.under_way[p]
@@ -120,7 +120,7 @@ def rates_at(node: Any, setting: Setting) -> tuple[float, float, float]:
 
 @called
 def move_edge(node: Any, before: Any, pulse: int, piece: int, columns: Any, setting: Setting) -> None:
-    """Carry the columns through an edge of a driver that moves, `before` which these were the rates."""
+    """Propagate the columns through a moving edge of a driver, with the rates `before` it."""
     live, forcing = setting.drive, setting.forcing
     behind = rates_at(node, setting)
     off_time = kind_of(live) == SWITCHED_PIECE and live[7] < 0.0

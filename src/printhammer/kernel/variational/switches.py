@@ -1,7 +1,7 @@
 """Jumps of columns at the switches of a run and at the edges of its drive: the saltation matrices.
 
-A neighbouring motion meets a switch a little earlier or later and spends that time under the other law; where
-a constant moves a surface, an edge or the law of an impact, so does it. The derivation is in docs/tangent.md.
+A neighbouring motion meets a switch slightly earlier or later and follows the other law in between; a
+constant may also move a surface, an edge or the law of an impact. The derivation is in docs/tangent.md.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from printhammer.kernel.variational.slopes import field_at
 
 SPEED_SPACING = 1e-3
-"""Share of the speed of an impact by which it is moved to see what a rebound makes of it."""
+"""Step of the impact speed for the derivative of the rebound, as a fraction of the speed."""
 NEAR = 1e-9
-"""Share of an indentation by which a reversal must miss the old maximum to be told from one at it."""
+"""Fraction of an indentation by which a reversal must differ from the old maximum to count as a new one."""
 
 
 @compiled
@@ -57,20 +57,20 @@ def powers_at(node: Any, mode: int, kept: float, v: float, hammer: Hammer, drive
 
 @compiled
 def add_energies(columns: Any, k: int, later: float, before: Any, behind: Any) -> None:
-    """Let the powers [W] `before` a switch last longer by `later` [s], and those `behind` it less long."""
+    """Add to the energies the effect of a delay `later` [s] of a switch: power [W] `before` less `behind`."""
     for i in range(ENERGIES):
         columns[ENERGY + i, k] += (before[i] - behind[i]) * later
 
 
 @compiled
 def is_rebound(node: Any, after: Any) -> bool:
-    """Tell whether two nodes are the two sides of an impact on a rigid backstop."""
+    """Whether two nodes are the two sides of an impact on a rigid backstop."""
     return RIGID and node[0] == after[0] and int(node[3]) == M.FREE and node[2] < 0.0 and after[2] >= 0.0
 
 
 @compiled
 def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
-    """Carry the columns through an impact on a rigid backstop."""
+    """Propagate the columns through an impact on a rigid backstop."""
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
     c = hammer[BACKSTOP_PART:MAGNET]
     v_in, v_out = node[2], after[2]
@@ -80,7 +80,7 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         - (backstop_rebound(c, v_in + 2.0 * spacing) - backstop_rebound(c, v_in - 2.0 * spacing))
     ) / (12.0 * spacing)
     a = acceleration(node[0], node[1], v_in, M.FREE, 0.0, hammer, drive)
-    # Damping alone tells one side of the impact from the other.
+    # Only damping distinguishes the two sides of the impact.
     jump = acceleration(node[0], node[1], v_out, M.FREE, 0.0, hammer, drive) - a if HAS_DAMPING else 0.0
     for k in range(columns.shape[1]):
         if FORCED:
@@ -98,7 +98,7 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
         if FORCED:
             columns[1, k] += rebound_change(v_in, k, forcing)
             columns[BACKSTOP_LOSS, k] -= v_out * (columns[1, k] - (a + jump) * earlier) / hammer[INVERSE_MASS]
-            # The energy that is lost goes with the mass.
+            # The lost energy is proportional to the mass.
             lost = 0.5 * (v_in * v_in - v_out * v_out) / hammer[INVERSE_MASS]
             columns[BACKSTOP_LOSS, k] -= lost * forcing.moves[k, INVERSE_MASS] / hammer[INVERSE_MASS]
             columns[0, k] += forcing.moves[k, POSITION]
@@ -106,7 +106,7 @@ def pass_rebound(node: Any, after: Any, columns: Any, setting: Setting) -> None:
 
 @compiled
 def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any, setting: Setting) -> bool:
-    """Carry the columns through a reversal inside the pack; tell whether that is differentiable.
+    """Propagate the columns through a reversal inside the pack; return whether it is differentiable.
 
     The velocity is zero, and so are all powers.
     """
@@ -130,7 +130,7 @@ def pass_reversal(node: Any, after: Any, mode: int, following: int, columns: Any
 def pass_level(
     node: Any, after: Any, mode: int, following: int, jump: int, columns: Any, setting: Setting
 ) -> bool:
-    """Carry the columns through a touch, a leaving or the old maximum; tell whether differentiable."""
+    """Propagate the columns through a touch, a release or the old maximum; return whether differentiable."""
     hammer, drive, forcing = setting.hammer, driven(setting.drive, electric_at_node(after)), setting.forcing
     v = after[2]
     if v == 0.0:
@@ -153,7 +153,7 @@ def pass_level(
 
 @compiled
 def pass_node(node: Any, after: Any, columns: Any, setting: Setting) -> bool:
-    """Carry the columns through the switch at the node `after`, if it is one; tell whether differentiable."""
+    """Propagate the columns through the switch at the node `after`, if any; return whether differentiable."""
     if is_rebound(node, after):
         pass_rebound(node, after, columns, setting)
         return True
@@ -178,7 +178,7 @@ def value_of_piece(t: float, fired: float, piece: int, pieces: Any) -> float:
 def pass_edge(
     node: Any, value: float, change: float, pulse: int, piece: int, columns: Any, setting: Setting
 ) -> float:
-    """Carry the columns through one edge at which the drive jumps by `change`; return its value after it."""
+    """Propagate the columns through an edge at which the drive jumps by `change`; return its new value."""
     hammer, forcing = setting.hammer, setting.forcing
     new = value + change
     if HAS_CIRCUIT:
@@ -204,7 +204,7 @@ def pass_edge(
 
 @compiled
 def pass_moving_edges(node: Any, train: Train, first: int, last: int, columns: Any, setting: Setting) -> None:
-    """Carry the columns through all edges of the drive at a node, which `pass_edges` has not passed yet."""
+    """Propagate the columns through all edges of the drive at a node that `pass_edges` has not passed yet."""
     firings, begins, pieces, replace, under_way, live = train
     t = node[0]
     value = drive_value(t, live)
