@@ -12,6 +12,7 @@ from tests.hammers import CRUDE
 
 import printhammer as ph
 from printhammer.drive.waveforms.shapes import HalfSine
+from printhammer.hammer.equilibrium import pull_reversals
 from printhammer.hammer.hammer import shipped
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
@@ -374,3 +375,22 @@ def test_a_hammer_that_may_not_return_is_a_warning_that_names_the_interval(hamme
     weak = hammer.replace({"magnet.F0": 2.0, "magnet.Am": 0.02**0.5, "spring.Bs": 1e-12, "spring.As": 1.0})
     told = "positive from 100 to 381 um: the armature may never return from there"
     assert weak.warnings() == [f"the net force at zero current is {told}"]
+
+
+def test_a_measured_pull_that_changes_sign_is_a_warning(tmp_path: Path) -> None:
+    # L = 40 + 24 x - 2.4 x^2 mH, x in mm: the force at 1 A, 12 - 2.4 x N, is zero at 5 mm.
+    linkages = {0: 40.0, 2: 78.4, 4: 97.6, 6: 97.6, 8: 78.4}
+    table = tmp_path / "plunger.csv"
+    rows = [f"{place},0,0\n{place},1,{linkage}" for place, linkage in linkages.items()]
+    table.write_text("\n".join(["displacement [mm],current [A],linkage [mWb]", *rows, ""]))
+    magnet = {"law": "linkage-table", "file": str(table)}
+    spring = PreloadSpring(preload=-0.5, stiffness=20.0)
+    turning = ph.Hammer.build(
+        0.02, magnet=magnet, spring=spring, backstop=RigidBackstop(position=0.0, restitution=0.3)
+    )
+    (place,) = pull_reversals(turning)
+    assert place == pytest.approx(5e-3, rel=1e-9)
+    assert turning.warnings() == ["the pull changes sign at 5 mm within the table"]
+    # Behind a backstop at 6 mm the armature does not come there, and a formula is no table.
+    assert pull_reversals(turning.replace("backstop.position", "6 mm")) == []
+    assert pull_reversals(ph.load("relay-5v")) == []

@@ -64,6 +64,13 @@ class DotHeat:
     """Heat of one dot there, J."""
     feed: str
     """One of `FEEDS`: how the heat goes on outside the temperatures, and between them in proportion to it."""
+    on_time: float = 0.0
+    """Time for which the driver is on for one dot, s; 0 where it is not known."""
+
+    @property
+    def most(self) -> float:
+        """Largest rate at which the driver is off between dots, Hz."""
+        return 1.0 / self.on_time if self.on_time > 0.0 else math.inf
 
     def at(self, temperature: float) -> float:
         """Return the heat of one dot at a temperature of the winding, degC; J."""
@@ -134,7 +141,10 @@ class ThermalDuty(Result, rows="ambient burst"):
     limit_heat: float = scalar("J", "heat of one dot at that temperature")
     ambient: FloatArray = coordinate("degC", "ambient temperature", "ambient")
     rate: FloatArray = column(
-        "Hz", "dots per second that the coil stands for ever", "ambient", more="0 where it is too hot at rest"
+        "Hz",
+        "dots per second that the coil stands for ever",
+        "ambient",
+        more="0 where it is too hot at rest; at most so many that the driver is off between dots",
     )
     burst: FloatArray = coordinate("Hz", "dots per second while it fires", "burst")
     temperature: FloatArray = column(
@@ -180,6 +190,12 @@ class ThermalDuty(Result, rows="ambient burst"):
         facts = [
             ("limit of the winding", f"{self.limit:g} °C"),
             ("heat of one dot there", f"{1e3 * self.limit_heat:.4g} mJ"),
+            (
+                "driver on",
+                f"{1e3 * self.heat.on_time:.4g} ms a dot, at most {self.heat.most:.4g} Hz"
+                if self.heat.on_time
+                else None,
+            ),
             ("keeps the same", f"the {self.heat.feed} of the driver"),
         ]
         return Summary([Facts(facts), "", Grid(rates), "", Grid(bursts)])
@@ -244,8 +260,8 @@ def thermal_duty(
     if not ambients.size:
         raise InputError("ambient is empty", key="ambient", expected="one temperature or more")
     at_limit = one_dot.at(largest)
-    rate = np.maximum(largest - ambients, 0.0) / (at_limit * coil.whole)
-    bursts = np.array([_rate(each) for each in burst or [rate.max()] if each != 0.0])
+    rate = np.minimum(np.maximum(largest - ambients, 0.0) / (at_limit * coil.whole), one_dot.most)
+    bursts = np.array([_rate(each, one_dot) for each in burst or [rate.max()] if each != 0.0])
     pairs = [[(float(cold), float(fast)) for fast in bursts] for cold in ambients]
     shape = ambients.size, bursts.size
 
@@ -313,10 +329,13 @@ def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate
         span *= 4.0
 
 
-def _rate(value: float | str) -> float:
+def _rate(value: float | str, heat: DotHeat) -> float:
     rate = read_number(value, "Hz", "burst")
     if rate <= 0.0:
         raise InputError.of("burst", value, "greater than 0 Hz", said=" is expected to be")
+    if rate > heat.most:
+        expected = f"at most {heat.most:.6g} Hz, since the driver is on for {1e3 * heat.on_time:.4g} ms a dot"
+        raise InputError.of("burst", value, expected)
     return rate
 
 
@@ -360,7 +379,7 @@ def heat_of(hammer: Hammer) -> DotHeat:
         heat = hammer.coil_resistance * squared_current(drive, 0.0, waveform.support)
         return DotHeat((REFERENCE,), (heat,), "current")
     heats = [_copper_loss(hammer.replace("coil.temperature", warm), drive) for warm in TEMPERATURES]
-    return DotHeat(TEMPERATURES, tuple(heats), "voltage")
+    return DotHeat(TEMPERATURES, tuple(heats), "voltage", waveform.support)
 
 
 def _copper_loss(hammer: Hammer, drive: PulseTrain) -> float:

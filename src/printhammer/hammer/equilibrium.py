@@ -23,6 +23,7 @@ from printhammer.support.roots import Root, bisect, roots
 
 # Smallest distance from an anchor in the search, m: far below any compression; arbitrary
 _NEAREST: Final = 1e-18
+_PLACES: Final = 401
 _LARGEST_CURRENT: Final = 1e6  # Range of currents of a law that states none, A; arbitrary
 FARTHER: Final = (10.0, 100.0, 1000.0)
 """Search radii about the origin, m, if nothing limits the search and no equilibrium is nearer; arbitrary."""
@@ -215,6 +216,26 @@ def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
             joined = bool(positive) and positive[-1][1] == left
             positive.append((positive.pop()[0] if joined else left, right))
     return positive
+
+
+def pull_reversals(hammer: HammerLike) -> list[float]:
+    """Return the displacements, m, at which the pull of a measured magnet changes sign, ascending.
+
+    The pull is the force at the largest current of the table less that without current, from the backstop to
+    the end of the table. The list is empty for a law that is no table.
+    """
+    most = max(_currents(hammer), key=abs)
+    if hammer.magnet is None or abs(most) >= _LARGEST_CURRENT:
+        return []
+    force = StaticForce(hammer)
+    low, high = hammer.magnet.domain
+    start = low if hammer.backstop is None else max(low, hammer.backstop.position)
+    if not (math.isfinite(start) and math.isfinite(high) and start < high):
+        return []
+    crossings = roots(
+        lambda x: force.magnet(x, most) - force.magnet(x), np.linspace(start, high, _PLACES).tolist()
+    )
+    return [root.x for root in crossings if start < root.x < high]
 
 
 def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPicture:

@@ -369,9 +369,10 @@ class Hammer:
         """List warnings about a hammer that can still be simulated.
 
         There is one sentence for each interval between backstop and platen in which the net force of magnet
-        and spring at zero current is positive.
+        and spring at zero current is positive, and one for each place at which the pull of a measured magnet
+        changes sign.
         """
-        from printhammer.hammer.equilibrium import positive_intervals
+        from printhammer.hammer.equilibrium import positive_intervals, pull_reversals
         from printhammer.units import from_si
 
         self.check()
@@ -382,6 +383,10 @@ class Hammer:
             sentences.append(
                 f"the net force at zero current is positive {where}: the armature may never return from there"
             )
+        sentences += [
+            f"the pull changes sign at {from_si(place, 'm', 'mm'):.4g} mm within the table"
+            for place in pull_reversals(self)
+        ]
         return sentences
 
     @staticmethod

@@ -32,3 +32,14 @@ def test_a_current_that_is_kept_up_heats_a_warm_coil_more(hammer: ph.Hammer) -> 
 def test_without_a_resistance_there_is_no_heat(hammer: ph.Hammer) -> None:
     with refused("coil.resistance"):
         heat_of(hammer)
+
+
+def test_a_driver_is_not_on_longer_than_there_is_time() -> None:
+    # 20 ms on for one dot: 50 dots a second leave no pause, however cool the coil stays.
+    relay = ph.load("relay-5v")
+    heat = heat_of(relay)
+    assert heat.most == pytest.approx(1.0 / relay.waveform.width, rel=1e-12)
+    assert ph.thermal_duty(heat, "0.1 K/W", 91.0).rate.tolist() == [heat.most]
+    assert ph.thermal_duty(heat, "1000 K/W", 91.0).rate[0] < heat.most
+    with refused("burst", value="188 Hz"):
+        ph.thermal_duty(heat, "0.1 K/W", 91.0, burst=["188 Hz"])
