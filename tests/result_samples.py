@@ -172,6 +172,15 @@ def impact_time(hammer: Hammer) -> Result:
     return ph.impact_time(wire, noise=["5 mA", "70 mA"], dots=6, units=3)
 
 
+def recorded_impacts(hammer: Hammer) -> Result:
+    import numpy as np
+
+    from printhammer.control.recorded_impacts import RecordedImpacts
+
+    times, sizes = np.array([2.6e-4, np.nan]), np.array([80.0, 2.0])
+    return RecordedImpacts(hammer, "current", 2.65e-4, ("1.csv", "2.csv"), times, sizes, ("", "unseen"))
+
+
 def thermal_duty(hammer: Hammer) -> Result:
     # Bursts of which one may last, and one melts the copper.
     bursts = ["100 Hz", "1 kHz", "1 MHz"]
@@ -198,6 +207,7 @@ SAMPLES: dict[str, Callable[[Hammer], Result]] = {
     "Motion": lambda hammer: ph.simulate(hammer, ph.PulseTrain(hammer.waveform), points=20),
     "Page": page,
     "Quality": quality,
+    "RecordedImpacts": recorded_impacts,
     "SafeRate": safe_rate,
     "Strobes": lambda hammer: not_none(ensemble(hammer).strobes),
     "TableReport": table_report,

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.errors import refused
 
 import printhammer as ph
 from printhammer.errors import InputError
@@ -71,6 +72,17 @@ def test_a_plain_plunger_without_fringe_and_saturation(tmp_path: Path) -> None:
         held = [key for key, each in fit.constants.items() if each.held]
         assert {"magnet.fringe_height", "magnet.core_reluctance"} <= set(held)
         assert 'status = "assumed"' in fit.fragment()
+
+
+def test_forces_in_a_wrong_unit_are_named_by_their_factor(tmp_path: Path) -> None:
+    gap = np.linspace(0.25, 3.0, 12)
+    slope = 4e-7 * np.pi * 600.0**2 * 60e-6 * 1e3
+    rows = [f"{g},{1e3 * slope / (g + 0.12) + 8},{0.5e3 * slope * 0.64 / (g + 0.12) ** 2}" for g in gap]
+    path = tmp_path / "small.csv"
+    path.write_text("\n".join(["gap [mm],inductance [mH],force [mN]", *rows]) + "\n", encoding="utf-8")
+    with refused("force") as caught:
+        ph.fit("solenoid", path, turns=600.0, current=0.8)
+    assert caught.value.value == pytest.approx(1e-3, rel=1e-6)
 
 
 @pytest.mark.parametrize(

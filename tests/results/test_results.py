@@ -37,7 +37,15 @@ from printhammer.support.arrays import FloatArray
 
 _FIGURES = Path(printhammer.__file__).parent / "figures"
 
-WITHOUT_PICTURE = {"DotTable", "EnsembleResult", "ExtraDots", "Measurement", "Spread", "Strobes"}
+WITHOUT_PICTURE = {
+    "DotTable",
+    "EnsembleResult",
+    "ExtraDots",
+    "Measurement",
+    "RecordedImpacts",
+    "Spread",
+    "Strobes",
+}
 
 
 @pytest.fixture(scope="module")

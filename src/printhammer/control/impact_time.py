@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.impact_estimator import UNITS, ImpactEstimator, Sampling, Signal
+from printhammer.control.impact_estimator import PHASES, UNITS, ImpactEstimator, Sampling, Signal
 from printhammer.control.learning.sensor import ImpactSensor
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.trains import PulseTrain
@@ -24,7 +24,7 @@ from printhammer.results.summary import (
 )
 from printhammer.run.simulate import simulate
 from printhammer.support.arguments import checked
-from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from printhammer.results.result import Entries
@@ -55,9 +55,15 @@ class ImpactTime(Result, rows=_CELLS):
     bias: FloatArray = column("s", "mean error on the nominal hammer", _CELLS, more="NaN if none is seen")
     deviation: FloatArray = column("s", "standard deviation of the error on the nominal hammer", _CELLS)
     missed: FloatArray = column("1", "share of its impacts that are not seen", _CELLS)
+    flagged: FloatArray = column(
+        "1", "share of its impacts whose estimates are flagged, and not used", _CELLS
+    )
     unit_bias: FloatArray = column("s", "mean error over units", _CELLS)
     unit_deviation: FloatArray = column("s", "standard deviation of the error over units", _CELLS)
     unit_missed: FloatArray = column("1", "share of the impacts of units that are not seen", _CELLS)
+    unit_flagged: FloatArray = column(
+        "1", "share of the impacts of units whose estimates are flagged, and not used", _CELLS
+    )
 
     @property
     def title(self) -> str:
@@ -74,9 +80,11 @@ class ImpactTime(Result, rows=_CELLS):
             self.cells("bias", "nominal:\nbias"),
             self.cells("deviation"),
             Cells("missed", [f"{100.0 * missed:.0f} %" for missed in self.missed.ravel()]),
+            Cells("flagged", [f"{100.0 * flagged:.0f} %" for flagged in self.flagged.ravel()]),
             self.cells("unit_bias", "units:\nbias"),
             self.cells("unit_deviation", "deviation"),
             Cells("missed", [f"{100.0 * missed:.0f} %" for missed in self.unit_missed.ravel()]),
+            Cells("flagged", [f"{100.0 * flagged:.0f} %" for flagged in self.unit_flagged.ravel()]),
         ]
         return Summary([Grid(columns, self.title, most=24)])
 
@@ -101,7 +109,8 @@ class ImpactTime(Result, rows=_CELLS):
             raise InputError("no impact was seen in the samples", expected="less noise for a sensor")
         # The mean over units is known at the design, and is taken off.
         offset = float(np.sqrt(max(units**2 - noise**2, 0.0)))
-        missed = min(float(self.unit_missed[0, 0, 0]), _MOST_MISSED)
+        # A flagged estimate is not used.
+        missed = min(float(self.unit_missed[0, 0, 0] + self.unit_flagged[0, 0, 0]), _MOST_MISSED)
         return ImpactSensor(noise=noise, offset=offset, missed=missed, seed=seed)
 
     @property
@@ -119,6 +128,9 @@ def impact_time(
     sampling_rate: Sequence[float | str] = (1e6,),
     bits: Sequence[SupportsIndex] = (12,),
     full_scale: float | str | None = None,
+    delay: float | str = 0.0,
+    bandwidth: float | str | None = None,
+    known: bool = True,
     dots: SupportsIndex = 50,
     units: SupportsIndex = 20,
     variability: Variability | None = None,
@@ -147,6 +159,12 @@ def impact_time(
     full_scale : float or str, optional
         Largest value that it shows, A or V; by default half as much again as the nominal hammer shows around
         its impact.
+    delay : float or str, optional
+        Delay of the probe, s.
+    bandwidth : float or str, optional
+        Bandwidth of the probe, Hz; by default unlimited.
+    known : bool, optional
+        Whether the estimator knows delay and bandwidth of the probe.
     dots : int, optional
         Dots of the nominal hammer, and of all units, in each way to sample.
     units : int, optional
@@ -168,6 +186,8 @@ def impact_time(
         read_count(seed, "seed", least=0),
     )
     span = None if full_scale is None else read_positive(full_scale, UNITS.get(signal, "A"), "full_scale")
+    late = read_number(delay, "s", "delay")
+    width = None if bandwidth is None else read_positive(bandwidth, "Hz", "bandwidth")
     if not 2 <= many <= _MOST_DOTS or not 2 <= others <= many:
         raise InputError(
             f"dots = {many} and units = {others}",
@@ -185,24 +205,27 @@ def impact_time(
     spread = Variability.of(hammer) if variability is None else variability
     drawn = spread.draw(hammer, others, first)
     rng = np.random.default_rng((first, 1))
-    names = ("bias", "deviation", "missed", "unit_bias", "unit_deviation", "unit_missed")
-    arrays = {name: np.full(shape, np.nan) for name in names}
+    names = ("bias", "deviation", "missed", "flagged")
+    arrays = {f"{prefix}{name}": np.full(shape, np.nan) for prefix in ("", "unit_") for name in names}
     flight, done = np.nan, 0
     for j, rate in enumerate(rates.tolist()):
         records: list[Any] = []
         for i, k in itertools.product(range(levels.size), range(widths.size)):
             if progress is not None:
                 progress(done, total)
-            sampling = Sampling(signal, float(levels[i]), rate, int(widths[k]), span)
-            estimator = ImpactEstimator(hammer, sampling)
+            probe = Sampling(signal, float(levels[i]), rate, int(widths[k]), span, late, width)
+            assumed = probe if known else replace(probe, delay=0.0, bandwidth=None)
+            estimator = ImpactEstimator(hammer, assumed)
             flight = estimator.flight
             if not records:
-                records = [_record(unit, estimator) for unit in (hammer, *drawn)]
+                records = [_record(unit, estimator, probe) for unit in (hammer, *drawn)]
             own = _errors(estimator, records[:1], many, rng)
             all_units = _errors(estimator, records[1:], many, rng)
-            for prefix, errors in (("", own), ("unit_", all_units)):
-                seen = errors[np.isfinite(errors)]
-                arrays[f"{prefix}missed"][i, j, k] = 1.0 - seen.size / errors.size
+            for prefix, (errors, believed) in (("", own), ("unit_", all_units)):
+                shown = np.isfinite(errors)
+                seen = errors[shown & believed]
+                arrays[f"{prefix}missed"][i, j, k] = 1.0 - np.mean(shown)
+                arrays[f"{prefix}flagged"][i, j, k] = np.mean(shown & ~believed)
                 if seen.size:
                     arrays[f"{prefix}bias"][i, j, k] = seen.mean()
                     arrays[f"{prefix}deviation"][i, j, k] = seen.std()
@@ -231,24 +254,30 @@ def _largest_current(hammer: Hammer) -> float:
     return float(np.abs(motion.current).max())
 
 
-def _record(unit: Hammer, estimator: ImpactEstimator) -> tuple[FloatArray, float]:
-    """Return the true signal of a dot of a unit, A or V, and when it strikes, s."""
-    times = estimator.times
+def _record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
+    """Return what the probe shows of a dot of a unit, A or V, and when it strikes, s."""
+    each = PHASES if probe.delay or probe.bandwidth is not None else 1
+    times = np.asarray(estimator.step / each * np.arange(each * estimator.count), np.float64)
     motion = simulate(
         unit, PulseTrain(estimator.pulse), duration=float(times[-1]) + estimator.step, times=times
     )
-    true = estimator.sampling.of(motion)
+    true = probe.of(motion)
     flight = motion.dots[0].flight_time
-    short = np.full(times.size - true.size, true[-1])
-    return np.concatenate([true, short]), np.nan if flight is None else float(flight)
+    whole = np.concatenate([true, np.full(times.size - true.size, true[-1])])
+    return probe.shown(times, whole)[::each], np.nan if flight is None else float(flight)
 
 
 def _errors(
     estimator: ImpactEstimator, records: Sequence[Any], dots: int, rng: np.random.Generator
-) -> FloatArray:
-    """Return the errors of estimated times of impact of dots, s, in turn one of each record."""
-    errors = []
+) -> tuple[FloatArray, BoolArray]:
+    """Return the errors of estimated times of impact of dots, s, in turn one of each record.
+
+    Beside them is which estimates are not flagged.
+    """
+    errors, believed = [], []
     for number in range(dots):
         true, flight = records[number % len(records)]
-        errors.append(estimator(estimator.sampling.read(true, rng)) - flight)
-    return np.array(errors)
+        estimate = estimator.estimate(estimator.sampling.read(true, rng))
+        errors.append(estimate.time - flight)
+        believed.append(not estimate.flag)
+    return np.array(errors), np.array(believed)

@@ -1,5 +1,6 @@
 """The time of impact from samples of the coil: exact without noise, and what noise and units do to it."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.impact_estimator import ImpactEstimator, Sampling
+from printhammer.control.recorded_impacts import recorded_impacts
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +102,69 @@ def test_few_bits_are_as_bad_as_noise(wire: ph.Hammer) -> None:
     assert study.deviation[0, 0, 0] > 2.0 * study.deviation[0, 0, 1]
 
 
+def shown_by(wire: ph.Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[Any, float]:
+    """Return noisy samples of the current by a probe with delay and bandwidth, and the true time."""
+    times = estimator.step / 20 * np.arange(20 * estimator.count)
+    motion = ph.simulate(wire, ph.PulseTrain(estimator.pulse), duration=times[-1] + 1e-6, times=times)
+    shown = probe.shown(times, np.asarray(motion.current))[::20]
+    flight = motion.dots[0].flight_time
+    assert flight is not None
+    return estimator.sampling.read(shown, np.random.default_rng(5)), flight
+
+
+PROBES = [{"delay": 5e-6}, {"bandwidth": 2e4}, {"delay": 2e-5}, {"delay": 3e-6, "bandwidth": 5e4}]
+
+
+@pytest.mark.parametrize("probe", PROBES)
+def test_a_probe_that_is_known_makes_no_bias(wire: ph.Hammer, probe: dict[str, float]) -> None:
+    sampling = Sampling(noise=5e-3, **probe)  # type: ignore[arg-type]
+    estimator = ImpactEstimator(wire, sampling)
+    samples, flight = shown_by(wire, estimator, sampling)
+    estimate = estimator.estimate(samples)
+    assert estimate.time == pytest.approx(flight, abs=1.5e-6)
+    assert not estimate.flag
+
+
+@pytest.mark.parametrize(
+    "probe",
+    [{"delay": late} for late in (0.0, 1e-6, 2e-6, 3e-6, 5e-6, 1e-5, 3e-5)]
+    + [{"bandwidth": width} for width in (2e5, 1e5, 7e4, 5e4, 2e4, 1e4)],
+)
+def test_an_estimate_by_a_probe_that_is_not_known_is_near_or_flagged(
+    wire: ph.Hammer, probe: dict[str, float]
+) -> None:
+    """The switch-off lies 5.7 us before the impact: in what the delay leaves of it the filter finds one."""
+    estimator = ImpactEstimator(wire, Sampling(noise=5e-3))
+    samples, flight = shown_by(wire, estimator, Sampling(**probe))  # type: ignore[arg-type]
+    estimate = estimator.estimate(samples)
+    assert estimate.flag == "edge" or abs(estimate.time - flight) < 4e-6
+    assert not estimate.flag or probe.get("delay", 0.0) > 1e-6 or probe.get("bandwidth", 1e9) < 1e5
+
+
+def test_what_the_study_flags_is_not_used(wire: ph.Hammer) -> None:
+    asked: dict[str, Any] = {"noise": ["5 mA"], "dots": 10, "units": 5, "delay": "5 us"}
+    unknown = ph.impact_time(wire, known=False, **asked)
+    assert unknown.flagged[0, 0, 0] == 1.0
+    assert np.isnan(unknown.bias[0, 0, 0])
+    known = ph.impact_time(wire, **asked)
+    assert known.flagged[0, 0, 0] == 0.0
+    assert abs(known.bias[0, 0, 0]) < 1e-6
+
+
+def test_impacts_in_recorded_files(wire: ph.Hammer, tmp_path: Path) -> None:
+    paths = [tmp_path / f"{k}.csv" for k in range(2)]
+    sensor = {"sampling_rate": "1 MHz", "bandwidth": "100 kHz"}
+    for seed, path in enumerate(paths):
+        ph.measure("current", wire, seed=seed, sensor=sensor, duration="1 ms").write(path)
+    impacts = recorded_impacts(wire, paths)
+    assert impacts.record == ("0.csv", "1.csv")
+    np.testing.assert_allclose(impacts.time, impacts.flight_time, atol=2e-6)
+    assert set(impacts.flag) == {""}
+    paths[0].write_text("time [us],current [A]\n" + "\n".join(f"{k},0.5" for k in range(90)), "utf-8")
+    with refused("time"):
+        recorded_impacts(wire, paths)
+
+
 @pytest.mark.parametrize(
     ("wrong", "key"),
     [
@@ -111,6 +176,8 @@ def test_few_bits_are_as_bad_as_noise(wire: ph.Hammer) -> None:
         ({"bits": [30]}, "bits"),
         ({"dots": 1}, "dots"),
         ({"signal": "charge"}, "signal"),
+        ({"delay": "-1 us"}, "delay"),
+        ({"bandwidth": "0 Hz"}, "bandwidth"),
     ],
 )
 def test_what_cannot_be_used(wire: ph.Hammer, wrong: dict[str, Any], key: str) -> None:

@@ -64,6 +64,9 @@ def dead_time(
         "full_scale": opt.text(
             "VALUE", "Full scale of the A/D converter (default: 1.5 times the largest nominal sample)."
         ),
+        "delay": opt.text("TIME", "Delay of the probe, e.g. '2 us' (default: none)."),
+        "bandwidth": opt.text("FREQUENCY", "Bandwidth of the probe, e.g. '50 kHz' (default: unlimited)."),
+        "known": opt.switch("Let the estimator know delay and bandwidth of the probe.", default=True),
         "dots": opt.whole("Number of dots for each sampling setup.", default=50),
         "seed": opt.whole("Seed of the hammers and of the noise.", default=0),
     },
@@ -82,6 +85,10 @@ def impact_time(
         "N", "Resolution of the A/D converter in bits (default: 12); repeatable.", many=True
     ),
     hammers: int = opt.whole("Number of hammers drawn from the production spread.", default=20),
+    record: list[Path] | None = opt.source(
+        "Record of one shot, columns time, current or voltage: estimate its impact time instead; repeatable.",
+        many=True,
+    ),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
@@ -89,6 +96,13 @@ def impact_time(
     from printhammer.control.impact_estimator import UNITS
     from printhammer.control.impact_time import impact_time as studied
 
+    if record:
+        from printhammer.control.recorded_impacts import recorded_impacts
+
+        opt.refuse({"noise": noise, "sampling-rate": sampling_rate, "bits": bits}, "none beside --record")
+        probe = {name: passed[name] for name in ("signal", "delay", "bandwidth") if name in passed}
+        impacts = recorded_impacts(hammer, record, **probe)
+        return Answer(render(impacts.summary(), units), files={"out": Content.of(impacts)})
     grids: dict[str, Any] = {
         "noise": opt.between(noise, UNITS[passed.get("signal", "current")], "--noise"),
         "sampling_rate": opt.between(sampling_rate, "Hz", "--sampling-rate"),

@@ -40,6 +40,9 @@ _REACH: Final = 1e3
 _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
 """Constants whose effect vanishes where they are large; of the others, where they are small."""
 
+_FACTOR: Final = 4.0
+"""Factor between force and slope of the inductance that no saturation explains; a pound-force is 4.4 N."""
+
 _SPARE: Final = 4
 """Rows more than parameters, for the errors."""
 
@@ -104,6 +107,7 @@ def fit_solenoid(
             key="gap",
             expected="0 or more",
         )
+    _check_factor(table.path, gap, currents, force, linkage)
     rows = len(gap)
     data = Data(
         (table.path,),
@@ -134,6 +138,33 @@ def fit_solenoid(
         given=given,
         remedies={"magnet.pole_area": "more rows over a wider span of the gap"},
     )
+
+
+def _check_factor(
+    path: Path, gap: FloatArray, current: FloatArray, force: FloatArray, linkage: FloatArray
+) -> None:
+    """Refuse forces that are far from what the inductances at the same currents ask for.
+
+    Between neighbouring gaps the force is i^2 / 2 times the chord of the inductance; where the inductance
+    falls as the inverse of the gap, their geometric mean is that exactly.
+    """
+    order = np.lexsort((gap, current))
+    g, i, f, inductance = gap[order], current[order], force[order], (linkage / current)[order]
+    same = (np.diff(i) <= 1e-6 * i[1:]) & (np.diff(g) > 0.0)
+    with np.errstate(all="ignore"):
+        asked = -0.5 * i[1:] ** 2 * np.diff(inductance) / np.diff(g)
+        factors = (np.sqrt(f[1:] * f[:-1]) / asked)[same & (asked > 0.0)]
+    if not factors.size:
+        return
+    factor = float(np.median(factors))
+    if not 1.0 / _FACTOR < factor < _FACTOR:
+        raise InputError(
+            f"{path}: the force is {factor:.3g} of what the slope of the inductance asks for (i^2/2 dL/dg)",
+            file=path,
+            key="force",
+            value=factor,
+            expected="forces, inductances, gaps and currents of one magnet, each in its unit",
+        )
 
 
 class CircuitLaw:

@@ -1,0 +1,145 @@
+"""Times of impact in recorded files of the current in a coil, or of the voltage across it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from printhammer.control.impact_estimator import UNITS, ImpactEstimator, Sampling, Signal
+from printhammer.drive.input import read_number, read_positive
+from printhammer.errors import InputError
+from printhammer.hammer.hammer import Hammer
+from printhammer.identify.lowpass import bandwidth_of
+from printhammer.identify.noise import noise_of_record
+from printhammer.results import Result, column, coordinate, part, scalar
+from printhammer.results.summary import Cells, Grid, Summary
+from printhammer.support.arrays import FloatArray
+from printhammer.support.tables.readings import Readings, read_table
+
+_BITS: Final = 24
+"""Bits of a converter without rounding; a record has its own in its noise."""
+
+_QUIET: Final = 1e-4
+"""Least noise of a sample, as a fraction of the largest."""
+
+_UNEVEN: Final = 0.01
+"""Largest difference of two time steps of a record, as a fraction of their median."""
+
+
+class RecordedImpacts(Result, rows="record"):
+    """Times of impact in records, one single shot each."""
+
+    hammer: Hammer = part("the nominal hammer")
+    signal: str = part("what was recorded, current or voltage")
+    flight_time: float = scalar("s", "from firing to impact on the nominal hammer")
+    record: tuple[str, ...] = coordinate("", "file of the record", "record")
+    time: FloatArray = column("s", "from firing to impact", "record", more="NaN where none shows")
+    clearness: FloatArray = column("1", "size of what the impact does, over the noise of a sample", "record")
+    flag: tuple[str, ...] = column(
+        "", "what speaks against the estimate", "record", more="empty where nothing does"
+    )
+
+    @property
+    def title(self) -> str:
+        """What it is of."""
+        return f"times of impact of {self.hammer.name} in records of the {self.signal} of its coil"
+
+    def summary(self) -> Summary:
+        """Return the times, a row for each record."""
+        columns = [
+            Cells("record", list(self.record), left=True),
+            self.cells("time"),
+            Cells("size / noise", self.clearness, "", ".3g"),
+            Cells("flag", list(self.flag), left=True),
+        ]
+        return Summary([Grid(columns, self.title, most=24)])
+
+
+def recorded_impacts(
+    hammer: Hammer,
+    paths: Sequence[str | Path],
+    *,
+    signal: Signal = "current",
+    delay: float | str = 0.0,
+    bandwidth: float | str | None = None,
+) -> RecordedImpacts:
+    """Estimate the times of impact in records of single shots from rest, fired at time 0.
+
+    The estimator is `printhammer.control.impact_estimator.ImpactEstimator`, the noise of a sample that of the
+    record.
+
+    Parameters
+    ----------
+    hammer : Hammer
+        The nominal hammer, with a pack and a driver of its coil.
+    paths : sequence of path
+        Tables with the columns ``time`` and ``current``, or ``voltage``, in even time steps.
+    signal : str, optional
+        "current" or "voltage".
+    delay : float or str, optional
+        Delay of the probe, s.
+    bandwidth : float or str, optional
+        Bandwidth of the probe, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, else unlimited.
+
+    Raises
+    ------
+    InputError
+        A record cannot be used, is too short, or shows nothing of an impact.
+    """
+    if signal not in UNITS:
+        raise InputError.of("signal", signal, " or ".join(UNITS))
+    late = read_number(delay, "s", "delay")
+    width = None if bandwidth is None else read_positive(bandwidth, "Hz", "bandwidth")
+    estimates, flight = [], math.nan
+    for path in paths:
+        table = read_table(path, {"time": "s", signal: UNITS[signal]})
+        table.check_times()
+        estimator = _estimator(hammer, table, signal, late, bandwidth_of(table) if width is None else width)
+        t, values = table.values["time"], table.values[signal]
+        last = float(estimator.times[-1])
+        if not t[0] <= 0.5 * estimator.step or not t[-1] >= last - estimator.step:
+            raise InputError(
+                f"{table.path}: a record from {t[0]:.4g} to {t[-1]:.4g} s",
+                file=table.path,
+                key="time",
+                expected=f"one from the firing at 0 s to {last:.4g} s",
+            )
+        estimates.append(
+            estimator.estimate(estimator.sampling.clipped(np.interp(estimator.times, t, values)))
+        )
+        flight = estimator.flight
+    if not estimates:
+        raise InputError("no records", key="records", expected="one or more")
+    return RecordedImpacts(
+        hammer=hammer,
+        signal=signal,
+        flight_time=flight,
+        record=tuple(Path(path).name for path in paths),
+        time=np.array([each.time for each in estimates]),
+        clearness=np.array([each.clearness for each in estimates]),
+        flag=tuple(each.flag for each in estimates),
+    )
+
+
+def _estimator(
+    hammer: Hammer, table: Readings, signal: Signal, delay: float, bandwidth: float | None
+) -> ImpactEstimator:
+    """Return an estimator for the steps and the noise of a record."""
+    steps = np.diff(table.values["time"])
+    step = float(np.median(steps))
+    if float(np.ptp(steps)) > _UNEVEN * step:
+        raise InputError(
+            f"{table.path}: time steps from {steps.min():.4g} to {steps.max():.4g} s",
+            file=table.path,
+            key="time",
+            expected="even ones",
+        )
+    values = table.values[signal]
+    noise = max(noise_of_record(values), _QUIET * float(np.abs(values).max()))
+    return ImpactEstimator(
+        hammer, Sampling(signal, noise, 1.0 / step, _BITS, delay=delay, bandwidth=bandwidth)
+    )
