@@ -42,6 +42,7 @@ ROOMS = (
     "control/learning",
     "control/impact_estimator",
     "control/impact_time",
+    "identify/lowpass",
     "control/table",
     "printing/dots",
     "printing/rates",
