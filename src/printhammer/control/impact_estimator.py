@@ -66,6 +66,9 @@ _UNLIKE: Final = 0.5
 Units of `impact-wire` reach 0.4 with errors of 2 us; a delay of 5 us that nobody stated has 1.5, and 30 us.
 """
 
+_TOO_LARGE: Final = 2.5
+"""Size of an impact over that of the nominal hammer from which on it is none; units reach 1.3."""
+
 UNSEEN, EDGE, UNLIKE, END = "unseen", "edge", "unlike", "end"
 """Flags of an estimate: no impact in the samples; unlike one, near an edge of the driver or elsewhere; at the
 end of what was searched."""
@@ -194,7 +197,8 @@ class ImpactEstimator:
         freedom = self._size - _DEGREE - 2
         expected = freedom + 4.0 * math.sqrt(2.0 * freedom)
         left_over = self._energy(windows[place : place + 1])[0] - float(found[best]) ** 2
-        if left_over > _UNLIKE * float(found[best]) ** 2 + expected * self.sampling.deviation**2:
+        unlike = left_over > _UNLIKE * float(found[best]) ** 2 + expected * self.sampling.deviation**2
+        if unlike or clearness > _TOO_LARGE * self.clearness:
             first, last = place * self.step, (place + self._size) * self.step
             edges = self.pulse.segments()[1:, 0] + self.sampling.delay
             flag = EDGE if ((edges > first) & (edges < last)).any() else UNLIKE
