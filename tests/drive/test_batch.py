@@ -112,7 +112,7 @@ def test_an_ensemble_of_trains_is_that_of_the_single_ones(count: int) -> None:
 
 
 def test_a_map_makes_no_drive_for_each_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not more with a hundred rates than with two."""
+    """Not more with a hundred rates than with two: a few for the wait after the last firing, and for all."""
     hammer = ph.load("hendriks-1983")
     made: list[object] = []
     begin = ph.PulseTrain.__init__
@@ -131,7 +131,7 @@ def test_a_map_makes_no_drive_for_each_rate(monkeypatch: pytest.MonkeyPatch) -> 
         made.clear()
         ph.frequency_map(hammer, np.linspace(900.0, 1000.0, rates), pulses=1, times=2)
         counts.append(len(made))
-    assert counts[0] == counts[1] <= 4
+    assert counts[0] == counts[1] <= 6
 
 
 @given(st.lists(st.lists(st.floats(allow_nan=False), max_size=4), max_size=5), st.data())

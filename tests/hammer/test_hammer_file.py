@@ -154,11 +154,11 @@ BAD = {
     ),
     "a file that is not there": (
         changed('^law = "inverse-root"(.|\n)*?^\n', 'law = "table"\nfile = "gone.csv"\n\n'),
-        ["gone.csv", "the force table cannot be read"],
+        ["gone.csv", "no such file"],
     ),
     "a record that is not there": (
         changed('^shape = "rectangle"(.|\n)*', 'shape = "sampled"\nfile = "gone.csv"\n'),
-        ["gone.csv", "cannot be read"],
+        ["gone.csv", "no such file"],
     ),
 }
 

@@ -79,7 +79,8 @@ def test_a_shipped_hammer_opens_with_something_that_strikes_its_backstop(name: s
     assert ("waveform" in opening) == (hammer.waveform is None)
     state = read_state({**STATE, "hammer": name, **opening})
     with interpreted() if name in RARE else nullcontext():
-        motion = limited_run(state.changed, state.drive, end_of_run(state.drive, None), bounds.MOST_STEPS)
+        end = end_of_run(state.changed, state.drive, None)
+        motion = limited_run(state.changed, state.drive, end, bounds.MOST_STEPS)
     assert motion.status == "ok"
     struck = any(contact.surface == "backstop" for contact in motion.contacts)
     # Without a spring an armature stays where it was pulled.

@@ -39,7 +39,7 @@ def test_tables_along_the_gap(cli: Callable, quick: Path, tmp_path: Path) -> Non
     done = cli("tune", quick, *words, "--tick", "1 us", "--budget", 60, *out)
     assert done.status == 0
     assert "Tables along the gap at 1850 Hz" in done.out
-    assert "44 bytes in a C header" in done.out
+    assert "48 bytes in a C header" in done.out
     assert "TICK_NS 1000" in names[2].read_text()
     assert names[0].read_text().startswith("gap [m],")
 
