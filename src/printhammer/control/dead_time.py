@@ -178,12 +178,21 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         ]
         facts = Facts([("own pulse", own), ("blow", quantity(self.blow, "m/s"))])
         none = np.isnan(self.width)
-        lacking = (
-            f"\nNo width gives the blow at {int(none.sum())} of {none.size} pairs of rail and temperature;"
-            f" {quantity(self.reached, 'm/s')} is the strongest that all of them reach."
-        )
+        strong = none & (self.strongest >= self.blow * (1.0 - _SAME))
+        pairs = f"of {none.size} pairs of rail and temperature"
+        lacking = []
+        if (weak := none & ~strong).any():
+            lacking.append(
+                f"No width gives the blow at {int(weak.sum())} {pairs};"
+                f" {quantity(self.reached, 'm/s')} is the strongest that all of them reach."
+            )
+        if strong.any():
+            lacking.append(
+                f"At {int(strong.sum())} {pairs} the shortest pulse that the driver can give strikes"
+                " harder than the blow already."
+            )
         return Summary(
-            [facts, "", Grid(columns, most=24), *([styled("poor", lacking)] if none.any() else [])]
+            [facts, "", Grid(columns, most=24), *(styled("poor", f"\n{each}") for each in lacking)]
         )
 
     @property

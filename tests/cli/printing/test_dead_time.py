@@ -37,3 +37,11 @@ def test_a_blow_out_of_reach_is_told(cli: Callable) -> None:
 )
 def test_what_cannot_be_used(refused: Callable, words: tuple[str, ...], said: str) -> None:
     refused("dead-time", *words, said=said)
+
+
+def test_a_blow_weaker_than_the_shortest_pulse_gives(cli: Callable) -> None:
+    """The strong phase of this driver lasts longer than the flight."""
+    options = ["--blow", "4 m/s", "--voltage", "45 V, 50 V, 2", "--temperature", "20 degC, 60 degC, 2"]
+    done = cli("dead-time", "pinball-flipper", *options)
+    assert "At 4 of 4 pairs of rail and temperature the shortest pulse" in " ".join(done.out.split())
+    assert "No width gives the blow" not in done.out
