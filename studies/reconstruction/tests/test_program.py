@@ -145,4 +145,4 @@ def test_a_log_is_continued_without_force(cli: Callable[..., Any]) -> None:
     continued = {verb.name for verb in VERBS if any(files.continued for files in verb.files.values())}
     assert continued == {"search", "judge"}
     for verb in VERBS:
-        assert ("Write over files" in cli(verb.name, "--help").out) == (verb.name not in continued)
+        assert ("--force" in cli(verb.name, "--help").out) == (verb.name not in continued)
