@@ -54,7 +54,7 @@ def test_it_begins_in_an_open_loop(law: LearningLaw) -> None:
     learner = Learner(law)
     assert not learner.learned
     assert (learner.settings == law.entries.open_loop).all()
-    assert (learner.printed == law.entries.open_loop).all()
+    assert (learner.printed == law.first.settings).all()
 
 
 def test_the_open_loop_is_left_for_a_gain_without_harm_only(law: LearningLaw) -> None:
