@@ -348,8 +348,9 @@ class LearningLaw:
         table = yield from order_good(press, [self.entries.settings(corrections)] * count)
         loop, shares = yield from better_loop(press, self.entries)
         edge = table.mean(axis=1) - shares.max(axis=0)
-        gains = bool(np.quantile(edge, self.doubt) >= 0.0 and edge.mean() >= _GAIN)
-        return gains, loop, (float(table.mean()), float(shares.mean(axis=1).max()))
+        expected = float(table.mean()), float(shares.mean(axis=1).max())
+        gains = bool(np.quantile(edge, self.doubt) >= 0.0 and expected[0] - expected[1] >= _GAIN)
+        return gains, loop, expected
 
 
 def better_loop(press: Press, entries: Adjustable) -> Printing[tuple[OpenLoop, FloatArray]]:
