@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.control.learning.law import JUDGED, PRINTED, RUNS, LearningLaw
+from printhammer.control.learning.law import JUDGED, RUNS, LearningLaw
 from printhammer.control.learning.learn import Progress, calibrate
 from printhammer.control.learning.learner import MISFIT, Learner
 from printhammer.control.learning.lines import DOTS, LINE, Press, Rung
@@ -109,16 +109,14 @@ def test_no_table_is_handed_out_where_the_belief_does_not_explain_the_readings(b
     assert not stages[-1].learned.any()
 
 
-def test_at_the_safe_rate_the_own_pulse_is_what_units_begin_with() -> None:
-    """A fast switch prints fewer dots of a row of them than the hammer's own pulse, which prints them all."""
-    law = law_for(nominal(), 835.0, members=150)[0]
-    own = law.entries.own
+def test_the_open_loop_of_the_own_pulse_arrives_when_that_of_the_switch_does(law: LearningLaw) -> None:
+    own, press = law.entries.own, law.production.press([law.production.nominal])
     assert own is not None
-    assert law.first.pulse is own.pulse
-    learner = Learner(law)
-    assert (learner.printed == own.settings).all()
-    line = law.production.press([law.production.nominal]).line([own.settings], PRINTED, [own.pulse])[1]
-    assert line.good[:, JUDGED].all()
+    assert own.pulse == nominal().waveform
+    for loop in law.entries.loops:
+        alone = press.line([loop.settings], (0,), [loop.pulse])[1]
+        assert alone.arrival_deviation[0, 0] == pytest.approx(0.0, abs=1e-7)
+        assert alone.force_deviation[0, 0] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_it_gains_where_the_force_is_measured(learned: tuple[list[Learner], list[Progress]]) -> None:
