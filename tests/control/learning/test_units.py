@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 import printhammer as ph
-from printhammer.control.learning.law import JUDGED, RUNS, LearningLaw
+from printhammer.control.learning.law import RUNS, LearningLaw
 from printhammer.control.learning.learn import Progress, calibrate
-from printhammer.control.learning.learner import MISFIT, Learner
+from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import DOTS, LINE, Press, Rung
 from printhammer.control.learning.preparation import law_for
-from printhammer.control.learning.production import OFFSET
 from printhammer.control.learning.sensor import ImpactSensor, Readings
 from printhammer.control.table.drive import with_pulse
 from printhammer.printing.rates.variability import Variability
@@ -66,57 +65,8 @@ def test_learning_depends_on_readings_and_on_nothing_else_of_the_unit(law: Learn
     assert one.corrections.any()
     assert set(vars(one)) == {
         *("law", "stage", "corrections", "belief", "contractions"),
-        *("loop", "expected", "_gains", "_started", "_ladders", "_line", "_first"),
+        *("_gains", "_started", "_ladders", "_line", "_first"),
     }
-
-
-def test_what_is_expected_and_left_is_told_from_readings(
-    learned: tuple[list[Learner], list[Progress]],
-) -> None:
-    first, *others = learned[1]
-    assert np.isnan(first.misfit).all()
-    assert np.isnan(first.expected).all()
-    for stage in others:
-        assert (stage.misfit < MISFIT).all()
-        # An expectation is a mean over units that may be this one.
-        assert abs((stage.expected - stage.cycle.good[:, JUDGED].mean(axis=1)).mean()) < 0.25
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("delay", [-50e-6, 20e-6, 50e-6])
-def test_a_hidden_offset_of_the_sensor_costs_nothing(by_time: LearningLaw, delay: float) -> None:
-    """Offsets are unknowns: no unit falls below the better open loop, and the offset itself is found."""
-    learners, stages = calibrate(by_time, Variability().draw(nominal(), 4, 5), ImpactSensor(delay=delay))
-    good = np.array([stage.cycle.good[:, JUDGED].mean(axis=1) for stage in stages])
-    assert (good[1:] >= good[0] - 0.02).all()
-    for learner in learners:
-        assert learner.belief is not None
-        mean, deviation = (each[-1] * OFFSET for each in learner.belief.moments())
-        assert abs(mean - delay) < 4.0 * deviation + 2e-6
-
-
-@pytest.mark.slow
-def test_no_table_is_handed_out_where_the_belief_does_not_explain_the_readings(by_time: LearningLaw) -> None:
-    """Errors of 60 us that alternate from dot to dot are no offset and no gain."""
-
-    class Odd(ImpactSensor):
-        def read(self, flight: np.ndarray, force: np.ndarray, unit: int, run: int) -> Readings:
-            time = super().read(flight, force, unit, run).time
-            return Readings(time + 60e-6 * (-1.0) ** np.arange(len(time)), None)
-
-    learners, stages = calibrate(by_time, Variability().draw(nominal(), 2, 5), Odd())
-    assert all(learner.misfit > MISFIT for learner in learners)
-    assert not stages[-1].learned.any()
-
-
-def test_the_open_loop_of_the_own_pulse_arrives_when_that_of_the_switch_does(law: LearningLaw) -> None:
-    own, press = law.entries.own, law.production.press([law.production.nominal])
-    assert own is not None
-    assert own.pulse == nominal().waveform
-    for loop in law.entries.loops:
-        alone = press.line([loop.settings], (0,), [loop.pulse])[1]
-        assert alone.arrival_deviation[0, 0] == pytest.approx(0.0, abs=1e-7)
-        assert alone.force_deviation[0, 0] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_it_gains_where_the_force_is_measured(learned: tuple[list[Learner], list[Progress]]) -> None:

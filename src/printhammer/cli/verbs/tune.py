@@ -219,12 +219,6 @@ def learn(
         "Correlation of the noise of successive dots (default: 0).", panel=_PANEL
     ),
     gain: float | None = opt.number("Scale error of the sensor (default: 0).", panel=_PANEL),
-    offset: float | None = opt.quantity(
-        "s",
-        "TIME",
-        "Standard deviation over units of the sensor's constant error (default: 0; prior: 25 us or more).",
-        panel=_PANEL,
-    ),
     missed: float | None = opt.number(
         "Fraction of impacts that the sensor misses (default: 0).", panel=_PANEL
     ),
@@ -240,17 +234,9 @@ def learn(
     from printhammer.control.learning.sensor import ImpactSensor
     from printhammer.hammer.hammer import load
 
-    readings = opt.given(
-        noise=noise,
-        force=force_noise,
-        colour=colour,
-        gain=gain,
-        missed=missed,
-        false=false,
-        offset=offset,
-    )
+    readings = opt.given(noise=noise, force=force_noise, colour=colour, gain=gain, missed=missed, false=false)
     if signal is not None:
-        opt.refuse({"noise": noise, "offset": offset}, "none beside --signal, which has --signal-noise")
+        opt.refuse({"noise": noise}, "none beside --signal, which has --signal-noise")
         readings |= _from_coil(job, hammer, signal, signal_noise)
     else:
         opt.refuse({"signal-noise": signal_noise}, "none without --signal")

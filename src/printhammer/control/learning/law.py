@@ -44,11 +44,10 @@ from printhammer.control.table.drive import (
 )
 from printhammer.control.table.task import Task
 from printhammer.control.table.tuning import tune
-from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.strategy import LEAD_IN, SLOTS, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slots_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import together
 
@@ -64,13 +63,6 @@ _LEAST_BRAKE: Final = 0.05  # Least width of a brake pulse, likewise
 ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
-class OpenLoop(NamedTuple):
-    """A pulse that is fired at every slot: its settings (4, entries), and its waveform."""
-
-    settings: FloatArray
-    pulse: Waveform
-
-
 @dataclass(frozen=True)
 class Adjustable:
     """The entries of a table that are learned: advance, width, and brake where there is one.
@@ -82,8 +74,6 @@ class Adjustable:
     task: Task
     rate: float
     base: FloatArray
-    own: OpenLoop | None = None
-    """The open loop of the hammer's own pulse; None if the pulse of the task is that, or it has no width."""
 
     @cached_property
     def inputs(self) -> IntArray:
@@ -99,12 +89,6 @@ class Adjustable:
         settings = np.zeros_like(self.base)
         settings[WIDTH] = self.task.width
         return settings
-
-    @property
-    def loops(self) -> list[OpenLoop]:
-        """The open loops that there are: that of the pulse of the task, and of the hammer's own."""
-        plain = OpenLoop(self.open_loop, self.task.pulse)
-        return [plain] if self.own is None else [plain, self.own]
 
     def limited(self, before: FloatArray, change: FloatArray) -> FloatArray:
         """Return corrections (inputs,) after a change, such that the settings keep to all bounds."""
@@ -169,14 +153,8 @@ _GAIN: Final = 0.02  # Least share of the dots that the table gains in the mean 
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 """Slots of the line that corrections are tried on, on hammers that are believed in: the cycle of order 6."""
 
-ROW: Final = 128  # Number of dots of the row that follows the cycle
-
-_CYCLE: Final = cycle_with_lead_in()
-PRINTED: Final = (*slots_of(_CYCLE), *range(len(_CYCLE) + SLOTS, len(_CYCLE) + SLOTS + ROW))
-"""Slots on which tables are judged: the cycle after its lead-in, and a row of dots from rest."""
-
-JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
-"""Which dots of these count."""
+PRINTED: Final = slots_of(cycle_with_lead_in())
+"""Slots of the cycle on which tables are judged."""
 
 
 class Update(NamedTuple):
@@ -184,9 +162,7 @@ class Update(NamedTuple):
 
     corrections: FloatArray  # (inputs,)
     contraction: float  # Largest eigenvalue of Q - L (G + a (G' - G))
-    gains: bool  # Whether the table is better than both open loops
-    loop: OpenLoop  # The better one of these, on the hammers believed in
-    expected: tuple[float, float]  # Fraction of dots within limits, with the table and in this open loop
+    gains: bool  # Whether the table is handed out
     left: (
         float  # What dots are off by in the end, on the hammers believed in: squares, in parts of the limits
     )
@@ -215,7 +191,6 @@ class LearningLaw:
     shown: tuple[Surrogate, ...]
     rows: FloatArray  # Constants of simulated hammers, (members, size): where a search may begin
     seen: FloatArray  # Their readings, (members, readings)
-    first: OpenLoop  # The better open loop in the mean over the production
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
         """Return what is done after a stage; asks for what the hammers believed in print.
@@ -253,8 +228,8 @@ class LearningLaw:
             # The table that learning starts from may lead to where what was learned does not.
             other = yield from self._followed(unit, 0.0 * corrections)
             left, found = min((left, found), other, key=lambda end: end[0])
-        gains, loop, expected = yield from self._compared(alike, found)
-        return Update(found, contraction, gains, loop, expected, left)
+        gains = yield from self._gains(alike, found)
+        return Update(found, contraction, gains, left)
 
     def started_anew(self, belief: Belief) -> LearningLaw | None:
         """Return the same law, starting from a table that is tuned for the hammer believed in.
@@ -336,39 +311,23 @@ class LearningLaw:
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
 
-    def _compared(
-        self, alike: Sequence[Hammer], corrections: FloatArray
-    ) -> Printing[tuple[bool, OpenLoop, tuple[float, float]]]:
-        """Return whether the table gains, the better open loop, and the shares of good dots of the two.
-
-        The table gains if probable hammers print more dots with it than in either open loop, and none of
-        them, but for doubt, fewer.
-        """
-        press, count = self.production.press(alike), len(alike)
-        table = yield from order_good(press, [self.entries.settings(corrections)] * count)
-        loop, shares = yield from better_loop(press, self.entries)
-        edge = table.mean(axis=1) - shares.max(axis=0)
-        expected = float(table.mean()), float(shares.mean(axis=1).max())
-        gains = bool(np.quantile(edge, self.doubt) >= 0.0 and expected[0] - expected[1] >= _GAIN)
-        return gains, loop, expected
+    def _gains(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[bool]:
+        """Return whether probable hammers print more dots with the table, and none, but for doubt, fewer."""
+        press = self.production.press(alike)
+        plain, table = yield from together(
+            [
+                order_good(press, [settings] * len(alike))
+                for settings in (self.entries.open_loop, self.entries.settings(corrections))
+            ]
+        )
+        edge = table.mean(axis=1) - plain.mean(axis=1)
+        return bool(np.quantile(edge, self.doubt) >= 0.0 and edge.mean() >= _GAIN)
 
 
-def better_loop(press: Press, entries: Adjustable) -> Printing[tuple[OpenLoop, FloatArray]]:
-    """Return the open loop with which some hammers print more dots, and the shares of all, (loops, M)."""
-    loops, count = entries.loops, len(press.hammers)
-    good = yield from together(
-        [order_good(press, [loop.settings] * count, [loop.pulse] * count) for loop in loops]
-    )
-    shares = np.array([each.mean(axis=1) for each in good])
-    return loops[int(np.argmax(shares.mean(axis=1)))], shares
-
-
-def order_good(
-    press: Press, settings: Sequence[FloatArray], pulses: Sequence[Waveform] | None = None
-) -> Printing[BoolArray]:
-    """Return which dots of `PRINTED` are within limits, (M, dots), those of the lead-in left out."""
-    _dots, judgement = yield from press.order_line(settings, PRINTED, pulses)
-    return np.asarray(judgement.good[:, JUDGED])
+def order_good(press: Press, settings: Sequence[FloatArray]) -> Printing[BoolArray]:
+    """Return which dots of the cycle are within limits, (M, dots), those of the lead-in left out."""
+    _dots, judgement = yield from press.order_line(settings, PRINTED)
+    return np.asarray(judgement.good[:, np.asarray(PRINTED) >= LEAD_IN])
 
 
 def _badness(off: FloatArray) -> float:

@@ -30,7 +30,6 @@ from printhammer.results.summary import (
     Cells,
     Grid,
     Summary,
-    quantity,
 )
 from printhammer.run.effort import DEFAULT, AtFixedTolerance, Effort, computation
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
@@ -44,8 +43,6 @@ class Progress(NamedTuple):
     cycle: Judgement
     line: Judgement
     learned: BoolArray  # Which units print with the table that is learned, not in an open loop
-    misfit: FloatArray  # What is left of their readings, in standard deviations; NaN before there are any
-    expected: FloatArray  # Fraction of dots within limits that is expected of what is handed out, likewise
 
 
 def calibrate(
@@ -67,12 +64,16 @@ def calibrate(
     run, history = 0, []
 
     def record(line: Judgement) -> None:
-        settings, pulses = ([getattr(each, name) for each in learners] for name in ("printed", "pulse"))
-        cycle = press.line(settings, PRINTED, pulses)[1]
-        states = (
-            np.array([getattr(each, name) for each in learners]) for name in ("learned", "misfit", "expected")
+        cycle = press.line([learner.printed for learner in learners], PRINTED)[1]
+        state = np.array([learner.learned for learner in learners])
+        history.append(
+            Progress(
+                run * (DOTS + len(LINE)),
+                cycle,
+                line,
+                state,
+            )
         )
-        history.append(Progress(run * (DOTS + len(LINE)), cycle, line, *states))
 
     for number, runs in enumerate(RUNS):
         dots, judgement = press.line([learner.settings for learner in learners])
@@ -95,10 +96,6 @@ def calibrate(
 _DOTS = "stage dot"
 
 
-def _percent(share: float) -> str:
-    return "–" if np.isnan(share) else f"{100.0 * share:.1f} %"
-
-
 def _worst(values: FloatArray) -> float:
     known = np.abs(values[np.isfinite(values)])
     return float(known.max()) if known.size else float("nan")
@@ -119,18 +116,6 @@ class Learning(Result, rows=_DOTS):
     learned: BoolArray = column(
         "1", "whether the table is printed with, and not an open loop", "stage", dtype=np.int8
     )
-    misfit: FloatArray = column(
-        "1",
-        "RMS of what the belief leaves of the readings, in standard deviations of their noise",
-        "stage",
-        more="NaN before there are any; above 2 no table is handed out",
-    )
-    expected: FloatArray = column(
-        "1",
-        "fraction of the dots that the readings let expect within limits",
-        "stage",
-        more="NaN before there are any",
-    )
     slot: IntArray = coordinate("1", "number of the slot", "dot", name="slot")
     force_deviation: FloatArray = column(
         "1", "peak force less that of the single pulse, in parts of it", _DOTS
@@ -141,8 +126,6 @@ class Learning(Result, rows=_DOTS):
     believed: FloatArray = column("SI", "constant of the unit, as its readings tell it", "constant")
     uncertainty: FloatArray = column("SI", "its standard deviation", "constant")
     contraction: FloatArray = part("largest eigenvalue of the law at each update")
-    offset: float = scalar("s", "offset of the sensor's times, as its readings tell it", name="sensor_offset")
-    offset_uncertainty: float = scalar("s", "its standard deviation")
     seed: int = scalar("1", "seed of the simulated hammers")
 
     @property
@@ -157,21 +140,16 @@ class Learning(Result, rows=_DOTS):
             Cells(
                 "printed with", ["table" if learned else "open loop" for learned in self.learned], left=True
             ),
-            Cells("expected", [_percent(share) for share in self.expected]),
-            Cells("misfit", self.misfit, "", ".2f"),
-            Cells("within limits", [_percent(share) for share in self.share]),
+            Cells("within limits", [f"{100.0 * share:.1f} %" for share in self.share]),
             Cells("worst force", [f"{100.0 * _worst(force):.1f} %" for force in self.force_deviation]),
             Cells("worst arrival", [_worst(arrival) for arrival in self.arrival_deviation], "s"),
         ]
         nominal = np.array([self.hammer.constants[name].si for name in self.constants])
         off, error = self.believed / nominal - 1.0, self.uncertainty / np.abs(nominal)
         constants = [
-            Cells("constant", [*self.constants, "offset of the sensor"], left=True),
-            Cells("off by", [*(f"{100.0 * each:+.2f} %" for each in off), quantity(self.offset, "s")]),
-            Cells(
-                "known to",
-                [*(f"{100.0 * each:.2f} %" for each in error), quantity(self.offset_uncertainty, "s")],
-            ),
+            Cells("constant", self.constants, left=True),
+            Cells("off by", [f"{100.0 * each:+.2f} %" for each in off]),
+            Cells("known to", [f"{100.0 * each:.2f} %" for each in error]),
         ]
         unit = self.table.serial
         return Summary(
@@ -224,13 +202,10 @@ def learn(
 ) -> Learning:
     """Let a hammer that nobody has measured calibrate its compensation table, from one number a dot.
 
-    The unit prints test lines; a sensor measures when each dot struck, with noise, and perhaps how hard. From
-    run to run the learner corrects advance, width and brakes of a table that was tuned on the nominal hammer
-    for the stated variability. Offset and gain of the sensor are unknowns beside the constants of the unit,
-    with priors of 25 us, or the larger one that the sensor states, and 1 %. The first line is printed in an
-    open loop. Where the belief does not explain the readings, or says that the table would print fewer dots
-    within limits, the better of two open loops is handed out: that of the driver, or of the hammer's own
-    pulse.
+    The unit prints test lines; after each dot the learner is told when it struck, with noise, and perhaps how
+    hard. From run to run it corrects advance, width and brakes of a table that was tuned on the nominal
+    hammer for the stated variability. The first line is printed in an open loop, and wherever the evidence is
+    that the table would print fewer dots within limits, what is handed out stays the open loop.
 
     Parameters
     ----------
@@ -301,12 +276,6 @@ def learn(
     entries = dict(zip(COLUMNS, learners[0].printed, strict=True))
     unknown = np.full_like(base.deviation, np.nan)
     table = replace(base, **{name: values[np.newaxis] for name, values in entries.items()}, deviation=unknown)
-    own = law.entries.own
-    if own is not None and learners[0].pulse is own.pulse:
-        # In the time of the hammer itself: its own pulse is fired at the slot.
-        table = replace(table, advance=np.zeros_like(table.advance)).delayed(0.0, "own", hammer)
-    else:
-        table = table.fired_by(driver, hammer)
     judged = [stage.cycle for stage in stages]
     belief = learners[0].belief
     assert belief is not None
@@ -315,7 +284,7 @@ def learn(
     return Learning(
         hammer=hammer,
         unit=driven,
-        table=replace(table, serial=serial),
+        table=replace(table.fired_by(driver, hammer), serial=serial),
         rate=speed,
         driver=driver,
         sensor=shown,
@@ -323,8 +292,6 @@ def learn(
         limits=law.entries.task.limits,
         dots=np.array([stage.dots for stage in stages]),
         learned=np.array([bool(stage.learned[0]) for stage in stages]),
-        misfit=np.array([stage.misfit[0] for stage in stages]),
-        expected=np.array([stage.expected[0] for stage in stages]),
         slot=np.array(PRINTED),
         force_deviation=np.array([judgement.force_deviation[0] for judgement in judged]),
         arrival_deviation=np.array([judgement.arrival_deviation[0] for judgement in judged]),
@@ -335,7 +302,5 @@ def learn(
         ),
         uncertainty=np.array([size * z for size, z in zip(sizes.values(), apart, strict=False)]),
         contraction=np.array(learners[0].contractions),
-        offset=float(law.production.offset * off[-1]),
-        offset_uncertainty=float(law.production.offset * apart[-1]),
         seed=seed,
     )

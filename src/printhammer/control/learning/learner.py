@@ -16,17 +16,12 @@ from printhammer.support.threads import translated
 
 if TYPE_CHECKING:
     from printhammer.control.learning.lines import Printing
-    from printhammer.drive.waveforms.shapes import Waveform
 
 # How well the laws of the model hold, a standard deviation in parts of the limits
 _FLOOR: Final = 0.01
 _STARTS: Final = 6  # Number of simulated hammers from which searches begin
 _OUTLIER: Final = 6.0  # Standard deviations from the median beyond which a reading is left out
 _FEWEST: Final = 3  # Readings of which the median says something
-MISFIT: Final = 2.0
-"""RMS of what the belief leaves of the readings, in standard deviations of their noise, above which it does
-not explain them, and no table is handed out."""
-
 _STARTED: Final = 2  # How often, at most, a table is tuned for the hammer believed in
 
 
@@ -40,10 +35,9 @@ class Mean(NamedTuple):
 class Learner:
     """Calibrates the table of one unit from run to run, by a law.
 
-    What is handed out is the better open loop before the first stage is over, and wherever no hammer believed
-    in explains the readings, or hammers that explain them as well speak against the table: more of them than
-    the doubt that is allowed would print fewer dots within limits with it than in an open loop, or there is
-    next to nothing to gain.
+    What is handed out is the open loop before the first stage is over, and wherever hammers that explain the
+    readings as well speak against the table: more of them than the doubt that is allowed would print fewer
+    dots within limits with it, or there is next to nothing to gain.
 
     Parameters
     ----------
@@ -57,8 +51,6 @@ class Learner:
         self.corrections = np.zeros(law.entries.inputs.shape[1])
         self.belief: Belief | None = None
         self.contractions: list[float] = []
-        self.loop = law.first
-        self.expected = float("nan")
         self._gains = False
         self._started = 0
         self._ladders: list[FloatArray] = []
@@ -84,17 +76,7 @@ class Learner:
     @property
     def printed(self) -> FloatArray:
         """What is handed out for printing, shape (4, entries)."""
-        return self.settings if self.learned else self.loop.settings
-
-    @property
-    def pulse(self) -> Waveform:
-        """The pulse that it is printed with."""
-        return self.law.entries.task.pulse if self.learned else self.loop.pulse
-
-    @property
-    def misfit(self) -> float:
-        """RMS of what the belief leaves of the readings, in standard deviations; NaN before there are any."""
-        return float("nan") if self.belief is None else self.belief.modes[0].misfit
+        return self.settings if self.learned else self.law.entries.open_loop
 
     def see(self, ladder: Readings, line: Readings) -> None:
         """Take in the readings of a run: of the dots of the ladder, and of the line."""
@@ -135,9 +117,7 @@ class Learner:
                 again = yield from other.update(self.belief, fresh, unexplained)
                 if again.left < update.left:
                     self.law, update = other, again
-        self.corrections, self.loop = update.corrections, update.loop
-        self._gains = update.gains and self.misfit <= MISFIT
-        self.expected = update.expected[0 if self._gains else 1]
+        self.corrections, self._gains = update.corrections, update.gains
         self.contractions.append(update.contraction)
         self._line = []
         self.stage += 1

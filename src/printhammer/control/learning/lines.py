@@ -144,7 +144,6 @@ def choose(
     force: Surrogate,
     rows: FloatArray,
     noise: float,
-    offset: float,
 ) -> list[Rung]:
     """Return the rungs of a ladder, `DOTS` dots in all.
 
@@ -158,18 +157,15 @@ def choose(
         How the force of the single pulse does.
     rows
         The constants of the members, in standard deviations, (members, constants).
-    noise, offset
-        Standard deviations of one reading of a time, and of the offset of all, as fractions of the limit.
+    noise
+        Standard deviation of one reading of a time, in parts of the limit.
     """
     points, variance = rows[:_POINTS], noise**2 / _RUNS
-    wanted = np.pad(force.gradient(points), ((0, 0), (0, 1)))
-    same = np.full((len(points), 1), offset)
+    wanted = force.gradient(points)
 
     def information(readings: Sequence[Surrogate]) -> FloatArray:
         # What is not smooth in the constants counts as noise: it cannot be followed far.
-        slopes = [
-            np.hstack([each.gradient(points), same]) / np.sqrt(variance + each.rest**2) for each in readings
-        ]
+        slopes = [each.gradient(points) / np.sqrt(variance + each.rest**2) for each in readings]
         return np.asarray(np.einsum("rpi,rpj->pij", slopes, slopes)) if slopes else np.zeros(())
 
     def unknown(known: FloatArray) -> float:
@@ -180,7 +176,7 @@ def choose(
     for rung, shown in times.items():
         if rung == Rung(1.0) or np.isfinite(shown).all(axis=1).mean() >= _SEEN:
             offered[rung] = information([Surrogate.of(rows, column) for column in shown.T])
-    known = np.eye(rows.shape[1] + 1) + information(line)
+    known = np.eye(rows.shape[1]) + information(line)
     chosen: list[Rung] = []
     left = DOTS
     while left:
@@ -229,17 +225,9 @@ class Press:
         """Return flight times, s, and forces in parts of the nominal one, of the dots of rungs, (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
-    def line(
-        self,
-        settings: Sequence[FloatArray],
-        slots: Sequence[int] = LINE,
-        pulses: Sequence[Waveform] | None = None,
-    ) -> tuple[DotTable, Judgement]:
-        """Print a line, each hammer with its settings (4, entries); return dots, and how far off they are.
-
-        The pulses are those of the task unless each hammer gets its own.
-        """
-        return printed(self.order_line(settings, slots, pulses), self.task)
+    def line(self, settings: Sequence[FloatArray], slots: Sequence[int] = LINE) -> tuple[DotTable, Judgement]:
+        """Print a line, each hammer with its settings (4, entries); return dots, and how far off they are."""
+        return printed(self.order_line(settings, slots), self.task)
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
         """Return what `ladder` returns; asks for it to be printed."""
@@ -263,23 +251,18 @@ class Press:
         return times, forces
 
     def order_line(
-        self,
-        settings: Sequence[FloatArray],
-        slots: Sequence[int] = LINE,
-        pulses: Sequence[Waveform] | None = None,
+        self, settings: Sequence[FloatArray], slots: Sequence[int] = LINE
     ) -> Printing[tuple[DotTable, Judgement]]:
         """Return what `line` returns; asks for it to be printed."""
         task, due = self.task, slot_times(slots, self.rate)
-        fired = [task.pulse] * len(settings) if pulses is None else pulses
-        known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}
-        keys = [(id(own), id(pulse)) for own, pulse in zip(settings, fired, strict=True)]
-        drives: dict[tuple[int, int], PulseSequence] = {}
-        for key, own, pulse in zip(keys, settings, fired, strict=True):
-            if key not in drives:
-                made = pulses_of(Settings(*own), task.gaps, task.reach, slots, self.rate)
-                drives[key] = sequence(made, pulse, known[id(pulse)])
+        known: dict[tuple[float, float, float], Waveform] = {}
+        drives: dict[int, PulseSequence] = {}
+        for own in settings:
+            if id(own) not in drives:
+                pulses = pulses_of(Settings(*own), task.gaps, task.reach, slots, self.rate)
+                drives[id(own)] = sequence(pulses, task.pulse, known)
         end = float(due[-1]) + task.window
-        ((dots, ok),) = yield [Order(self.hammers, [drives[key] for key in keys], end)]
+        ((dots, ok),) = yield [Order(self.hammers, [drives[id(own)] for own in settings], end)]
         shape = len(self.hammers), len(slots)
         wanted, times = np.ones(shape, np.bool_), np.broadcast_to(due, shape)
         return dots, judge(dots, wanted, times, task.single.nominal, task.limits, ok)
