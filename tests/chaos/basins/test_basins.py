@@ -14,7 +14,7 @@ import printhammer as ph
 from printhammer.chaos import basin_entropy
 from printhammer.chaos.basins import attractors
 from printhammer.chaos.basins.attractors import Attractors
-from printhammer.chaos.basins.basins import FAILED, NO_STATE, UNDECIDED, Basins
+from printhammer.chaos.basins.basins import FAILED, NO_STATE, UNDECIDED, Basins, uncertainty_exponent
 from printhammer.chaos.bifurcation.columns import Columns
 from printhammer.run.regime import Regime
 from printhammer.run.start import AT_REST
@@ -60,6 +60,13 @@ def test_the_result_does_not_depend_on_threads(hammer: "ph.Hammer", two: Basins)
     np.testing.assert_array_equal(alone.firings, two.firings)
     for one, other in zip(alone.attractors, two.attractors, strict=True):
         np.testing.assert_array_equal(one.states, other.states)
+
+
+def test_a_sample_of_labels_is_compared_at_a_tenth_of_the_tolerance(two: Basins) -> None:
+    assert two.compared == max(two.labels.size // 8, 1)
+    assert two.changed == 0
+    assert f"0 of {two.compared} labels (0.0 %) change at a tenth of the tolerance" in str(two)
+    assert two.to_dataset().attrs["compared"] == two.compared
 
 
 def test_labels_do_not_depend_on_the_order_of_the_cells(hammer: "ph.Hammer", two: Basins) -> None:
@@ -259,3 +266,12 @@ def test_near_a_doubling_no_cell_is_left_and_the_orbit_has_its_own_period() -> N
     ((x, v),) = found.attractors[0].states.tolist()
     after = ph.strobe(hammer, period=1.05e-3, points=2, transient=3000, state=(x, v), verdict=False)
     assert after.x[0] == pytest.approx(x, abs=1e-9)
+
+
+def test_the_uncertainty_exponent_is_one_for_a_straight_boundary() -> None:
+    labels = np.ones((64, 64), np.int64)
+    labels[:, 30:] = 2
+    assert uncertainty_exponent(labels) == pytest.approx(1.0, abs=0.05)
+    # Labels of a coin: as uncertain at any distance.
+    assert abs(uncertainty_exponent(1 + np.random.default_rng(1).integers(0, 2, (128, 128)))) < 0.02
+    assert math.isnan(uncertainty_exponent(np.ones((64, 64), np.int64)))

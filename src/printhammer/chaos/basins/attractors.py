@@ -68,6 +68,13 @@ class Attractors:
         self._attempts = 0
         self._noise: dict[int, float] = {}
 
+    def at(self, tolerance: float) -> Attractors:
+        """Return the same attractors, for trains at another tolerance."""
+        other = Attractors(self.regime, self.scales, tolerance)
+        other.found, other._trees, other._noise = list(self.found), dict(self._trees), dict(self._noise)
+        other._attempts = ATTEMPTS
+        return other
+
     def judge(self, columns: Columns) -> IntArray:
         """Return to which attractor trains have come: its place in `found`, -1 where that is not known."""
         cycles, _ = self._cycles(columns)

@@ -29,7 +29,7 @@ from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
-from printhammer.results import Column, Declared, Result, column, coordinate, part
+from printhammer.results import Column, Declared, Result, column, coordinate, part, scalar
 from printhammer.results.declare import Kind
 from printhammer.results.summary import (
     FactRow,
@@ -118,6 +118,35 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
     )
 
 
+def uncertainty_exponent(labels: npt.ArrayLike) -> float:
+    """Return the exponent a of the share f of cells that have another label at a distance e, f ~ e^a.
+
+    The slope of log f against log e for distances of 1, 2, 4, ... cells along either side, up to an eighth of
+    the plane; the dimension of the boundary is 2 - a, so that a is 1 for a smooth one and less for a fractal
+    (S. W. McDonald, C. Grebogi, E. Ott and J. A. Yorke, Physica D 17 (1985) 125). Cells without an attractor
+    do not count. NaN where fewer than three distances have cells on both sides of a boundary.
+    """
+    plane = np.asarray(labels)
+    shares, apart = [], 1
+    while apart <= min(plane.shape) // 8:
+        pairs = [(plane[apart:], plane[:-apart]), (plane[:, apart:], plane[:, :-apart])]
+        decided = [(here > 0) & (there > 0) for here, there in pairs]
+        count = sum(int(both.sum()) for both in decided)
+        differ = sum(int(((a != b) & both).sum()) for (a, b), both in zip(pairs, decided, strict=True))
+        if count and differ:
+            shares.append((math.log(apart), math.log(differ / count)))
+        apart *= 2
+    if len(shares) < _FEWEST_DISTANCES:
+        return math.nan
+    across, up = np.array(shares).T
+    return float(np.polyfit(across, up, 1)[0])
+
+
+_FEWEST_DISTANCES: Final = 3
+
+SAMPLE: Final = 256
+"""Number of cells that are judged again at a tenth of the tolerance, at most; an eighth of all."""
+
 FIRINGS: Final = 200
 """Firings of a round unless told otherwise."""
 
@@ -138,6 +167,7 @@ NO_STATE: Final = -2
 NO_STATE_STATUS: Final = "no state"
 
 _PIECE: Final = 4096
+_GOLDEN: Final = 0.618033988749895
 _FEWEST: Final = 4
 
 Range = tuple[float | str, float | str, SupportsIndex]
@@ -166,6 +196,10 @@ class Basins(Result, rows="v x"):
     )
     firings: IntArray = column("1", "firings until it was decided", "v x", more="or given up", dtype=np.int32)
     status: TextArray = column("", "how the run ended", "v x", more='or "no state"')
+    compared: int = scalar(
+        "1", "number of cells, spread evenly, that were judged at a tenth of the tolerance too"
+    )
+    changed: int = scalar("1", "number of those whose label differs there: rounding decides it")
     tolerance: float = part("tolerance of the integration")
 
     @property
@@ -202,7 +236,21 @@ class Basins(Result, rows="v x"):
             f"{', more than ln 2: a fractal one' if entropy.fractal else ''}"
         )
         boxes = f"{entropy.boxes} boxes of {entropy.box} x {entropy.box} cells"
-        return Summary([Facts([*rows, ("basin entropy", f"{entropy.entropy:.4f} in {boxes}, {boundary}")])])
+        exponent = uncertainty_exponent(self.labels)
+        rows += [
+            ("basin entropy", f"{entropy.entropy:.4f} in {boxes}, {boundary}"),
+            ("uncertainty exponent", None if math.isnan(exponent) else f"{exponent:.3f}"),
+            ("rounding", self.rounding or None),
+        ]
+        return Summary([Facts(rows)])
+
+    @property
+    def rounding(self) -> str:
+        """How many labels of a sample change at a tenth of the tolerance, in words."""
+        if not self.compared:
+            return ""
+        share = 100.0 * self.changed / self.compared
+        return f"{self.changed} of {self.compared} labels ({share:.1f} %) change at a tenth of the tolerance"
 
     @property
     def names(self) -> dict[int, str]:
@@ -239,6 +287,7 @@ class Basins(Result, rows="v x"):
             "box": entropy.box,
             "basin_entropy": entropy.entropy,
             "boundary_basin_entropy": entropy.boundary_entropy,
+            "uncertainty_exponent": uncertainty_exponent(self.labels),
         }
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
@@ -313,9 +362,15 @@ def basins(
     cells = np.empty((up.size, across.size, 2 + len(AT_REST)))
     cells[..., 0], cells[..., 1] = across, up[:, np.newaxis]
     cells[..., 2:] = AT_REST
-    labels, used, status, attractors = _decided(
-        regime, cells.reshape(-1, cells.shape[-1]), (count, most), effort
-    )
+    (scales,) = scales_of_columns([regime])
+    known_attractors = Attractors(regime, scales, effort.tolerance)
+    rows = cells.reshape(-1, cells.shape[-1])
+    labels, used, status = _decided(regime, rows, (count, most), effort, known_attractors)
+    attractors = list(known_attractors.found)
+    sample = _sample(np.flatnonzero(labels >= 0), len(rows))
+    finer = effort.at(0.1 * effort.tolerance)
+    again, _, _ = _decided(regime, rows[sample], (count, most), finer, known_attractors.at(finer.tolerance))
+    changed = int((again != labels[sample]).sum())
     shape = up.size, across.size
     order = sorted(range(len(attractors)), key=lambda place: _key(attractors[place]))
     number = np.zeros(len(attractors) + 1, np.int64)
@@ -331,17 +386,17 @@ def basins(
         attractors=tuple(attractors[place] for place in order),
         firings=used.reshape(shape),
         status=status.reshape(shape),
+        compared=len(sample),
+        changed=changed,
         tolerance=effort.tolerance,
     )
 
 
 def _decided(
-    regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort
-) -> tuple[IntArray, IntArray, TextArray, list[Attractor]]:
-    """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings, statuses, attractors."""
+    regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort, attractors: Attractors
+) -> tuple[IntArray, IntArray, TextArray]:
+    """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings and statuses."""
     firings, most = counts
-    (scales,) = scales_of_columns([regime])
-    attractors = Attractors(regime, scales, effort.tolerance)
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
     status = np.full(len(cells), OK, "U16")
@@ -363,7 +418,14 @@ def _decided(
             used[rows] += firings
             done += len(rows)
         known = done + int((places == UNDECIDED - 1).sum())
-    return places, used, status, attractors.found
+    return places, used, status
+
+
+def _sample(decided: IntArray, count: int) -> IntArray:
+    """Return rows of decided cells, spread evenly over the plane by multiples of the golden section."""
+    size = min(SAMPLE, max(count // 8, 1), len(decided))
+    shares = (np.arange(1, size + 1) * _GOLDEN) % 1.0
+    return np.unique(decided[(shares * len(decided)).astype(np.int64)]) if size else decided[:0]
 
 
 def _key(attractor: Attractor) -> tuple[int, float, float]:

@@ -166,7 +166,8 @@ def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifol
     label(ax, "x", way, "Displacement at the first firing")
     label(ax, "y", speed, "Velocity at the first firing")
     more = count - _MOST
-    sign(figure, basins.regime.hammer, f"{more} more attractors are not named." if more > 0 else "")
+    unnamed = f"{more} more attractors are not named. " if more > 0 else ""
+    sign(figure, basins.regime.hammer, f"{unnamed}{basins.rounding}{'.' if basins.rounding else ''}".strip())
     return figure
 
 
