@@ -271,7 +271,7 @@ def test_near_a_doubling_no_cell_is_left_and_the_orbit_has_its_own_period() -> N
 def test_the_uncertainty_exponent_is_one_for_a_straight_boundary() -> None:
     labels = np.ones((64, 64), np.int64)
     labels[:, 30:] = 2
-    assert uncertainty_exponent(labels) == pytest.approx(1.0, abs=0.05)
+    assert uncertainty_exponent(labels) == pytest.approx(1.0, abs=1e-12)
     # Labels of a coin: as uncertain at any distance.
     assert abs(uncertainty_exponent(1 + np.random.default_rng(1).integers(0, 2, (128, 128)))) < 0.02
     assert math.isnan(uncertainty_exponent(np.ones((64, 64), np.int64)))

@@ -127,19 +127,24 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
     do not count. NaN where fewer than three distances have cells on both sides of a boundary.
     """
     plane = np.asarray(labels)
-    shares, apart = [], 1
-    while apart <= min(plane.shape) // 8:
-        pairs = [(plane[apart:], plane[:-apart]), (plane[:, apart:], plane[:, :-apart])]
+    distances = [2**k for k in range(16) if 2**k <= min(plane.shape) // 8]
+    # As many pairs at every distance.
+    up, across = (length - max(distances, default=0) for length in plane.shape)
+    shares = []
+    for apart in distances:
+        pairs = [
+            (plane[:up], plane[apart : apart + up]),
+            (plane[:, :across], plane[:, apart : apart + across]),
+        ]
         decided = [(here > 0) & (there > 0) for here, there in pairs]
         count = sum(int(both.sum()) for both in decided)
         differ = sum(int(((a != b) & both).sum()) for (a, b), both in zip(pairs, decided, strict=True))
         if count and differ:
             shares.append((math.log(apart), math.log(differ / count)))
-        apart *= 2
     if len(shares) < _FEWEST_DISTANCES:
         return math.nan
-    across, up = np.array(shares).T
-    return float(np.polyfit(across, up, 1)[0])
+    far, differing = np.array(shares).T
+    return float(np.polyfit(far, differing, 1)[0])
 
 
 _FEWEST_DISTANCES: Final = 3
