@@ -406,7 +406,7 @@ def _decided(
     used = np.zeros(len(cells), np.int64)
     status = np.full(len(cells), OK, "U16")
     known_states = {x: possible(regime.hammer, x, 0.0) for x in np.unique(cells[:, 0]).tolist()}
-    absent = np.array([not known_states[x] for x in cells[:, 0].tolist()])
+    absent = np.array([not known_states[x] for x in cells[:, 0].tolist()], np.bool_)
     places[absent], status[absent] = NO_STATE - 1, NO_STATE_STATUS
     states = cells.copy()
     done, known = 0, int((~absent).sum())
