@@ -8,13 +8,12 @@ plane, so that orbits which no train from rest comes near are found too.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from printhammer.chaos.orbits.newton import Guess
-from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory, state_later
+from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.results import Declared, part
@@ -34,10 +33,6 @@ _LOOKED_AT: Final = 4000
 """Returns that are looked at, closest first, for guesses that are not alike."""
 _EARLY: Final = 2
 """Firings of a record that count as early."""
-_LEAST: Final = 8
-"""Least number of firings for which a motion is followed."""
-_TOUCHES: Final = 4
-"""Every so many-th state comes from a touch of a rigid backstop."""
 _ROOM: Final = 1.2
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
@@ -51,12 +46,6 @@ class Records(Declared):
         "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run ended before"
     )
     usable: BoolArray = part("whether that is the whole state, shape (M, n)")
-    begins: bool = part("whether the first one is the long one", default=True)
-
-
-def firings_for(period: int) -> int:
-    """Return for how many firings motions are followed to find orbits of a period."""
-    return max(2 * period, _LEAST)
 
 
 def record(
@@ -95,8 +84,6 @@ def record(
 def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
     """Return states spread evenly: half of them over the window, half over all that a motion visits.
 
-    With a rigid backstop every fourth is instead that of a motion that has left it, see `touches`.
-
     Where the way is not bounded by both backstop and pack, the latter is no smaller than six times the scales
     of the motion, which then are the half-widths of the window: a ball that bounces once a period rises five
     of them high. States are displacement, m, and velocity, m/s, a row each.
@@ -126,10 +113,6 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
     least, most = magnet.domain if magnet is not None else (-np.inf, np.inf)
     if backstop is not None and backstop.law == "rigid":
         least = max(least, backstop.position)
-        chosen = np.flatnonzero(number[:, 0] % _TOUCHES == 0)
-        left = touches(regime, len(chosen), float(wide_high[1]))
-        known_left = np.isfinite(left).all(axis=1)
-        states[chosen[known_left]] = left[known_left]
     states[:, 0] = np.clip(states[:, 0], least, most)
     return states
 
@@ -143,30 +126,10 @@ def first_state(regime: Regime) -> tuple[float, float]:
         return 0.5 * (window.x[0] + window.x[1]), 0.0
 
 
-def touches(regime: Regime, count: int, fastest: float) -> FloatArray:
-    """Return states at a firing of motions that have just left a rigid backstop, shape (count, 2).
-
-    Phases and speeds are spread evenly, slow ones more densely: near a chatter, where an armature bounces
-    ever lower, orbits crowd that no even spread over the plane comes near. NaN where a run ends before.
-    """
-    number = np.arange(1, count + 1)
-    phases, shares = ((0.5 + number / _PLASTIC**k) % 1.0 for k in (1, 2))
-    place, tolerance = regime.hammer.origin, TOLERANCE
-    return np.array(
-        [
-            state_later(replace(regime, phase=float(phase)), np.array([place, speed]), 0.0, tolerance)
-            for phase, speed in zip(phases, fastest * shares**2, strict=True)
-        ]
-    ).reshape(-1, 2)
-
-
 def close_returns(
     records: Records, period: int, most: int, scales: FloatArray
 ) -> tuple[list[Guess], list[Guess]]:
     """Return the closest returns of records after `period` firings that are not alike, half of `most` each.
-
-    What is found depends on the first firings of the short records alone, as many for a period whatever the
-    longest one is.
 
     First the closest of all, then the closest of those that begin early; distances are in the scales, the
     half-widths of the window. With a larger `most` both lists begin as they do with a smaller one.
@@ -177,9 +140,6 @@ def close_returns(
         return [], []
     gap = np.abs(scaled[:, period:] - scaled[:, :count]).max(axis=2)
     gap = np.where(records.usable[:, period:] & records.usable[:, :count], gap, np.inf)
-    # The first record is the long one.
-    rows = slice(1, None) if records.begins else slice(None)
-    gap[rows, firings_for(period) - period + 1 :] = np.inf
     # Late returns lie close to what attracts, early ones everywhere.
     early = gap.copy()
     early[:, _EARLY:] = np.inf

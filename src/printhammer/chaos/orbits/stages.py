@@ -19,20 +19,18 @@ import numpy as np
 from printhammer.chaos.continuation.arclength import Steps, follow
 from printhammer.chaos.continuation.family import RegimeFamily
 from printhammer.chaos.continuation.fixed_points import Corrector, between
-from printhammer.chaos.orbits.collection import Orbits, index_sums, indices_add_up
+from printhammer.chaos.orbits.collection import Orbits
 from printhammer.chaos.orbits.guesses import (
     PHASES,
     Records,
     close_returns,
-    firings_for,
     first_state,
     joined,
     record,
     spread,
 )
 from printhammer.chaos.orbits.newton import Closing, ExactMaps, FastMaps, Guess, close_orbits
-from printhammer.chaos.orbits.orbit import KINDS, Orbit, multipliers_of, orbit_of
-from printhammer.chaos.strobe.map import state_later
+from printhammer.chaos.orbits.orbit import KINDS, Orbit, orbit_of
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD
 from printhammer.run.effort import Effort
@@ -83,9 +81,6 @@ _EVEN: Final = 8
 """Firings up to which fewer of them have more guesses in proportion."""
 _JOINED: Final = 48
 """Guesses made of two shorter orbits that a stage tries for each number of firings, at most."""
-_COMPLETED: Final = 6
-_MORE: Final = 512
-"""Largest period for which more returns are tried if the indices show a gap, and their number."""
 _SAME: Final = 1e-6
 """Distance, in half-widths of the window, up to which states of two orbits are one."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
@@ -147,7 +142,7 @@ class Search:
         self.all = 3 + 2 * self.longest * len(self.blocks) * len(self.batches)
         (settling, *_others) = record(self.regime, rest, 1, _LONG, self.effort.threads)
         begun = np.vstack([rest, spread(self.regime, self.blocks[-1], settling.states[0])])
-        records = record(self.regime, begun, firings_for(self.longest), _LONG, self.effort.threads)
+        records = record(self.regime, begun, 2 * self.longest, _LONG, self.effort.threads)
         self._tell(1)
         known: list[tuple[Regime, _Known]] = []
         for place, (phase, kept) in enumerate(zip(PHASES, records, strict=True)):
@@ -162,7 +157,6 @@ class Search:
         self._tell(1)
         if self.follow:
             self._along(described)
-        self._mirror(described)
         self._tell(1)
         ordered = sorted(
             described,
@@ -190,7 +184,7 @@ class Search:
         different: list[_Known] = []
         ends = np.cumsum([1 + self.blocks[0], *np.diff(self.blocks)])
         for block, (begin, end) in enumerate(itertools.pairwise([0, *ends.tolist()])):
-            part = Records(records.states[begin:end], records.usable[begin:end], begins=not begin)
+            part = Records(records.states[begin:end], records.usable[begin:end])
             lists = [
                 close_returns(part, period, _share(self.batches[-1], period), self.scales)
                 for period in range(1, self.longest + 1)
@@ -201,22 +195,7 @@ class Search:
                     tried += self._joined(different, period, (block, batch))
                     self._try(fast, different, tried, (block, batch))
                     self._tell(1)
-            if block == len(self.blocks) - 1 and indices_add_up(regime):
-                self._complete(fast, different, part, (block, len(self.batches) - 1))
         return self._refined(regime, different)
-
-    def _complete(
-        self, fast: FastMaps, different: list[_Known], part: Records, stage: tuple[int, int]
-    ) -> None:
-        """Try more returns for periods whose indices do not add up to 1: orbits are missing there."""
-        for period in range(1, min(self.longest, _COMPLETED) + 1):
-            own = [
-                (int(known.closing.firings.sum()), multipliers_of(known.closing.jacobians))
-                for known in different
-            ]
-            if index_sums(own, period)[period] != 1:
-                returns = close_returns(part, period, _MORE, self.scales)
-                self._try(fast, different, [guess for both in returns for guess in both], stage)
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
         """Return that part of some guesses that is new in a batch."""
@@ -327,26 +306,6 @@ class Search:
             different = []
             self._try(exact, different, tried, (0, 0))
             self._describe(described, [(every[0].regime, known) for known in different])
-
-    def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add the mirror images of orbits: x -> -x and half a period, where nothing is on one side alone.
-
-        Where the forces are not odd, Newton's method finds none, or another orbit.
-        """
-        hammer = self.regime.hammer
-        if hammer.pack is not None or hammer.backstop is not None or self.regime.drive is None:
-            return
-        centre = np.array([2.0 * hammer.origin, 0.0])
-        for orbit, hits in list(described):
-            regime = orbit.regime
-            half = state_later(regime, orbit.section, (orbit.phase + 0.5) % 1.0, self.effort.tolerance)
-            if not np.isfinite(half).all():
-                continue
-            exact = ExactMaps(regime, self.effort)
-            guess = _guess(replace(orbit, section=centre - half), exact)
-            for closing in _closed(exact, [guess], self.scales, LONE):
-                if closing.closed:
-                    self._describe(described, [(regime, _Known(closing, [], hits))])
 
     def _same(self, orbit: Orbit, other: Orbit) -> bool:
         if orbit.firings != other.firings:
