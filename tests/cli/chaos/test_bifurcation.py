@@ -56,7 +56,7 @@ def test_most_trains_are_decided_and_the_others_say_why(cli: Callable) -> None:
     assert "[ms] [ms]" in out
     assert re.search(r"With rising values the first strange train comes at 0\.92\d\d? ms after", out)
     assert (
-        "undecided trains: neighbouring motions approach each other: they still settle, more --firings" in out
+        "undecided trains: neighbouring motions approach each other: they still settle, more firings" in out
     )
 
 
