@@ -54,7 +54,8 @@ def check_functions(part: Any, *, complete: bool = False) -> None:
             raise InputError(
                 f"{where}: {has}", file=where, key=name, expected=f"the function {name}({', '.join(wanted)})"
             )
-        if "print" in getattr(law, "__code__", _takes.__code__).co_names:
+        code = getattr(law, "__code__", None)
+        if code is not None and "print" in code.co_names:
             # Machine code runs without the interpreter's lock, for which a print would wait.
             raise InputError.of(name, "print", "a law that prints nothing", file=where)
     forces = _FORCES[part.role]

@@ -63,17 +63,19 @@ def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
         return least_wait(pulse)
     drive = PulseTrain(pulse)
     key = hammer.fingerprint, drive.fingerprint
-    if key not in _known:
-        while len(_known) >= _MOST_KEPT:
-            _known.pop(next(iter(_known)))
+    wait = _known.get(key)
+    if wait is None:
         wait, last = least_wait(pulse), math.nan
         while not is_enough(hammer, _single(hammer, drive, wait), wait):
             last = last_wait(hammer, pulse) if math.isnan(last) else last
             if wait >= last:
                 break
             wait *= 2.0
+        # Threads share the cache: emptying it leaves the windows that others return as they are.
+        if len(_known) >= _MOST_KEPT:
+            _known.clear()
         _known[key] = wait
-    return _known[key]
+    return wait
 
 
 def end_of(hammer: Hammer, drive: Drive) -> float:
