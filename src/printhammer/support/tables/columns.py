@@ -183,18 +183,3 @@ def columns_beside(path: Path) -> Columns | None:
             expected="[columns]",
         )
     return read_columns(", ".join(entries), where)
-
-
-def written(columns: Mapping[str, str], delays: Mapping[str, str] | None = None) -> str:
-    """Return the text of a file beside a table."""
-    tables = [("columns", columns), ("delay", delays or {})]
-    parts = [
-        "\n".join([f"[{table}]", *(f'{_quoted(name)} = "{value}"' for name, value in values.items())])
-        for table, values in tables
-        if values
-    ]
-    return "\n\n".join(parts) + "\n"
-
-
-def _quoted(name: str) -> str:
-    return name if name.isidentifier() else f'"{name}"'
