@@ -184,7 +184,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         if (weak := none & ~strong).any():
             lacking.append(
                 f"No width gives the blow at {int(weak.sum())} {pairs};"
-                f" {quantity(self.reached, 'm/s')} is the strongest that all of them reach."
+                f" {quantity(self.reached, 'm/s')} is the strongest blow that all of them reach."
             )
         if strong.any():
             lacking.append(

@@ -14,7 +14,7 @@ Processing: Detection Theory*, 1998, ch. 7). The straight line takes what differ
 the nominal hammer: resistance, temperature, rail.
 
 The estimator sees samples, the pulse that was fired, and the nominal hammer; nothing of the unit. Delay and
-bandwidth of the probe, where they are known, are in what is expected. An estimate is flagged where the
+bandwidth of the probe, where they are known, are part of the template. An estimate is flagged where the
 samples are unlike any impact, near an edge of the driver above all, which a delay that nobody stated leaves
 in the difference; or where it lies at the end of what was searched.
 
@@ -61,27 +61,27 @@ _SOFT: Final = 1e-9  # Part of these that a pack has which does nothing
 
 
 _UNLIKE: Final = 0.5
-"""Unexplained energy of the samples, over that of the impact, from which on an estimate is flagged.
+"""Ratio of unexplained to explained signal energy above which an estimate is flagged.
 
 Units of `impact-wire` reach 0.4 with errors of 2 us; a delay of 5 us that nobody stated has 1.5, and 30 us.
 """
 
 _TOO_LARGE: Final = 2.5
-"""Size of an impact over that of the nominal hammer from which on it is none; units reach 1.3."""
+"""Ratio to the nominal impact above which a match is no impact; units of `impact-wire` reach 1.3."""
 
 UNSEEN, EDGE, UNLIKE, END = "unseen", "edge", "unlike", "end"
-"""Flags of an estimate: no impact in the samples; unlike one, near an edge of the driver or elsewhere; at the
-end of what was searched."""
+"""Flags of an estimate: no impact in the samples; samples unlike an impact, near an edge of the driver or
+elsewhere; an estimate at the end of the search range."""
 
 
 class ImpactEstimate(Declared):
-    """An estimated time of impact, and whether to believe it."""
+    """Estimated time of impact, with a flag where the estimate is doubtful."""
 
     time: float = part("from firing to impact, s; NaN where none shows")
     flag: str = part(
         '"unseen", "edge", "unlike" or "end", as the module says; empty where nothing speaks against'
     )
-    clearness: float = part("size of what the impact does, in standard deviations of the samples")
+    clearness: float = part("amplitude of the impact in the signal, in standard deviations of a sample")
 
 
 class ImpactEstimator:
@@ -172,7 +172,7 @@ class ImpactEstimator:
         return self.estimate(samples).time
 
     def estimate(self, samples: FloatArray) -> ImpactEstimate:
-        """Estimate the time from firing to impact, and say whether to believe it.
+        """Estimate the time from firing to impact, and flag a doubtful estimate.
 
         `samples` are the first `count` from the firing on, A or V; more are left unread.
         """
@@ -372,7 +372,7 @@ class Sampling(Declared):
         return np.asarray(values, np.float64)
 
     def shown(self, times: FloatArray, true: FloatArray) -> FloatArray:
-        """Return what the probe shows of true values, A or V, at dense times from the firing on, s."""
+        """Apply bandwidth and delay of the probe to a signal, A or V, at dense times since the firing, s."""
         slow = lowpass_lines(times, true, time_constant(self.bandwidth))
         return slow if self.delay == 0.0 else np.interp(times - self.delay, times, slow)
 

@@ -255,7 +255,7 @@ def _largest_current(hammer: Hammer) -> float:
 
 
 def _record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
-    """Return what the probe shows of a dot of a unit, A or V, and when it strikes, s."""
+    """Compute the probe signal, A or V, of one dot of a unit, and its time of impact, s."""
     each = PHASES if probe.delay or probe.bandwidth is not None else 1
     times = np.asarray(estimator.step / each * np.arange(each * estimator.count), np.float64)
     motion = simulate(
@@ -270,9 +270,9 @@ def _record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[
 def _errors(
     estimator: ImpactEstimator, records: Sequence[Any], dots: int, rng: np.random.Generator
 ) -> tuple[FloatArray, BoolArray]:
-    """Return the errors of estimated times of impact of dots, s, in turn one of each record.
+    """Return the errors of estimated impact times, s, and a mask of the estimates that are not flagged.
 
-    Beside them is which estimates are not flagged.
+    The records take turns, one dot each.
     """
     errors, believed = [], []
     for number in range(dots):

@@ -45,7 +45,7 @@ class RecordedImpacts(Result, rows="record"):
 
     @property
     def title(self) -> str:
-        """What it is of."""
+        """Title of the summary: hammer and signal."""
         return f"times of impact of {self.hammer.name} in records of the {self.signal} of its coil"
 
     def summary(self) -> Summary:

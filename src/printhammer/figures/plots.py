@@ -70,7 +70,7 @@ def plot(result: object, picture: str = "", **options: Any) -> Figure:
 
 
 def _attach(figure: Figure) -> None:
-    """Let `pyplot.show` show a figure, where pyplot is in use and opens windows.
+    """Register a figure with pyplot if pyplot is loaded and its backend opens windows.
 
     Elsewhere nothing global keeps the figure: pyplot would hold it until it is closed.
     """

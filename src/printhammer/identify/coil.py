@@ -41,32 +41,32 @@ from printhammer.identify.static.assemble import Data, assemble, enough, judge, 
 from printhammer.support.arrays import FloatArray, IntArray
 
 FREE: Final = ("coil.resistance", "coil.inductance")
-"""What is fitted unless others are named; the resistance alone where the magnet has its own inductance."""
+"""Constants that are fitted by default; only the resistance if the magnet has its own inductance."""
 
 _STEP: Final = 1e-4
-"""Of the differences for the derivatives, relative: well above the errors of the integration."""
+"""Relative step of the finite differences: well above the errors of the integration."""
 
 _SHORT: Final = 0.05
-"""Of the differences for derivatives by times, in time steps of the record."""
+"""Step of the finite differences with respect to times, in sampling intervals."""
 
 _REACH: Final = 1e3
-"""Factor by which constants may go away from those that the fit begins with."""
+"""Largest factor between a fitted constant and its initial guess; arbitrary."""
 
 _TOLERANCE: Final = 1e-10
 """Relative tolerance of the descents: derivatives by differences are no better."""
 
 _SPARE: Final = 4
-"""Rows more than parameters, for the errors."""
+"""Smallest number of rows in excess of parameters, for the standard errors; arbitrary."""
 
 _EXACT: Final = 1e-6
 """Residuals below this part of the current are errors of the integration: they test no law."""
 
 _COARSE: Final = 1.5
-"""Resolution over the standard deviation of the residuals from which on it is what they consist of."""
+"""Ratio of resolution to residual standard deviation above which quantisation dominates the residuals."""
 
 
 def default_constants(hammer: Hammer) -> tuple[str, ...]:
-    """Return what is fitted unless others are named: no inductance beside a magnet that has its own."""
+    """Return the names of the constants that are fitted by default; see `FREE`."""
     linked = hammer.magnet is not None and hammer.magnet.has_linkage
     return FREE[:1] if linked and not _stated(hammer, FREE[1]) else FREE
 

@@ -1,4 +1,4 @@
-"""What a current probe shows of a coil that a voltage drives, computed, and as records of it have it.
+"""Current of a coil driven by a voltage, as a current probe shows it: simulated, and read from records.
 
 A record has the columns ``time`` and ``current``, perhaps ``voltage``; one shot a file. The armature is free
 or locked. The probe is a first-order low-pass. Between moments at most 0.5 us apart the current is taken as
@@ -38,10 +38,10 @@ _STEEP: Final = 0.3
 """Change of the voltage from row to row, as a fraction of its range, that is an edge."""
 
 _EDGES: Final = 8
-"""Number of edges above which a voltage is no switched one, and is taken as straight between its rows."""
+"""Number of edges above which a voltage counts as continuous and is interpolated linearly; arbitrary."""
 
 _FLOWS: Final = 0.05
-"""Current at the switching, as a fraction of its largest, above which it flowed before."""
+"""Current at switch-on, as a fraction of the largest, above which the coil was on before; arbitrary."""
 
 _RAMP: Final = 1e-5
 """Half the duration of an edge of a recorded voltage, over the time between its rows."""
@@ -61,7 +61,7 @@ def check_driver(hammer: Hammer) -> None:
 def probe_current(
     hammer: Hammer, waveform: Waveform, t: FloatArray, *, locked: float | None = None, tau: float = 0.0
 ) -> FloatArray:
-    """Return what a probe shows at ascending times, s, of a coil switched on at time 0, A, shape of `t`.
+    """Simulate the probe current, A, at ascending times `t`, s, of a coil that is switched on at time 0.
 
     The armature begins at rest, or is locked at a displacement, m; `tau` is the time constant of the
     probe, s. Before time 0 there is no current.
@@ -99,7 +99,7 @@ def probe_current(
 
 
 class Trace(Declared, eq=False):
-    """One record, and what drove it."""
+    """Record of a coil current with its driving voltage."""
 
     table: Readings = part("its columns")
     waveform: Waveform = part(

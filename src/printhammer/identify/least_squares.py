@@ -24,10 +24,10 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray
 
 _FALSE_OUTLIERS: Final = 0.01
-"""How many rows of good data with normal noise are left out, on average, in one fit."""
+"""Expected number of good rows left out per fit, for normal noise."""
 
 _EXACT: Final = 1e-11
-"""Residuals below this part of the data are rounding, not noise."""
+"""Residual, as a fraction of the data, below which it is rounding, not noise."""
 
 _ROUNDS: Final = 30
 
@@ -35,7 +35,7 @@ _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""
 
 _HOLDING: Final = 4.0
-"""Ratio of the variances of a parameter without rows and with them from which on they hold it; arbitrary."""
+"""Ratio of the variances of a parameter without and with rows above which they determine it; arbitrary."""
 
 _AT_BOUND: Final = 1e-6
 """Distance from a bound, as a fraction of the parameter, below which a descent ended there."""
@@ -54,7 +54,7 @@ _DIFFERENCES: Final = 1e-9
 
 
 class Law(Protocol):
-    """What is fitted: data as a function of parameters."""
+    """Model to fit: data as a function of parameters."""
 
     def value(self, p: FloatArray) -> FloatArray:
         """Return the data that the law expects, shape (m,)."""
@@ -63,25 +63,24 @@ class Law(Protocol):
         """Return their derivatives by the parameters, shape (m, n)."""
 
     def spread(self, p: FloatArray) -> FloatArray:
-        """Return how much each component of the variance has in each row, shape (m, q), not negative."""
+        """Return the coefficient of each variance component in each row, shape (m, q), not negative."""
 
 
 class Parameters(Declared, eq=False):
-    """Where a fit begins, where it may go, and what is known beforehand; arrays of shape (n,)."""
+    """Initial guess, bounds and Gaussian prior of a fit; arrays of shape (n,)."""
 
-    start: FloatArray = part("initial guess, and the mean of what is known beforehand")
+    start: FloatArray = part("initial guess, and mean of the prior")
     low: FloatArray = part("lower bounds; -inf for none")
     high: FloatArray = part("upper bounds; inf for none")
-    deviation: FloatArray = part(
-        "standard deviation with which `start` is known beforehand; inf for not at all"
-    )
+    deviation: FloatArray = part("standard deviation of the prior; inf for none")
     size: FloatArray | None = part(
         "plausible change of a parameter, its own magnitude at least; a parameter is held where the data do"
         " not show that change. None to hold only what the Jacobian does not determine at all",
         default=None,
     )
     rest: FloatArray | None = part(
-        "where a parameter is held that the data do not determine; None for `start`", default=None
+        "value of a parameter that is held because the data do not determine it; None for `start`",
+        default=None,
     )
     tolerance: float = part("relative tolerance of the descents", default=1e-15)
 
@@ -97,14 +96,14 @@ class Parameters(Declared, eq=False):
         rest: FloatArray | None = None,
         tolerance: float = 1e-15,
     ) -> Self:
-        """Make parameters without bounds or knowledge but for what is named."""
+        """Create parameters; by default without bounds and without a prior."""
         low, high, deviation = (np.broadcast_to(each, start.shape).copy() for each in (low, high, deviation))
         sizes = None if size is None else np.broadcast_to(size, start.shape).copy()
         return cls(start, low, high, deviation, sizes, rest, tolerance)
 
 
 class Solution(Declared, eq=False):
-    """Parameters and what the residuals say."""
+    """Fitted parameters with their covariance, residuals and diagnostics."""
 
     p: FloatArray = part("parameters, shape (n,)")
     covariance: FloatArray = part("of the parameters, shape (n, n); 0 for those held")
@@ -141,7 +140,7 @@ class Solution(Declared, eq=False):
 
     @property
     def rows(self) -> FloatArray:
-        """Weighted Jacobian of rows used and free parameters, and a row for each known beforehand."""
+        """Weighted Jacobian of used rows and free parameters, with a row for each prior."""
         return _weighted(self.jacobian, self.variance, self.used, self.parameters, self.free)
 
 
@@ -156,7 +155,7 @@ class NoSolutionError(ArithmeticError):
 def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust: bool = True) -> Solution:
     """Fit a law to data, shape (m,), more than it has parameters, from parameters near enough.
 
-    Rows that lie too far off are left out if the fit is to be robust, but never all that hold a parameter. A
+    A robust fit leaves outliers out, but never all rows that determine a parameter. A
     parameter that the data do not determine, or that runs to a bound, is held, and the others are fitted
     again: the weakest direction of the scaled Jacobian (singular values) says which.
 
@@ -261,7 +260,7 @@ def _solve(
     p = np.where(free, np.clip(start, space.low, space.high), start)
     guess = np.ones(m)
     if np.isfinite(space.deviation[free]).any():
-        # What is known beforehand counts by the noise of the data, of which nothing is known yet.
+        # The prior is weighted against the noise of the data, which is not estimated yet.
         guess *= robust_scale(data - law.value(p)) ** 2 or 1.0
     if plain_first:
         p = descend(law, data, guess, used, space, p, free)
@@ -303,15 +302,15 @@ def _solve(
 
 
 def _keep_what_holds(rows: FloatArray, inside: BoolArray) -> BoolArray:
-    """Return the rows to use: where those left out hold a parameter, all that hold it are used.
+    """Return the mask of rows to use, which never leaves a parameter undetermined.
 
-    A parameter is held by rows without which its variance is more than `_HOLDING` times as large. Shapes (m
-    and more, n), the weighted Jacobian, and (m,).
+    Rows determine a parameter if its variance without them is more than `_HOLDING` times as large; such rows
+    are used, also as outliers. `rows` is the weighted Jacobian, shape (m and more, n); masks have shape (m,).
     """
     if inside.all():
         return inside
     scaled = rows / lengths_of(rows)
-    # What is known beforehand is no row that can be left out.
+    # Rows of the prior cannot be left out.
     kept = np.concatenate([inside, np.ones(len(rows) - len(inside), dtype=bool)])
     all_rows = np.linalg.pinv(scaled)
     before, after = np.sum(all_rows**2, axis=1), np.sum(np.linalg.pinv(scaled[kept]) ** 2, axis=1)
@@ -326,7 +325,7 @@ def _keep_what_holds(rows: FloatArray, inside: BoolArray) -> BoolArray:
 def _weighted(
     jacobian: FloatArray, variance: FloatArray, used: BoolArray | None, space: Parameters, free: BoolArray
 ) -> FloatArray:
-    """Return the weighted Jacobian of the free parameters, and a row for each that is known beforehand."""
+    """Return the weighted Jacobian of the free parameters, with a row for each prior."""
     rows = jacobian[:, free] / np.sqrt(variance)[:, None]
     rows = rows if used is None else rows[used]
     known = np.isfinite(space.deviation)

@@ -1,4 +1,4 @@
-"""What residuals and records say of their noise: its size, its outliers, its memory, its components."""
+"""Noise of residuals and records: scale, outliers, autocorrelation, variance components."""
 
 from __future__ import annotations
 

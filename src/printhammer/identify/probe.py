@@ -20,7 +20,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray, IntArray
 
 FIT: Final = "fit"
-"""What is written for an error that the fit finds."""
+"""Setting of a probe error that is fitted."""
 
 NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0}
 """Errors of a probe that has none, SI."""
@@ -33,14 +33,14 @@ SIGNS: Final = {
     "delay": "the current comes late or early, as by a delay of the probe: state it, or fit it",
     "time constant": "the current is smoother, as by the bandwidth of the probe: state it, or fit it",
 }
-"""What an error that nobody stated looks like."""
+"""Advice for each undeclared probe error that a record shows."""
 
 _WIDEST: Final = 0.2
 """Lower bound of a bandwidth that is fitted, over the reciprocal of the record."""
 
 
 class ProbeError(Declared):
-    """One error of a probe, as far as it is known."""
+    """Probe error with its standard deviation."""
 
     name: str = part("offset, gain, delay or time constant")
     value: float = part("SI")
@@ -48,7 +48,7 @@ class ProbeError(Declared):
 
     @property
     def is_fitted(self) -> bool:
-        """Whether the fit finds it."""
+        """Whether the error is fitted."""
         return self.deviation > 0.0
 
     @property
@@ -103,7 +103,7 @@ def _read(name: str, written: float | str) -> tuple[float, float]:
 
 
 def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
-    """Return how far an error of a probe may go, SI, in records of a duration, s."""
+    """Return the bounds of a probe error, SI, for records of a duration, s."""
     if error.name == "gain":
         return 0.1 * error.value, 10.0 * error.value
     if error.name == "time constant":
@@ -123,7 +123,7 @@ def resolution_of(values: FloatArray) -> float:
 
 
 _WHOLE: Final = 0.02
-"""How far readings may be from whole multiples of the resolution, for the digits of a file."""
+"""Largest distance of readings from multiples of the resolution, as a fraction of it; rounding in files."""
 
 
 def plateaus(fitted: FloatArray, series: IntArray, step: float) -> IntArray:

@@ -175,7 +175,7 @@ class Result:
         files.save(path, self.to_dataset, self.to_dataframe, self.ENDINGS)
 
     def plot(self, **options: Any) -> Figure:
-        """Draw the result; `pyplot.show` shows the figure too where pyplot has windows.
+        """Draw the result; with an interactive backend, `pyplot.show` shows the figure.
 
         Options are those of the plot function that `printhammer.figures.plots` registers for the class;
         `picture` names an alternative picture.

@@ -66,7 +66,7 @@ def waits_of(
 
 
 def fired_by(drives: Sequence[Drive]) -> list[Waveform]:
-    """Return the longest waveform of each of several drives."""
+    """Return the longest waveform of each drive."""
     if isinstance(drives, PulseTrains):
         return [drives.pulses[number].waveform for number in drives.pulse_of.tolist()]
     return [longest_of(drive) for drive in drives]

@@ -150,7 +150,7 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
 _FEWEST_DISTANCES: Final = 3
 
 SAMPLE: Final = 256
-"""Number of cells that are judged again at a tenth of the tolerance, at most; an eighth of all."""
+"""Maximum number of cells integrated again at a tenth of the tolerance, up to an eighth of all; arbitrary."""
 
 FIRINGS: Final = 200
 """Firings of a round unless told otherwise."""
@@ -202,9 +202,11 @@ class Basins(Result, rows="v x"):
     firings: IntArray = column("1", "firings until it was decided", "v x", more="or given up", dtype=np.int32)
     status: TextArray = column("", "how the run ended", "v x", more='or "no state"')
     compared: int = scalar(
-        "1", "number of cells, spread evenly, that were judged at a tenth of the tolerance too"
+        "1", "number of sampled cells that were also integrated at a tenth of the tolerance"
     )
-    changed: int = scalar("1", "number of those whose label differs there: rounding decides it")
+    changed: int = scalar(
+        "1", "number of sampled cells whose label differs there: rounding decides the label"
+    )
     tolerance: float = part("tolerance of the integration")
 
     @property
@@ -251,7 +253,7 @@ class Basins(Result, rows="v x"):
 
     @property
     def rounding(self) -> str:
-        """How many labels of a sample change at a tenth of the tolerance, in words."""
+        """Number of sampled labels that change at a tenth of the tolerance, as a sentence."""
         if not self.compared:
             return ""
         share = 100.0 * self.changed / self.compared

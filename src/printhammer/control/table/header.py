@@ -39,7 +39,7 @@ def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
 
 
 def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int) -> IntArray:
-    """Return how many slots before its own slot a dot of each history has to be known.
+    """Compute the look-ahead of each history: slots before its own at which a dot must be known.
 
     A dot must be known when it is fired, `advance` before its slot, and when its brake pulse is,
     `brake_delay` after the slot of the dot before. A dot from rest has the brake pulse that follows the last
@@ -67,7 +67,7 @@ def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, re
 
 
 def prefix_of(head: Mapping[str, Any], rates: FloatArray, axis: str = "") -> str:
-    """Return what the names of a header begin with: hammer, unit, driver, rates and axis.
+    """Return the prefix of all names in a header, from hammer, unit, driver, rates and axis.
 
     The driver is left out where it is the hammer's own, the unit where the table is for every unit.
     """
@@ -89,7 +89,7 @@ def header_text(
     Parameters
     ----------
     head : mapping
-        What is said of the whole table, see `printhammer.control.table.formats.HEAD` and `OPTIONAL`.
+        Metadata of the table, see `printhammer.control.table.formats.HEAD` and `OPTIONAL`.
     rates : array, shape (R,)
         Slots per second.
     times : mapping
@@ -198,7 +198,7 @@ def _most(prefix: str, values: int, entries: int) -> str:
 
 
 class _Between(NamedTuple):
-    """What differs between interpolations: over the period of the slots, and along an axis."""
+    """Code fragments of an interpolation, over the slot period or along an axis."""
 
     said: str
     call: str

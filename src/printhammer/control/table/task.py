@@ -113,12 +113,12 @@ class Task:
 
     @cached_property
     def window(self) -> float:
-        """How long runs to a whole line go on after the last firing, s."""
+        """Time from the last firing to the end of a run of a whole line, s."""
         return wait_of(self.hammers[0], self.pulse)
 
     @property
     def tail(self) -> float:
-        """How long the short runs of the search go on, s: until the last contact is over."""
+        """Time from the last firing to the end of the search's short runs, s; it covers the last contact."""
         return max(_TAIL, FLIGHTS * self.single.nominal.flight_time, _CONTACT * self.single.left)
 
     def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:

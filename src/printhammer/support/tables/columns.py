@@ -99,7 +99,7 @@ class Columns:
     delays: dict[str, float] = field(default_factory=dict)
     """Delay of a quantity, s."""
     where: str = "--columns"
-    """What messages call it."""
+    """Name of the declaration in error messages."""
 
 
 def read_columns(text: str, where: str = "--columns") -> Columns:

@@ -50,7 +50,7 @@ class Clock(NamedTuple):
     step: float
     """Time from one sample to the next, s."""
     numbers: int | None = None
-    """Place of the column that numbers the samples; None where there is none."""
+    """Index of the column of sample numbers; None without such a column."""
 
     def times(self, count: int) -> FloatArray:
         """Return the times of a number of samples, s."""
@@ -282,7 +282,7 @@ def _fact(facts: dict[str, list[str]], keys: Collection[str], default: list[str]
 def _clock(
     where: str, facts: dict[str, list[str]], columns: list[Heading], rows: list[list[str]], *, numbered: bool
 ) -> Clock | None:
-    """Return the times of samples that facts say: start and step, or step and the index of time zero."""
+    """Derive the sample times from facts: start and step, or step and the index of time zero."""
     written = _fact(facts, _START, [""])[0]
     # Above the numbers, a start without a unit may be the number of a sample.
     plain = not numbered and is_number(written) and not any(key in facts for key in _START[:-2])

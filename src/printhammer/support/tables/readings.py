@@ -122,9 +122,9 @@ def read_table(
     gaps : collection of str, optional
         Columns that may have empty cells, which become NaN.
     columns : str, optional
-        What the columns hold; by default what the file beside the table says, and else what its heading says.
+        Declaration of the columns; by default the file beside the table, or else its heading.
     what : str, optional
-        What messages call the file.
+        Name of the file in error messages.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def assigned(
     wanted: str,
     columns: Columns | None,
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Return where numbers and words come from: what is said beside the table, else what its heading says."""
+    """Return the columns of numbers and of words, by declaration if there is one, else by heading."""
     if columns is None:
         return _by_heading(table, numbers, text, wanted)
     for name, source in columns.sources.items():
@@ -242,7 +242,7 @@ def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
 def _by_heading(
     table: Table, numbers: Mapping[str, str], text: Mapping[str, tuple[str, ...]], wanted: str
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Return where numbers and words come from as the heading says: by name, or by the only such unit."""
+    """Return the columns of numbers and of words that the heading names, or the only ones of their unit."""
     where = f"{table.where}: {_line(table)}".rstrip(": ")
     sources: dict[str, Source] = {}
     words: dict[str, int] = {}
