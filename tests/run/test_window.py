@@ -16,7 +16,7 @@ from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.run.waits import waits_of
-from printhammer.run.window import CYCLE, FLIGHTS, least_wait, wait_of
+from printhammer.run.window import CYCLE, Single, is_enough, least_wait, wait_of
 from printhammer.sweep.members import Base, Maker
 
 
@@ -52,7 +52,7 @@ def test_a_slow_device_is_waited_for_until_it_has_struck_and_settled() -> None:
     single = nominal(relay)
     wait = wait_of(relay)
     assert wait >= least_wait(relay.waveform) == CYCLE + relay.waveform.width
-    assert wait >= FLIGHTS * single.flight_time
+    assert wait >= 3.0 * single.flight_time
     motion = ph.simulate(relay, ph.PulseTrain(relay.waveform))
     assert motion.end == wait
     assert abs(motion.x[-1] - relay.rest) < 0.05 * (relay.front - relay.rest)
@@ -61,6 +61,16 @@ def test_a_slow_device_is_waited_for_until_it_has_struck_and_settled() -> None:
         [single.flight_time, nominal(printer).flight_time], rel=1e-6
     )
     assert waits_of([relay, printer], [relay.waveform, printer.waveform]).tolist() == [wait, wait_of(printer)]
+
+
+def test_a_window_holds_three_flights_though_the_armature_rests_before() -> None:
+    relay = ph.load("relay-5v")
+    flight, rest = 5e-3, relay.rest
+    for wait, enough in ((14e-3, False), (16e-3, True)):
+        assert is_enough(relay, Single(True, flight, rest, 0.0), wait) is enough
+    away = rest + 0.1 * (relay.front - rest)
+    assert not is_enough(relay, Single(True, flight, away, 0.0), 16e-3)
+    assert not is_enough(relay, Single(True, flight, rest, 0.1 * (relay.front - rest) / flight), 16e-3)
 
 
 def test_the_relay_strikes_at_every_firing_on_its_map() -> None:

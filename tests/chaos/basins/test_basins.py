@@ -69,6 +69,13 @@ def test_a_sample_of_labels_is_compared_at_a_tenth_of_the_tolerance(two: Basins)
     assert two.to_dataset().attrs["compared"] == two.compared
 
 
+def test_labels_that_hang_on_the_tolerance_are_counted(hammer: "ph.Hammer") -> None:
+    """The orbit of a coarse tolerance is none at a finer one: the whole pictures differ, as the sample says."""
+    coarse, fine = (ph.basins(hammer, period=0.98e-3, tolerance=each, **PLANE) for each in (1e-5, 1e-6))
+    assert (coarse.labels != fine.labels).all()
+    assert coarse.changed == coarse.compared == 9
+
+
 def test_labels_do_not_depend_on_the_order_of_the_cells(hammer: "ph.Hammer", two: Basins) -> None:
     # The last row alone: whatever attractor is met first, the numbers mean the same.
     last = ph.basins(hammer, period=1.3e-3, x=PLANE["x"], v=(0.9, 1.0, 2))

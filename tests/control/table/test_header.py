@@ -84,11 +84,16 @@ def test_a_budget_and_a_tick_are_kept_to() -> None:
 
 
 def braked(**changes: Any) -> CompensationTable:
-    """A table by hand with brake pulses, one history fired in another way at the second rate."""
+    """A table by hand with brake pulses, one history fired in another way at the second rate.
+
+    Dots from rest, one slot and two slots after another have a brake pulse.
+    """
     table = by_hand()
     values = {name: getattr(table, name).copy() for name in COLUMNS}
-    values["brake_width"][:, 1], values["brake_delay"][:, 1] = 20e-6, 700e-6
-    values["advance"][1, 4] += 30e-6
+    for history, delay in (((0, 0), 750e-6), ((1, 1), 700e-6), ((2, 0), 1500e-6)):
+        number = number_of(history, 2)
+        values["brake_width"][:, number], values["brake_delay"][:, number] = 20e-6, delay
+    values["advance"][1, number_of((2, 1), 2)] += 30e-6
     return replace(table, **values, **changes)
 
 
