@@ -70,7 +70,7 @@ def test_a_sample_of_labels_is_compared_at_a_tenth_of_the_tolerance(two: Basins)
 
 
 def test_labels_that_hang_on_the_tolerance_are_counted(hammer: "ph.Hammer") -> None:
-    """The orbit of a coarse tolerance is none at a finer one: the whole pictures differ, as the sample says."""
+    """The orbit of a coarse tolerance is none at a finer one: pictures differ as the sample says."""
     coarse, fine = (ph.basins(hammer, period=0.98e-3, tolerance=each, **PLANE) for each in (1e-5, 1e-6))
     assert (coarse.labels != fine.labels).all()
     assert coarse.changed == coarse.compared == 9

@@ -90,7 +90,7 @@ def braked(**changes: Any) -> CompensationTable:
     """
     table = by_hand()
     values = {name: getattr(table, name).copy() for name in COLUMNS}
-    for history, delay in (((0, 0), 750e-6), ((1, 1), 700e-6), ((2, 0), 1500e-6)):
+    for history, delay in (((0, 0), 750e-6), ((1, 1), 700e-6), ((2, 0), 700e-6)):
         number = number_of(history, 2)
         values["brake_width"][:, number], values["brake_delay"][:, number] = 20e-6, delay
     values["advance"][1, number_of((2, 1), 2)] += 30e-6
@@ -140,6 +140,8 @@ def test_a_dot_is_known_when_its_first_pulse_is_fired(tmp_path: Path) -> None:
             if history[0] != 0:
                 slots_before = (float(pulses.due[-1]) - min(begun)) * rate
                 assert ahead[row, number] == max(0, math.ceil(slots_before - 1e-6))
+        # 0.75 ms after the last dot the two slots after it must be known to be empty.
+        assert ahead[row, 0] == math.ceil(2.0 - 750e-6 * rate) == 2
     (tmp_path / "table.h").write_text(table.to_header())
     text = '#include "table.h"\n#include <stdio.h>\n'
     text += f'int main(void) {{ printf("%u\\n", {PREFIX}_slots_ahead(1u)); return 0; }}\n'

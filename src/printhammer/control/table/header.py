@@ -42,8 +42,8 @@ def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, re
     """Compute the look-ahead of each history: slots before its own at which a dot must be known.
 
     A dot must be known when it is fired, `advance` before its slot, and when its brake pulse is,
-    `brake_delay` after the slot of the dot before. A dot from rest has the brake pulse that follows the last
-    dot for long: it is known when no dot comes within reach.
+    `brake_delay` after the slot of the dot before. The brake pulse of a dot from rest follows the last dot
+    for long; it is fired when the slots within reach are known to be empty.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, re
     """
     advance, _, delay, brake = (times[name] * rates[:, np.newaxis] for name in COLUMNS)
     gap = np.arange(entries_of(gaps, reach)) // (reach + 1) ** (gaps - 1)
-    gap[gap == REST] = reach + 1
+    gap[gap == REST] = reach
     ahead = np.where(brake > 0.0, np.maximum(advance, gap - delay), advance)
     return np.ceil(np.maximum(ahead, 0.0) - 1e-9).astype(np.int64)
 
