@@ -122,6 +122,28 @@ def from_si(value: float, si_unit: str, unit: str) -> float:
     return _scaled(value, 1 / _factor(unit, si_unit), si_unit) + _ZEROS.get(unit, 0)
 
 
+def factor_of(unit: str, si_unit: str) -> float:
+    """Return the size of one `unit` in `si_unit`, for scales such as "A/V"; errors as for `to_si`.
+
+    Raises
+    ------
+    InputError
+        Also for a unit whose zero is not that of the SI unit, such as "degF".
+    """
+    if unit in _ZEROS:
+        raise InputError.of("unit", unit, f"a multiple of {si_unit}")
+    return to_si(1.0, unit, si_unit)
+
+
+def is_unit_of(unit: str, si_unit: str) -> bool:
+    """Whether a text is a known unit of the dimension of `si_unit`."""
+    try:
+        _factor(unit, si_unit)
+    except InputError:
+        return False
+    return True
+
+
 def parse(text: str, si_unit: str) -> float:
     """Read a number with its unit, such as "60 lbf", into SI; arguments as for `split`.
 

@@ -134,3 +134,15 @@ def test_a_fit_takes_columns(tmp_path: Path) -> None:
     found = ph.fit("spring", path, position=0.0, columns="displacement=1*50 um/V, force=2*-4 N/V")
     assert found["spring.Bs"].value == pytest.approx(2.0)
     assert found["spring.As"].value == pytest.approx(2.0 / 3000.0)
+
+
+def test_degrees_fahrenheit_are_converted_or_refused(tmp_path: Path) -> None:
+    """A factor has no place for their zero, and says so."""
+    path = tmp_path / "warm.csv"
+    path.write_text("ambient [degF],sensor [V]\n32,1\n212,2\n")
+    wanted = {"ambient": "degC"}
+    known = read_table(path, wanted, optional={"sensor": "V"}).values["ambient"]
+    np.testing.assert_allclose(known, [0.0, 100.0], atol=1e-12)
+    for columns in ("ambient=1*2", "ambient=2*100 degF/V"):
+        with refused("ambient.unit", "degF") if columns.endswith("2") else refused("sensor.unit", "degF"):
+            read_table(path, wanted, columns=columns)

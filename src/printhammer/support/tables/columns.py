@@ -20,7 +20,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -28,7 +27,7 @@ from typing import Final
 from printhammer.errors import InputError, located
 from printhammer.support.files import read_text
 from printhammer.support.tables.layout import Clock
-from printhammer.units import parse, to_si
+from printhammer.units import factor_of, is_unit_of, parse
 
 _NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _ENTRY: Final = re.compile(
@@ -71,22 +70,16 @@ class Source:
                 expected=f"a factor, such as --columns '...={self.place}*1 {si}'",
             )
         if not self.unit:
-            return self.factor * to_si(1.0, own, si)
-        if _converts(self.unit, si):
+            return self.factor * factor_of(own, si)
+        if is_unit_of(self.unit, si):
             if own:
                 raise InputError(
                     f"{self.unit} stands for 1 {own}", value=self.unit, expected=f"{self.unit}/{own}"
                 )
-            return self.factor * to_si(1.0, self.unit, si)
+            return self.factor * factor_of(self.unit, si)
         above, _slash, below = self.unit.rpartition("/")
-        each = to_si(1.0, above.strip() or self.unit, si)
-        return self.factor * each * (to_si(1.0, own, below.strip()) if own else 1.0)
-
-
-def _converts(unit: str, si: str) -> bool:
-    with suppress(InputError):
-        return to_si(1.0, unit, si) is not None
-    return False
+        each = factor_of(above.strip() or self.unit, si)
+        return self.factor * each * (factor_of(own, below.strip()) if own else 1.0)
 
 
 @dataclass(frozen=True)

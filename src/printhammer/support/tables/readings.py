@@ -23,7 +23,7 @@ from printhammer.support.tables.columns import Columns, Source, columns_beside, 
 from printhammer.support.tables.layout import Table, layout_of
 from printhammer.support.tables.marks import GAPS, OVER
 from printhammer.support.tables.text import read_any
-from printhammer.units import all_to_si, describe, parse, to_si
+from printhammer.units import all_to_si, describe, is_unit_of, parse, to_si
 
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
@@ -233,7 +233,7 @@ def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
         numbered = table.clock is not None and place == table.clock.numbers
         known.append("" if numbered else name if name in numbers else heading.quantity)
     for name, si in _BY_UNIT.items() if "time" in numbers else ():
-        same = [k for k, heading in enumerate(table.columns) if not known[k] and _measures(heading.unit, si)]
+        same = [k for k, heading in enumerate(table.columns) if not known[k] and is_unit_of(heading.unit, si)]
         if name in numbers and name not in known and len(same) == 1:
             known[same[0]] = name
     return known
@@ -294,14 +294,6 @@ def _by_heading(
     return sources, words
 
 
-def _measures(unit: str, si: str) -> bool:
-    try:
-        to_si(1.0, unit, si)
-    except InputError:
-        return False
-    return True
-
-
 def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> FloatArray:
     """Return the numbers of a column in SI."""
     cells = table.cells(source.place - 1)
@@ -309,17 +301,16 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
     numbers = _floats(table, name, cells, heading.unit or source.unit, si, gaps)
     place = heading.name or name
     with located(f"{table.where}: {place}", file=table.where, key=place):
-        factor = source.scale(heading.unit, si)
-    if (source.factor, source.unit) == (1.0, ""):
-        try:
-            array = np.array(all_to_si(numbers, heading.unit, si), dtype=np.float64)
-        except InputError:
-            array = np.array(numbers) * math.inf
-    else:
-        array = np.array(numbers, dtype=np.float64) * factor
+        if heading.unit and (source.factor, source.unit) == (1.0, ""):
+            # The unit itself is checked apart from numbers too large for a float.
+            to_si(1.0, heading.unit, si)
+            array = _converted(numbers, heading.unit, si)
+        else:
+            array = np.array(numbers, dtype=np.float64) * source.scale(heading.unit, si)
     # Squares and powers of what no sensor reads are no numbers.
-    size = np.abs(array)
-    bad = np.flatnonzero((size > LARGEST) | ((size < _TINY) & (np.asarray(numbers) != 0.0)))
+    size, cell = np.abs(array), np.abs(numbers)
+    # 32 degF are 0 degC: only a number below 1 can vanish by its size.
+    bad = np.flatnonzero((size > LARGEST) | ((size < _TINY) & (cell > 0.0) & (cell < 1.0)))
     if len(bad):
         row = int(bad[0])
         raise InputError(
@@ -333,6 +324,14 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
         with located(f"{table.where}: {place}", file=table.where, key=place):
             array = array + parse(source.offset, si)
     return array
+
+
+def _converted(numbers: list[float], unit: str, si: str) -> FloatArray:
+    """Return numbers in SI; infinite where one of them is too large to convert."""
+    try:
+        return np.array(all_to_si(numbers, unit, si), dtype=np.float64)
+    except InputError:
+        return np.array(numbers) * math.inf
 
 
 def _floats(table: Table, name: str, cells: list[str], unit: str, si: str, gaps: bool) -> list[float]:
@@ -424,6 +423,6 @@ def _example(table: Table, numbers: Mapping[str, str]) -> str:
     entries = []
     for place, ((name, si), heading) in enumerate(zip(numbers.items(), table.columns, strict=False), 1):
         own = heading.unit
-        factor = "" if own and _measures(own, si) else f"*1 {si}/{own}" if own else f"*1 {si}"
+        factor = "" if own and is_unit_of(own, si) else f"*1 {si}/{own}" if own else f"*1 {si}"
         entries.append(f"{name}={place}{factor}")
     return f"'{', '.join(entries)}'"
