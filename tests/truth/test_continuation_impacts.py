@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.truth.impact_orbits import BouncingBall, LinearImpacts
+from tests.truth.impact_orbits import BouncingBall, DampedImpacts, LinearImpacts
 
 import printhammer as ph
 from printhammer.chaos.continuation.branch import Branch
@@ -235,6 +235,54 @@ def test_a_branch_goes_on_where_its_impact_meets_the_section() -> None:
         ]
         if value > 1.0001 * case.fold:
             assert min(math.dist((x[0], v[0]), state) for state in exact) < 1e-7
+
+
+@pytest.mark.parametrize("phase", [0.25, 0.75])
+def test_a_branch_goes_to_the_grazing_in_which_its_impact_fades(phase: float) -> None:
+    # x'' + 0.1 x' + x = F cos(w t) with impacts at x = -0.1; a free oscillation is F / |1 - w^2 + 0.1 i w|.
+    omega, damping, stop = 2.0 * math.pi * 0.5, 0.1, 0.1
+    square = 1.0 - 0.5 * damping**2
+    grazing = math.sqrt(square + math.sqrt(square**2 - 1.0 + 1.0 / stop**2)) / (2.0 * math.pi)
+    case = DampedImpacts(omega, -stop, 0.8, damping)
+    low, high = 0.0, 0.5
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if case.orbit(middle)[0] < 1.0 else (low, middle)
+    _, angle, _ = case.orbit(low)
+    assert case.possible(low)
+    late = ((2.0 * math.pi * phase - angle) / omega) % case.period
+    branch = continuation(
+        ph.load("shaw-holmes-1983"),
+        "rate",
+        (0.37, 0.541),
+        drive=ph.SineForce(1.0, 0.5, phase=0.5 * math.pi),
+        state=case.state(low, late),
+        phase=phase,
+    )
+    assert [stop.reason for stop in branch.stops] == ["bound", "grazing"]
+    assert branch.stops[1].parameter == pytest.approx(grazing, rel=1e-9)
+    assert grazing - branch.values[-1] < 5e-4 * grazing
+    # e^2 exp(-c T), at any speed of the impact.
+    np.testing.assert_allclose(
+        np.prod(branch.multipliers, axis=1).real, 0.64 * np.exp(-0.1 / branch.values), rtol=1e-3
+    )
+    assert [event.kind for event in branch.events] == ["period doubling"]
+    assert len(branch) < 350
+
+
+def test_a_stable_range_ends_at_the_grazing_and_not_at_the_last_orbit() -> None:
+    # F / |1 - w^2 + 0.1 i w| = 0.1, at w = 2.
+    grazing = 0.1 * math.hypot(1.0 - 4.0, 0.2)
+    force = 0.9 * grazing
+    gain = force / complex(1.0 - 4.0, 0.2)
+    branch = continuation(
+        ph.load("shaw-holmes-1983"),
+        "drive.amplitude",
+        (0.5 * grazing, 1.2 * grazing),
+        drive=ph.SineForce(force, 1.0 / math.pi, phase=0.5 * math.pi),
+        state=(gain.real, (2j * gain).real),
+    )
+    assert branch.stops[1].reason == "grazing"
+    assert branch.stable_ranges == [pytest.approx((0.5 * grazing, grazing), rel=1e-10)]
 
 
 HOPPER = BouncingBall(1.5, 0.4, 3.0)

@@ -134,9 +134,12 @@ def _parted(touches: list[Touch], length: float) -> bool:
 
 
 def stable_ranges(
-    along: FloatArray, stable: BoolArray, events: Sequence[BranchEvent]
+    along: FloatArray, stable: BoolArray, events: Sequence[BranchEvent], ends: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Return the ranges of the constant over which the orbits of a branch are stable, ascending."""
+    """Return the ranges of the constant over which the orbits of a branch are stable, ascending.
+
+    `ends` are the values at which the branch ends, which may lie beyond its first and last orbit.
+    """
     limits = [event for event in events if event.kind not in ("grazing", "section")]
     values = along.tolist()
     ranges: list[tuple[float, float]] = []
@@ -151,9 +154,9 @@ def stable_ranges(
                 ranges.append((begin, edge))
                 begin = None
         elif not i and stable[0]:
-            begin = value
+            begin = ends[0]
     if begin is not None:
-        ranges.append((begin, values[-1]))
+        ranges.append((begin, ends[1]))
     return sorted((min(pair), max(pair)) for pair in ranges)
 
 
@@ -287,7 +290,9 @@ class Branch(Result):
     @property
     def stable_ranges(self) -> list[tuple[float, float]]:
         """Ranges of the constant over which the orbits are stable, ascending."""
-        return stable_ranges(self.values, self.stable, self.events)
+        return stable_ranges(
+            self.values, self.stable, self.events, (self.stops[0].parameter, self.stops[1].parameter)
+        )
 
     @property
     def message(self) -> str:

@@ -34,6 +34,8 @@ _SPACING: Final = 1e-6
 _ROUNDS: Final = 20
 _PRECISION: Final = 1e-12
 _STAGNANT: Final = 1e3
+_SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
+"""Speeds, as fractions of the first, of the impacts with which a branch is continued to its grazing."""
 
 
 class Flight(Declared):
@@ -146,38 +148,50 @@ def _still(state: FloatArray, begin: float, fast: float) -> list[tuple[float, fl
     return [(begin, float(state[0]))] if abs(state[1]) < _STILL * fast else []
 
 
-def grazing_of(
-    regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
-) -> float | None:
-    """Return the value of a constant at which an orbit near a grazing touches without velocity.
+def touch_at(
+    regime: Regime,
+    name: str,
+    surface: Surface,
+    guess: tuple[float, float],
+    speed: float,
+    firings: int,
+    tolerance: float,
+    width: float,
+) -> tuple[float, float] | None:
+    """Return phase of the touch and value of a constant of the orbit that leaves a surface with a speed.
 
     Parameters
     ----------
     regime : Regime
-        With the value of the constant near that.
+        With a value of the constant near the solution.
     name : str
         Of the constant.
-    touch : NearTouch
-        Of the orbit.
+    surface : str
+        "pack" or "backstop".
+    guess : tuple of float
+        Phase of the touch, as a fraction of the period, and value of the constant, SI.
+    speed : float
+        Speed with which the orbit leaves a rigid backstop, m/s; 0 of a grazing.
     firings, tolerance
-        After which the orbit repeats; error allowed in one step.
+        Firings after which the orbit repeats; error allowed in one step.
     width : float
-        By which the constant is divided, SI.
+        Scale of the constant, SI.
 
     Returns
     -------
-    float or None
-        None where Newton's method finds none.
+    tuple of float or None
+        None where Newton's method does not converge.
     """
-    own, scales = regime.value(name), regime.window.half_widths
+    phase, own = guess
+    scales = regime.window.half_widths
 
     def missed(z: FloatArray) -> FloatArray | None:
         try:
             moved = regime.with_(name, own + float(z[1]) * width)
         except InputError:
             return None
-        flight = fly(moved, touch.surface, touch.phase + float(z[0]), 0.0, firings, tolerance)
-        at = np.array([flight.surface, 0.0])
+        flight = fly(moved, surface, phase + float(z[0]), speed, firings, tolerance)
+        at = np.array([flight.surface, -speed / flight.rebound if speed else 0.0])
         return None if flight.trouble else (flight.end - at) / scales
 
     z, size = np.zeros(2), math.inf
@@ -192,8 +206,34 @@ def grazing_of(
             return None
         last, size = size, float(np.abs(change).max())
         if size <= _PRECISION or (size >= 0.5 * last and size <= _STAGNANT * _PRECISION):
-            return own + float(z[1]) * width
+            return phase + float(z[0]), own + float(z[1]) * width
         if not size < 1.0:
             return None
         z = z + change
     return None
+
+
+def fading(
+    regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
+) -> list[tuple[float, float, float]] | None:
+    """Return phase, speed and value of the constant of an ever slower impact.
+
+    A branch of orbits is smooth in these variables up to the grazing, which is the last entry; in the state
+    at a section it bends ever more, since the derivative of the strobe map grows as the inverse of the speed.
+    None where the impact does not fade to a grazing nearby. The arguments are those of `touch_at`.
+    """
+    way = [(touch.phase, touch.speed, float(regime.value(name)))]
+    speeds = [touch.speed * share for share in _SLOWER] if touch.speed else []
+    for speed in [*speeds, 0.0]:
+        phase, _, value = way[-1]
+        if len(way) > 1:
+            (before, fast, at), (phase, slow, value) = way[-2:]
+            share = (speed - slow) / (slow - fast)
+            phase, value = phase + share * (phase - before), value + share * (value - at)
+        solved = touch_at(regime, name, touch.surface, (phase, value), speed, firings, tolerance, width)
+        if solved is None:
+            return None
+        if len(way) > 1 and abs(solved[1] - value) > 0.5 * abs(value - way[-1][2]) + _SPACING * width:
+            return None
+        way.append((solved[0], speed, solved[1]))
+    return way

@@ -21,7 +21,7 @@ from printhammer.chaos.continuation.branch_points import (
 )
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
-from printhammer.chaos.continuation.flights import grazing_of, near_touches
+from printhammer.chaos.continuation.grazing_ends import fades, grazing_end
 from printhammer.chaos.strobe.map import quiet_section, state_later
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
@@ -36,9 +36,8 @@ PRECISION: Final = 1e-10
 _PARTS: Final = 5.0
 """Parts of the range of the constant that count as much as half a width of the strobe window."""
 _LOST: Final = ("lost", "jump", "no value")
-_GENTLE: Final = 1e-2
-_NEAR: Final = 1e-2
-"""Distances in half-widths of the window, and scales of the constant, from the grazing in which one ends."""
+GRAZING: Final = "grazing"
+_AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
 _SHORTER: Final = 1e-6
 """Scaled distance of an orbit from itself after a part of its firings, up to which it repeats then."""
 _DIGITS: Final = ".9g"
@@ -185,25 +184,23 @@ class Tracer:
         return self if same else replace(self, regime=replace(self.regime, phase=phase))
 
     def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
-        """Return a curve that is lost where it grazes a rigid backstop with that as the reason."""
+        """Return a curve that ends near a grazing of a rigid backstop continued up to it."""
         if not rigid_backstop(self.regime):
             return curve
-        stops = []
-        for stop, node in zip(curve.stops, (curve.nodes[0], curve.nodes[-1]), strict=True):
-            place = self.grazing_near(family, node) if stop.reason in _LOST else None
-            sentence = "it grazes the rigid backstop, where the strobe map has no derivative"
-            stops.append(stop if place is None else Stop("grazing", place, node.state, sentence))
-        return Curve(curve.nodes, (stops[0], stops[1]))
-
-    def grazing_near(self, family: RegimeFamily, node: Node) -> float | None:
-        """Return where the orbit that is nearly grazing grazes; None where it is far from that."""
-        regime = family.regime.with_(self.parameter, node.parameter)
-        for touch in near_touches(regime, node.state, family.firings, self.effort.tolerance)[:1]:
-            width = float(self.scales[-1])
-            place = grazing_of(regime, self.parameter, touch, family.firings, self.effort.tolerance, width)
-            if touch.gap < _GENTLE and place is not None and abs(place - node.parameter) < _NEAR * width:
-                return place
-        return None
+        nodes, stops = curve.nodes, list(curve.stops)
+        for end, sign in ((0, -1.0), (-1, 1.0)):
+            if stops[end].reason not in (*_LOST, GRAZING):
+                continue
+            last = replace(nodes[end], tangent=sign * nodes[end].tangent, arc=sign * nodes[end].arc)
+            ended = grazing_end(family, self.scales, last)
+            if ended is None:
+                continue
+            more, place = ended
+            if end == 0:
+                more = [replace(each, tangent=-each.tangent, arc=-each.arc) for each in reversed(more)]
+            nodes = [*more, *nodes] if end == 0 else [*nodes, *more]
+            stops[end] = Stop(GRAZING, place, nodes[end].state, _AT_GRAZING)
+        return Curve(nodes, (stops[0], stops[1]))
 
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
         """Return the branch born at a period doubling of an orbit of so many firings."""
@@ -219,6 +216,7 @@ class Tracer:
             steps=steps,
             watch=self.watch(2 * firings, steps, self.effort),
         )
+        curve = self.grazed(family, curve)
         value, state = event.value, event.point.node.state
         sentence = f"the orbit is born at {self.at_value(value)}, where one of half its period doubles"
         born = Stop(BIRTH, value, state, sentence)
@@ -247,7 +245,7 @@ class Tracer:
             half = Corrector(self.family(firings // 2), self.scales, steps.precision)
         rigid = rigid_backstop(self.regime)
         parts = [self.family(firings // k) for k in range(2, firings + 1) if firings % k == 0]
-        taken = 0
+        taken, fading = 0, fades(whole, self.scales)
 
         def watched(here: Node, ahead: Node) -> Stop | None:
             nonlocal taken
@@ -255,7 +253,9 @@ class Tracer:
             effort.report(min(taken, 2 * steps.most), 2 * steps.most)
             if rigid and here.value.label != ahead.value.label:
                 why = "its sequence of contacts changes in a grazing, where the strobe map has no derivative"
-                return Stop("grazing", here.parameter, here.state, why, here)
+                return Stop(GRAZING, here.parameter, here.state, why, here)
+            if rigid and fading(here, ahead):
+                return Stop(GRAZING, ahead.parameter, ahead.state, _AT_GRAZING)
             born = None if half is None else birth_of(half, here, ahead)
             if born is None:
                 shorter = [part for part in parts if self.repeats(part, ahead)]
@@ -382,7 +382,7 @@ class Tracer:
             "lost": f"beyond {at} Newton's method does not converge",
             "jump": f"beyond {at} what Newton's method converges to is no continuation",
             "length": f"the number of steps was used up at {at}",
-            "grazing": f"at {at} {why}",
+            GRAZING: f"at {at} {why}",
             "merged": f"close to {at} {why}",
             BIRTH: f"at {at} it is born from an orbit of half its period, which doubles",
             "not asked": f"it was not followed beyond {at}",
