@@ -166,7 +166,7 @@ def test_bad_axes_are_refused(tables: AxisTables) -> None:
 def behind_a_rail() -> ph.Hammer:
     coil = {"resistance": 28.6, "inductance": "6.547 mH"}
     rail = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
-    return ph.load("hendriks-1983").replace({"coil": coil, "waveform": rail})
+    return ph.load("hendriks-1983-1").replace({"coil": coil, "waveform": rail})
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def test_supplies_tell_drives_apart() -> None:
 
 
 def test_a_sequence_has_one_supply() -> None:
-    hammer = ph.load("hendriks-1983").replace("coil", {"resistance": "2 ohm", "inductance": "2 mH"})
+    hammer = ph.load("hendriks-1983-1").replace("coil", {"resistance": "2 ohm", "inductance": "2 mH"})
     other = EACH[2].model_copy(update={"diode_voltage": 0.3})
     with refused("waveforms"):
         ph.simulate(hammer, PulseSequence([EACH[2], other], at=[0.0, 1e-3]))

@@ -32,7 +32,7 @@ DEVICES = {
 
 
 def test_the_textbook_cases_are_shipped() -> None:
-    assert TEXTBOOK | PRINTED | DEVICES | {"hendriks-1983"} == set(shipped())
+    assert TEXTBOOK | PRINTED | DEVICES | {"hendriks-1983", "hendriks-1983-1"} == set(shipped())
 
 
 @pytest.mark.parametrize("name", shipped())

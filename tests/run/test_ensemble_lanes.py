@@ -262,7 +262,7 @@ def test_near_the_border_of_rest_a_member_that_does_not_get_on_leaves(
     key: str, value: float, tolerance: float
 ) -> None:
     """Its swings are far shorter than its steps, so that a step to the switch never ends on it."""
-    hammer = ph.load("hendriks-1983").replace({key: value})
+    hammer = ph.load("hendriks-1983-1").replace({key: value})
     assert hammer.waveform is not None
     drives = ph.PulseTrains.at_rates(hammer.waveform, np.linspace(500.0, 1100.0, 8), 9)
     result = Ensemble(hammer, drives, 0.026, tolerance=tolerance, max_steps=20_000).run(engine="lanes")

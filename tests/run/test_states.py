@@ -36,7 +36,7 @@ def on_a_rail(*, turn: bool = False) -> ph.Hammer:
     coil = {"resistance": "28.6 ohm", "inductance": "6.5 mH"}
     if turn:
         coil |= {"turn_resistance": "60 ohm", "leakage": "1 mH"}
-    return ph.load("hendriks-1983").replace("coil", coil)
+    return ph.load("hendriks-1983-1").replace("coil", coil)
 
 
 @pytest.mark.parametrize("turn", [False, True])
@@ -63,7 +63,7 @@ def test_a_motion_goes_on_from_its_state_at_a_firing(
 
 
 def test_a_motion_goes_on_from_inside_the_pack_under_a_current() -> None:
-    hammer, period = ph.load("hendriks-1983"), 0.3e-3
+    hammer, period = ph.load("hendriks-1983-1"), 0.3e-3
     with interpreted():
         train = ph.PulseTrain(hammer.waveform, period=period, pulses=4, overlap="replace")
         whole = ph.simulate(hammer, train, duration=4 * period, tolerance=1e-14)
@@ -97,7 +97,7 @@ def test_trains_hand_on_the_current(turn: bool) -> None:
 
 def test_states_of_a_current_driven_train_have_no_current() -> None:
     with interpreted():
-        points = ph.strobe(ph.load("hendriks-1983"), period=1.3e-3, points=2, verdict=False)
+        points = ph.strobe(ph.load("hendriks-1983-1"), period=1.3e-3, points=2, verdict=False)
     assert points.current is None
     assert "current" not in points.to_dataset()
 
@@ -139,7 +139,7 @@ def test_what_is_no_state_is_refused(state: tuple[float, ...], key: str) -> None
 
 
 def test_a_current_in_a_state_needs_a_voltage() -> None:
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     drive = ph.PulseTrain(hammer.waveform)
     with refused("state"):
         ph.simulate(hammer, drive, state=(1e-4, 0.0, 0.1))

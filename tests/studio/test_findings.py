@@ -76,7 +76,7 @@ def test_the_rate_where_a_dot_is_lost_is_found(opened: Page) -> None:
     def struck(rate: float) -> bool:
         return ph.simulate(hammer, ph.PulseTrain(hammer.waveform, rate=rate, pulses=9)).dots[1].struck
 
-    assert 1505 < rate < 1520
+    assert 1470 < rate < 1476
     assert not struck(rate)
     assert struck(rate - 0.1)
 

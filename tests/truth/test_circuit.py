@@ -164,7 +164,7 @@ def test_a_moving_coil_is_linear() -> None:
 def paper(resistance: float, inductance: float, **more: Any) -> ph.Hammer:
     """The hammer of the paper behind a rail, its pack out of reach; other tests share the machine code."""
     paper = {"pack.front": "1 mm", "platen": "1.1 mm", "pack.thickness": "0.1 mm"}
-    return ph.load("hendriks-1983").replace(
+    return ph.load("hendriks-1983-1").replace(
         {"coil.resistance": resistance, "coil.inductance": inductance, **paper, **more}
     )
 
@@ -292,7 +292,7 @@ def test_both_ledgers_close(seed: int) -> None:
 
 def test_a_coil_without_back_emf_leaves_the_motion_of_the_current_as_it_was() -> None:
     """The voltage R i + L di/dt of the old current makes that current, and the motion with it."""
-    hammer = ph.load("hendriks-1983").replace("pack", None)
+    hammer = ph.load("hendriks-1983-1").replace("pack", None)
     pulse = hammer.waveform
     assert pulse is not None
     amplitude, width, rise, decay = (getattr(pulse, k) for k in ("amplitude", "width", "rise", "decay"))
@@ -355,7 +355,7 @@ class Exponentials(Waveform):
 def test_a_coil_that_is_no_circuit_is_one_sentence(
     coil: dict[str, str], waveform: Waveform, key: str
 ) -> None:
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     if coil:
         hammer = hammer.replace("coil", coil)
     with refused(key):
@@ -368,6 +368,6 @@ def test_thresholds_in_the_wrong_order_and_negative_resistance_are_refused() -> 
     with refused(None, file="chopper waveform"):
         Chopper(voltage=24.0, width=1e-3, upper=1.0)
     with refused("coil.resistance"):
-        ph.load("hendriks-1983").replace("coil.resistance", "-1 ohm")
+        ph.load("hendriks-1983-1").replace("coil.resistance", "-1 ohm")
     with refused(None, file="rail waveform"):
         Rail(voltage=24.0, width=1e-3, decay="zener")

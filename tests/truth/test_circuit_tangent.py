@@ -115,7 +115,7 @@ DRIVERS: dict[str, Waveform] = {
 
 def behind(circuit: dict[str, Any]) -> ph.Hammer:
     """The paper's hammer, pack and backstop, behind a rail."""
-    hammer = ph.load("hendriks-1983").replace("coil", circuit["coil"])
+    hammer = ph.load("hendriks-1983-1").replace("coil", circuit["coil"])
     return hammer.replace({key: value for key, value in circuit.items() if key != "coil"})
 
 

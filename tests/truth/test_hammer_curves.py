@@ -15,7 +15,7 @@ WIDE = ("500 Hz", "1200 Hz")
 
 @pytest.fixture(scope="module")
 def branch() -> Branch:
-    return ph.continuation(ph.load("hendriks-1983"), "rate", ("735 Hz", "770 Hz"), rate="745 Hz", most=120)
+    return ph.continuation(ph.load("hendriks-1983-1"), "rate", ("735 Hz", "770 Hz"), rate="745 Hz", most=120)
 
 
 def solved(curve: BifurcationCurve, place: int) -> float:

@@ -21,7 +21,7 @@ RAIL = Rail(voltage=100.0, width=177.24e-6, decay="diode", decay_resistance=159.
 def hammer() -> ph.Hammer:
     """The paper's, behind a rail that makes its current."""
     coil = {"coil.resistance": 28.612, "coil.inductance": 6.5468e-3}
-    return ph.load("hendriks-1983").replace({**coil, "waveform": RAIL})
+    return ph.load("hendriks-1983-1").replace({**coil, "waveform": RAIL})
 
 
 def after(regime: Regime, state: list[float], firings: int) -> Image:

@@ -20,7 +20,7 @@ def rows_of(hammer: ph.Hammer, rates: list[float]) -> list[ph.PulseTrain]:
 
 @pytest.fixture(scope="module")
 def shipped() -> ph.Hammer:
-    return ph.load("hendriks-1983")
+    return ph.load("hendriks-1983-1")
 
 
 def by_tangent_flow(hammer: ph.Hammer, rate: float) -> float:

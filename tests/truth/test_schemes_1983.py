@@ -43,7 +43,7 @@ def test_the_first_firings(hammer: ph.Hammer, scheme: Scheme, reading: Reading) 
 @pytest.mark.slow
 @pytest.mark.parametrize(("period", "scheme"), [(0.8e-3, "runge-kutta-4"), (1.0e-3, "trapezoid")])
 def test_the_verdict_on_a_panel_that_locks_at_once(period: float, scheme: Scheme) -> None:
-    hammer, firings = ph.load("hendriks-1983"), (101, 200)
+    hammer, firings = ph.load("hendriks-1983-1"), (101, 200)
     (mine,) = scheme_strobes(hammer, [period], scheme, points=200, firings=firings)
     states = plain(hammer, period, firings[1], scheme, "firings")[firings[0] - 1 :]
     assert mine.verdict is not None

@@ -265,7 +265,7 @@ def test_entropy_of_what_is_no_plane_is_refused(labels: np.ndarray, box: int, ke
 
 @pytest.mark.slow
 def test_near_a_doubling_no_cell_is_left_and_the_orbit_has_its_own_period() -> None:
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     # The multiplier is -0.990: states two firings apart agree a thousand firings before those one apart do.
     found = ph.basins(hammer, period=1.05e-3, x=(30e-6, 260e-6, 4), v=(-1.0, 1.0, 4))
     assert found.counts[0] == 0

@@ -152,7 +152,7 @@ def test_steps_are_halved_where_neighbours_differ(hammer: "ph.Hammer") -> None:
 
 def test_a_train_that_takes_turns_about_an_orbit_has_the_period_of_the_orbit() -> None:
     # States two firings apart agree within 300 firings, but still move: the multiplier is close to -1.
-    found = ph.bifurcation(ph.load("hendriks-1983"), periods=[1.004e-3, 1.0075e-3, 1.0105e-3], refine=0)
+    found = ph.bifurcation(ph.load("hendriks-1983-1"), periods=[1.004e-3, 1.0075e-3, 1.0105e-3], refine=0)
     assert found.verdicts[0].tolist() == ["period-1"] * 3
 
 

@@ -54,7 +54,7 @@ def test_states_approach_an_orbit_in_its_order_only() -> None:
 @pytest.mark.parametrize("period", [1, 2])
 def test_a_saddle_is_no_period(period: int) -> None:
     # Of period 2, with a largest multiplier of 1.0094: trains dwell there for hundreds of firings.
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     regime = Regime.of(hammer, period=1.05e-3)
     saddle = orbit(regime, (5.24594925e-05, 0.11503261), firings=2)
     assert saddle.kind == "saddle"

@@ -248,7 +248,7 @@ def test_what_does_not_fit_together_is_refused(hammer: "ph.Hammer") -> None:
 
 def test_near_a_doubling_a_verdict_rests_on_newtons_method() -> None:
     # States two firings apart agree to 7e-8 of the window, those one firing apart to 7e-6 only.
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     assert ph.strobe(hammer, period=1.047408e-3, points=1).verdict.name == "period-1"
     judged = ph.strobe(hammer, period=1.0482e-3, points=1).verdict
     assert judged.name == "period-1"

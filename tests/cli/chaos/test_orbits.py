@@ -45,7 +45,7 @@ def test_in_inches(cli: Callable) -> None:
 
 def test_a_search_that_finds_nothing_is_told(cli: Callable, tmp_path: Path) -> None:
     path, table = tmp_path / "short.toml", tmp_path / "orbits.csv"
-    ph.load("hendriks-1983").replace("magnet.range_max", "250 um").save(path)
+    ph.load("hendriks-1983-1").replace("magnet.range_max", "250 um").save(path)
     done = cli("orbits", path, "--period", "1.3 ms", *SMALL, "--out", table)
     assert done.status == 1
     assert "no orbits of 1 firing" in done.out

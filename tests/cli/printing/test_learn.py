@@ -8,15 +8,15 @@ import printhammer as ph
 
 def test_a_unit_learns_its_table(cli: Callable, tmp_path: Path) -> None:
     unit, table, picture = tmp_path / "unit.toml", tmp_path / "learned.csv", tmp_path / "lines.png"
-    ph.load("hendriks-1983").replace("magnet.Am", 0.282).save(unit)
+    ph.load("hendriks-1983-1").replace("magnet.Am", 0.282).save(unit)
     words = ("--rate", "1.275kHz", "--force-noise", 0.03, "--members", 100, "--serial", "A17", "--unit", unit)
-    done = cli("learn", "hendriks-1983", *words, "--table", table, "--out", picture)
+    done = cli("learn", "hendriks-1983-1", *words, "--table", table, "--out", picture)
     assert done.status in (0, 1)
-    assert "Unit A17 of hendriks-1983 at 1275 Hz" in done.out
+    assert "Unit A17 of hendriks-1983-1 at 1275 Hz" in done.out
     assert "open loop" in done.out
     assert picture.exists()
     assert ph.load_table(table).serial == "A17"
-    report = ("quality", "hendriks-1983", "--rate", "1.275kHz", "--pulses", 9, "--table", table)
+    report = ("quality", "hendriks-1983-1", "--rate", "1.275kHz", "--pulses", 9, "--table", table)
     assert cli(*report, "--serial", "A17").status == 0
     assert cli(*report, "--serial", "any").status == 0
     refused = cli(*report, "--serial", "B2")

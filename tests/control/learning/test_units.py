@@ -22,7 +22,7 @@ SENSOR = ImpactSensor(force=0.03)
 
 
 def nominal() -> ph.Hammer:
-    return ph.load("hendriks-1983")
+    return ph.load("hendriks-1983-1")
 
 
 def apart(learner: Learner, row: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ def permanent() -> ph.Hammer:
     """The paper's hammer behind a rail, whose current is over soon after the impact."""
     coil = {"resistance": 28.6, "inductance": "6.547 mH"}
     rail = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
-    return ph.load("hendriks-1983").replace({"coil": coil, "waveform": rail})
+    return ph.load("hendriks-1983-1").replace({"coil": coil, "waveform": rail})
 
 
 def signal_of(hammer: ph.Hammer, estimator: ImpactEstimator) -> tuple[Any, float]:
@@ -193,4 +193,4 @@ def test_a_pulse_that_is_over_before_the_impact_says_so(permanent: ph.Hammer) ->
 
 def test_a_current_without_a_circuit_tells_nothing() -> None:
     with refused("waveform"):
-        ph.impact_time(ph.load("hendriks-1983"))
+        ph.impact_time(ph.load("hendriks-1983-1"))

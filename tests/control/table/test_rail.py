@@ -19,7 +19,7 @@ def hammer() -> ph.Hammer:
     """The paper's hammer behind a rail that makes about the current of its pulse."""
     coil = {"resistance": 28.6, "inductance": "6.547 mH"}
     rail = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
-    return ph.load("hendriks-1983").replace({"coil": coil, "waveform": rail})
+    return ph.load("hendriks-1983-1").replace({"coil": coil, "waveform": rail})
 
 
 def test_dots_are_like_that_of_the_single_pulse(hammer: ph.Hammer) -> None:

@@ -25,7 +25,7 @@ SHRINKS = (PERIOD, 772e-6, 40.9e-6, PERIOD + 94e-6, 181.5e-6)
 
 @pytest.fixture(scope="module")
 def task() -> Task:
-    return task_of(ph.load("hendriks-1983"), RATE)
+    return task_of(ph.load("hendriks-1983-1"), RATE)
 
 
 def test_both_make_the_second_dot_right_and_one_is_no_way(task: Task) -> None:
@@ -52,7 +52,7 @@ def test_a_long_row_shows_it(task: Task) -> None:
 
 @pytest.mark.slow
 def test_the_table_prints_rows_of_200() -> None:
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     table = ph.tune(hammer, rate=RATE)
     report: Any = ph.judge_table(hammer, table, perturbations=[Perturbation()])
     assert report.passed[1].all()

@@ -75,7 +75,7 @@ def test_what_fails_first_fails_alone_as_well(hammer: "ph.Hammer") -> None:
 
 def test_a_rate_that_eight_dots_bear_and_a_row_does_not_is_not_safe() -> None:
     """At 840 Hz an error of a row changes its sign from dot to dot, and grows: seen in one long motion."""
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     grid = {"first": 835.0, "last": 840.0}
     assert safe_rate(hammer, long=False, **grid).at_least
     found = safe_rate(hammer, **grid)

@@ -1,11 +1,12 @@
 """Constants of a coil that a hammer file leaves open: its temperature, or the whole winding.
 
 A hammer whose file states no resistance is driven by a current. If the user selects a driver by voltage for
-it, the winding is chosen such that the rail reproduces the current approximately.
+it, winding and rail are chosen such that the current rises to about the same peak in the same time.
 """
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,11 +23,11 @@ _SOURCE: Final = "not in the file of the hammer; taken where a voltage drives th
 _RESISTANCE: Final = 28.6
 """Resistance of a coil without a stated one, ohm; arbitrary."""
 
-_REACH: Final = 1.775
-"""Rail voltage as a multiple of peak current times resistance."""
+_LAST: Final = 1.19
+"""Time constant of coil and magnet as a multiple of the pulse width; arbitrary."""
 
-_LAST: Final = 1.287
-"""Time constant of the coil as a multiple of the pulse width."""
+_REACH: Final = 1.0 / (1.0 - math.exp(-1.0 / _LAST))
+"""Rail voltage as a multiple of peak current times resistance: an inductance behind a resistance."""
 
 _PULSE: Final = (1.97, 177e-6)
 """Current, A, and width, s, of a pulse without stated ones: those of the shipped hammer."""
@@ -46,8 +47,7 @@ def open_constants(hammer: Hammer) -> dict[str, tuple[Constant, Range]]:
 
     values: dict[str, float] = {"temperature": REFERENCE}
     if hammer.coil is None or getattr(hammer.coil, "resistance", None) is None:
-        _, width = _pulse(hammer)
-        values |= {"resistance": _RESISTANCE, "inductance": _LAST * width * _RESISTANCE}
+        values |= {"resistance": _RESISTANCE, "inductance": _inductance(hammer)}
     known: dict[str, tuple[Constant, Range]] = {}
     notes = quantities(Winding)
     for name, value in values.items():
@@ -101,6 +101,16 @@ def rail_of(hammer: Hammer) -> dict[str, Any] | None:
 def by_voltage(waveform: Waveform | None) -> bool:
     """Whether a waveform is a voltage across the coil."""
     return waveform is not None and waveform.quantity == "voltage"
+
+
+def _inductance(hammer: Hammer) -> float:
+    """Return the inductance, H, with which coil and magnet at rest have the time constant `_LAST`."""
+    from printhammer.run.supply import inductance
+
+    current, width = _pulse(hammer)
+    whole = _LAST * width * _RESISTANCE
+    wound = hammer.replace("coil", {"resistance": _RESISTANCE, "inductance": whole})
+    return 2.0 * whole - inductance(wound, hammer.origin, current / 2.0)
 
 
 def _pulse(hammer: Hammer) -> tuple[float, float]:

@@ -13,12 +13,12 @@ export const STORIES = [
     notice: "Figure 6. After 660 µs the second pulse pulls while the armature still comes back, and the dot is lost; 40 µs later it catches it on the rise and prints harder than the first.",
   },
   {
-    name: "Buzz printing", state: { rate: 1500, pulses: 12 },
-    notice: "Figure 7. Fired in step with the return from the paper, the armature turns round before the backstop: every dot is printed, in the end with three tenths of the force.",
+    name: "Buzz printing", state: { rate: 1460, pulses: 12 },
+    notice: "Figure 7. Fired in step with the return from the paper, the armature turns round before the backstop: every dot is printed, in the end with four tenths of the force.",
   },
   {
     name: "The second dot lost", state: { rate: 1520, pulses: 9, low: 1300, high: 1800 },
-    notice: "Drag the line in the map up from 1300 Hz: the dots grow stronger, then irregular, and from about 1512 Hz on the second is lost. Red in the map is a lost dot.",
+    notice: "Drag the line in the map up from 1300 Hz: the dots become irregular, and from about 1473 Hz on the second is lost, and above 1555 Hz the third. Red in the map is a lost dot.",
   },
   {
     name: "A strange train", state: { rate: 1050, pulses: 40, low: 900, high: 1300 },
