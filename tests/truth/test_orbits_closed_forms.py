@@ -9,6 +9,7 @@ from tests.truth.impact_orbits import BouncingBall
 
 import printhammer as ph
 from printhammer.chaos import orbit
+from printhammer.chaos.orbits.collection import index_sums
 from printhammer.chaos.orbits.newton import Images, close_orbits
 from printhammer.chaos.orbits.orbit import multipliers_of
 from printhammer.chaos.orbits.search import shortest
@@ -197,3 +198,43 @@ def test_a_search_finds_both_orbits_of_the_bouncing_ball(gamma: float) -> None:
     for stable in (True, False):
         near = np.abs(sums - exact.trace(gamma, stable)) < 1e-6
         assert products[near] == pytest.approx([exact.restitution**2], rel=1e-6)
+
+
+def test_indices_of_all_orbits_add_up_to_one() -> None:
+    # A doubling: two firings see a saddle with the multiplier 1.44, and the orbit born there twice.
+    flip, born = (1, np.array([-1.2, 0.1], complex)), (2, np.array([0.5, 1e-4], complex))
+    assert index_sums([flip, born], 2) == {1: 1, 2: 1}
+    assert index_sums([flip], 2) == {1: 1, 2: -1}
+    # A fold adds a saddle and a node; a spiral counts as a node does, whether it winds in or out.
+    pair = [(1, np.array([2.0, 0.1], complex)), (1, np.array([1.1 + 0.5j, 1.1 - 0.5j]))]
+    assert index_sums([(1, np.array([0.3j, -0.3j])), *pair], 1) == {1: 1}
+
+
+@pytest.mark.slow
+def test_a_longer_search_finds_what_a_shorter_one_does() -> None:
+    ball = ph.load("tufillaro-1992")
+    force = ph.SineForce(1.1705e-4 * (2.0 * math.pi * 60.0) ** 2 * ball.mass, 60.0)
+    one, two = (ph.orbits(ball, drive=force, longest=longest) for longest in (1, 2))
+    assert len(one) == 7
+    assert one.indices == {1: 1}
+    assert one.incomplete == ()
+    for own in one:
+        gaps = [abs(own.x[0] - o.x[0]) / 1e-4 + abs(own.v[0] - o.v[0]) for o in two if o.firings == 1]
+        assert min(gaps) < 1e-7
+    # An independent search found this one.
+    assert any(orbit.multipliers[0].real == pytest.approx(-93.48, abs=0.01) for orbit in two)
+
+
+@pytest.mark.slow
+def test_mirror_images_of_orbits_are_found() -> None:
+    force = ph.SineForce(0.3, 1.0 / (2.0 * math.pi), phase="90 deg")
+    found = ph.orbits(ph.load("duffing-holmes"), drive=force, longest=1, starts=128, guesses=8)
+    assert found.indices == {1: 1}
+    states = []
+    for own in found:
+        assert own.phase == found[0].phase
+        motion = own.motion()
+        (x,), (v,) = motion.at(motion.start + 0.5 * own.regime.period)
+        states.append((own.section, np.array([-x, -v])))
+    for _state, mirror in states:
+        assert min(np.abs(mirror - state).max() for state, _other in states) < 1e-6

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
-from printhammer.chaos.orbits.orbit import KINDS, STABLE, Orbit, orbits_table
+from printhammer.chaos.orbits.newton import SINGULAR, STUCK, TOO_LONG
+from printhammer.chaos.orbits.orbit import KINDS, STABLE, UNDECIDED, Orbit, orbits_table
+from printhammer.chaos.strobe.map import RANGE_LEFT
 from printhammer.results import Column, Result, part, scalar
 from printhammer.results.result import stacked
 from printhammer.results.summary import (
@@ -26,12 +29,40 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+_WORDS: Final = {
+    STUCK: "Newton iterations stalled",
+    TOO_LONG: "hit the iteration limit",
+    SINGULAR: "met a singular derivative",
+    RANGE_LEFT: "left the allowed range",
+}
 _STYLES: Final[dict[str, Style]] = {
     "stable": "good",
     "saddle": "cyan",
     "unstable": "magenta",
     "undecided": "poor",
 }
+
+
+def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest: int) -> dict[int, int]:
+    """Return the sums of the indices of the fixed points over 1, 2, ... firings.
+
+    The index of a fixed point is the sign of det(I - M), M the derivative of the map over so many firings: -1
+    for a saddle with a multiplier beyond +1, else +1. If the map is continuous and maps a disc into itself,
+    the indices of all fixed points in it add up to 1 (S. Lefschetz, Trans. Am. Math. Soc. 28 (1926) 1).
+    Orbits are pairs of firings and multipliers.
+    """
+    sums = {}
+    for count in range(1, longest + 1):
+        own = [(firings, multipliers) for firings, multipliers in orbits if count % firings == 0]
+        signs = [np.sign(np.prod(1.0 - each ** (count // firings)).real) for firings, each in own]
+        sums[count] = int(sum(sign * firings for sign, (firings, _each) in zip(signs, own, strict=True)))
+    return sums
+
+
+def indices_add_up(regime: Regime) -> bool:
+    """Whether the indices of all orbits add up to 1: no pack, and a loss that bounds the motion."""
+    hammer = regime.hammer
+    return hammer.pack is None and (hammer.damping is not None or hammer.backstop is not None)
 
 
 def energies_of(regime: Regime) -> list[str]:
@@ -104,6 +135,8 @@ class Orbits(Result):
     def coverage(self) -> float:
         """Estimated share of further guesses that close which would lead to one of the list; NaN without any.
 
+        No bound: orbits that no guess came near are not counted.
+
         One less the share of those that led to an orbit to which no other one did (I. J. Good, Biometrika 40
         (1953) 237).
         """
@@ -114,10 +147,26 @@ class Orbits(Result):
         """Estimated least number of orbits that are not in the list.
 
         f1 (f1 - 1) / (2 (f2 + 1)), with f1 orbits to which one guess led and f2 to which two did (A. Chao,
-        Scand. J. Statist. 11 (1984) 265). Of orbits to which no guess leads it knows nothing.
+        Scand. J. Statist. 11 (1984) 265). Of orbits to which no guess leads it knows nothing; but where the
+        indices do not add up, one at least for each of those numbers of firings.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
-        return 0.5 * once * max(once - 1, 0) / (twice + 1)
+        return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(len(self.incomplete)))
+
+    @property
+    def indices(self) -> dict[int, int]:
+        """Sum of the indices of the fixed points of the strobe map over 1, 2, ... firings.
+
+        See `index_sums`. Empty where no theorem says what they add up to.
+        """
+        if not indices_add_up(self.regime) or any(orbit.kind == UNDECIDED for orbit in self.found):
+            return {}
+        return index_sums([(orbit.firings, orbit.multipliers) for orbit in self.found], self.longest)
+
+    @property
+    def incomplete(self) -> tuple[int, ...]:
+        """Numbers of firings over which the indices do not add up to 1: there orbits are missing."""
+        return tuple(count for count, total in self.indices.items() if total != 1)
 
     @property
     def message(self) -> str:
@@ -128,13 +177,22 @@ class Orbits(Result):
         head = f"{count or 'no'} orbit{'' if count == 1 else 's'} of {most}"
         tried = f"{sum(self.guesses)} guesses in motions from {self.starts} states"
         ends = [f"{self.repeats} led to one of these again"] if self.repeats else []
-        ends += [f"{number}: {reason}" for reason, number in sorted(self.failures.items())]
-        sure = (
-            f"; {100.0 * self.coverage:.1f} % of further guesses that close would lead to these again,"
-            f" {self.unseen:.1f} orbits or more are estimated to be missing"
-            if count
-            else ""
-        )
+        failed = [
+            f"{number} {_WORDS.get(reason, reason)}" for reason, number in sorted(self.failures.items())
+        ]
+        ends += [f"failed: {', '.join(failed)}"] if failed else []
+        sure = ""
+        if count:
+            sure = f"; {100.0 * self.coverage:.1f} % of further guesses that close would lead to these again"
+            sure += (
+                f", at least {math.ceil(self.unseen)} more orbits are estimated to be missing"
+                if self.unseen
+                else ""
+            )
+            sure += "; orbits near no guess are not counted"
+        if self.incomplete:
+            periods = ", ".join(map(str, self.incomplete))
+            sure += f"; orbits are missing: the indices over {periods} firings do not add up to 1"
         return f"{head}{f' ({what})' if what else ''}; {tried}{': ' if ends else ''}{'; '.join(ends)}{sure}"
 
     def notes(self) -> dict[str, Any]:

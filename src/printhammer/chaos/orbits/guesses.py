@@ -8,12 +8,13 @@ plane, so that orbits which no train from rest comes near are found too.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from printhammer.chaos.orbits.newton import Guess
-from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory
+from printhammer.chaos.strobe.map import WITH_MEMORY, front_with_memory, state_later
 from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.results import Declared, part
@@ -33,6 +34,8 @@ _LOOKED_AT: Final = 4000
 """Returns that are looked at, closest first, for guesses that are not alike."""
 _EARLY: Final = 2
 """Firings of a record that count as early."""
+_LEAST: Final = 16
+"""Least number of firings for which a motion is followed."""
 _ROOM: Final = 1.2
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
@@ -46,6 +49,16 @@ class Records(Declared):
         "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run ended before"
     )
     usable: BoolArray = part("whether that is the whole state, shape (M, n)")
+    begins: bool = part("whether the first one is the long one", default=True)
+
+    def rows(self, begin: int, end: int) -> Records:
+        """Return the records from one number to before another."""
+        return Records(self.states[begin:end], self.usable[begin:end], begins=not begin)
+
+
+def firings_for(period: int) -> int:
+    """Return for how many firings motions are followed to find orbits of a period."""
+    return max(2 * period, _LEAST)
 
 
 def record(
@@ -126,10 +139,31 @@ def first_state(regime: Regime) -> tuple[float, float]:
         return 0.5 * (window.x[0] + window.x[1]), 0.0
 
 
+def touches(regime: Regime, count: int) -> FloatArray:
+    """Return states at a firing of motions that have just left a rigid backstop, shape (count, 2).
+
+    Phases and speeds are spread evenly, slow ones more densely: near a chatter, where an armature bounces
+    ever lower, orbits crowd that no even spread over the plane comes near. Where a run ends before the
+    firing, the rest state.
+    """
+    number = np.arange(1, count + 1)
+    phases, shares = ((0.5 + number / _PLASTIC**k) % 1.0 for k in (1, 2))
+    place, fastest = regime.hammer.position, _SCALES * regime.window.half_widths[1]
+    states = np.array(
+        [
+            state_later(replace(regime, phase=float(phase)), np.array([place, speed]), 0.0, TOLERANCE)
+            for phase, speed in zip(phases, fastest * shares**2, strict=True)
+        ]
+    ).reshape(-1, 2)
+    return np.where(np.isfinite(states).all(axis=1, keepdims=True), states, first_state(regime))
+
+
 def close_returns(
-    records: Records, period: int, most: int, scales: FloatArray
+    records: Records, period: int, most: int, scales: FloatArray, within: int
 ) -> tuple[list[Guess], list[Guess]]:
     """Return the closest returns of records after `period` firings that are not alike, half of `most` each.
+
+    Of the short records the first `within` firings count.
 
     First the closest of all, then the closest of those that begin early; distances are in the scales, the
     half-widths of the window. With a larger `most` both lists begin as they do with a smaller one.
@@ -140,6 +174,9 @@ def close_returns(
         return [], []
     gap = np.abs(scaled[:, period:] - scaled[:, :count]).max(axis=2)
     gap = np.where(records.usable[:, period:] & records.usable[:, :count], gap, np.inf)
+    # The first record is the long one.
+    rows = slice(1, None) if records.begins else slice(None)
+    gap[rows, max(within - period + 1, 0) :] = np.inf
     # Late returns lie close to what attracts, early ones everywhere.
     early = gap.copy()
     early[:, _EARLY:] = np.inf

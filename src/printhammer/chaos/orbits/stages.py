@@ -19,18 +19,21 @@ import numpy as np
 from printhammer.chaos.continuation.arclength import Steps, follow
 from printhammer.chaos.continuation.family import RegimeFamily
 from printhammer.chaos.continuation.fixed_points import Corrector, between
-from printhammer.chaos.orbits.collection import Orbits
+from printhammer.chaos.orbits.collection import Orbits, index_sums, indices_add_up
 from printhammer.chaos.orbits.guesses import (
     PHASES,
     Records,
     close_returns,
+    firings_for,
     first_state,
     joined,
     record,
     spread,
+    touches,
 )
 from printhammer.chaos.orbits.newton import Closing, ExactMaps, FastMaps, Guess, close_orbits
-from printhammer.chaos.orbits.orbit import KINDS, Orbit, orbit_of
+from printhammer.chaos.orbits.orbit import KINDS, Orbit, multipliers_of, orbit_of
+from printhammer.chaos.strobe.map import state_later
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD
 from printhammer.run.effort import Effort
@@ -81,6 +84,11 @@ _EVEN: Final = 8
 """Firings up to which fewer of them have more guesses in proportion."""
 _JOINED: Final = 48
 """Guesses made of two shorter orbits that a stage tries for each number of firings, at most."""
+_TOUCHES: Final = 4
+"""One state just behind a touch of a rigid backstop for so many states spread over the plane."""
+_COMPLETED: Final = 6
+_MORE: Final = 512
+"""Largest period for which more returns are tried if the indices show a gap, and their number."""
 _SAME: Final = 1e-6
 """Distance, in half-widths of the window, up to which states of two orbits are one."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
@@ -142,7 +150,10 @@ class Search:
         self.all = 3 + 2 * self.longest * len(self.blocks) * len(self.batches)
         (settling, *_others) = record(self.regime, rest, 1, _LONG, self.effort.threads)
         begun = np.vstack([rest, spread(self.regime, self.blocks[-1], settling.states[0])])
-        records = record(self.regime, begun, 2 * self.longest, _LONG, self.effort.threads)
+        backstop = self.regime.hammer.backstop
+        if backstop is not None and backstop.law == "rigid":
+            begun = np.vstack([begun, touches(self.regime, self.blocks[-1] // _TOUCHES)])
+        records = record(self.regime, begun, firings_for(self.longest), _LONG, self.effort.threads)
         self._tell(1)
         known: list[tuple[Regime, _Known]] = []
         for place, (phase, kept) in enumerate(zip(PHASES, records, strict=True)):
@@ -157,6 +168,7 @@ class Search:
         self._tell(1)
         if self.follow:
             self._along(described)
+        self._mirror(described)
         self._tell(1)
         ordered = sorted(
             described,
@@ -182,20 +194,70 @@ class Search:
         """Return the different orbits through one section."""
         fast = FastMaps(regime, self.longest, self.effort.at(TOLERANCE))
         different: list[_Known] = []
+        seen: set[bytes] = set()
         ends = np.cumsum([1 + self.blocks[0], *np.diff(self.blocks)])
         for block, (begin, end) in enumerate(itertools.pairwise([0, *ends.tolist()])):
-            part = Records(records.states[begin:end], records.usable[begin:end])
+            part = records.rows(begin, end)
             lists = [
-                close_returns(part, period, _share(self.batches[-1], period), self.scales)
+                close_returns(part, period, _share(self.batches[-1], period), self.scales, 2 * self.longest)
                 for period in range(1, self.longest + 1)
             ]
             for batch in range(len(self.batches)):
                 for period, both in enumerate(lists, 1):
                     tried = [guess for guesses in both for guess in self._batch(guesses, batch, period)]
+                    seen.update(guess.states.tobytes() for guess in tried)
                     tried += self._joined(different, period, (block, batch))
                     self._try(fast, different, tried, (block, batch))
                     self._tell(1)
+        self._further(fast, different, records, seen)
+        if indices_add_up(regime):
+            self._complete(fast, different, records)
         return self._refined(regime, different)
+
+    def _further(self, fast: FastMaps, different: list[_Known], records: Records, seen: set[bytes]) -> None:
+        """Try the returns of searches for shorter orbits, those of longer motions, and those after a touch.
+
+        After all others, so that none of the orbits that these lead to is lost.
+        """
+        first = len(different)
+        begin, last = 0, len(self.batches) - 1
+        for block, end in enumerate(1 + np.array(self.blocks)):
+            parts = [records.rows(begin, int(end))]
+            behind = [1 + self.blocks[-1] + (place - 1) // _TOUCHES for place in (max(begin, 1), int(end))]
+            if behind[1] <= len(records.states):
+                parts.append(records.rows(*behind))
+            begin = int(end)
+            for period in range(1, self.longest + 1):
+                many = _share(self.batches[-1], period)
+                ways = [(parts[0], 2 * most) for most in _doubled(period, self.longest)]
+                ways += [(part, firings_for(period)) for part in parts]
+                tried = {
+                    guess.states.tobytes(): guess
+                    for part, within in ways
+                    for guesses in close_returns(part, period, many, self.scales, within)
+                    for guess in guesses
+                }
+                fresh = [guess for key, guess in tried.items() if key not in seen]
+                seen.update(tried)
+                self._try(fast, different, fresh, (block, last))
+        known = set(itertools.combinations(range(first), 2))
+        closings = [orbit.closing for orbit in different]
+        for period in range(2, self.longest + 1):
+            if len(different) > first:
+                more = joined(closings, period, _JOINED, self.scales, known)
+                self._try(fast, different, more, (len(self.blocks) - 1, last))
+
+    def _complete(self, fast: FastMaps, different: list[_Known], records: Records) -> None:
+        """Try more returns for periods whose indices do not add up to 1: orbits are missing there."""
+        stage = len(self.blocks) - 1, len(self.batches) - 1
+        for period in range(1, min(self.longest, _COMPLETED) + 1):
+            own = [
+                (int(known.closing.firings.sum()), multipliers_of(known.closing.jacobians))
+                for known in different
+            ]
+            if index_sums(own, period)[period] != 1:
+                returns = close_returns(records, period, _MORE, self.scales, firings_for(period))
+                self._try(fast, different, [guess for both in returns for guess in both], stage)
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
         """Return that part of some guesses that is new in a batch."""
@@ -307,6 +369,26 @@ class Search:
             self._try(exact, different, tried, (0, 0))
             self._describe(described, [(every[0].regime, known) for known in different])
 
+    def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
+        """Add the mirror images of orbits: x -> -x and half a period, where nothing is on one side alone.
+
+        Where the forces are not odd, Newton's method finds none, or another orbit.
+        """
+        hammer = self.regime.hammer
+        if hammer.pack is not None or hammer.backstop is not None or self.regime.drive is None:
+            return
+        centre = np.array([2.0 * hammer.origin, 0.0])
+        for orbit, hits in list(described):
+            regime = orbit.regime
+            half = state_later(regime, orbit.section, (orbit.phase + 0.5) % 1.0, self.effort.tolerance)
+            if not np.isfinite(half).all():
+                continue
+            exact = ExactMaps(regime, self.effort)
+            guess = _guess(replace(orbit, section=centre - half), exact)
+            for closing in _closed(exact, [guess], self.scales, LONE):
+                if closing.closed:
+                    self._describe(described, [(regime, _Known(closing, [], hits))])
+
     def _same(self, orbit: Orbit, other: Orbit) -> bool:
         if orbit.firings != other.firings:
             return False
@@ -321,6 +403,11 @@ class Search:
 def _share(guesses: int, period: int) -> int:
     """Return how many guesses are tried for a number of firings: as much work for each where few."""
     return guesses * max(1, _EVEN // period)
+
+
+def _doubled(first: int, below: int) -> list[int]:
+    """Return a number and its doubles below a limit."""
+    return [first << k for k in range(below.bit_length()) if first << k < below]
 
 
 def _steps(ladder: Sequence[int], most: int) -> list[int]:
