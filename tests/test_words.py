@@ -29,6 +29,7 @@ ROOMS = (
     "kernel/variational",
     "maps",
     "parts",
+    "printing",
     "report",
     "results",
     "run",

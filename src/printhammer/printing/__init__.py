@@ -1,5 +1,5 @@
-"""What a hammer prints: `dots` one by one, the `rates` at which they come out well, and whole `page`s.
+"""Print quality: single dots (`dots`), safe rates and yields (`rates`), and printed pages (`page`).
 
-Everything here takes a hammer and what is to be printed, runs ensembles, and returns frozen results that can
-be tabulated and drawn.
+Every computation takes a hammer and a pattern, simulates ensembles, and returns a frozen result that can be
+tabulated and plotted.
 """

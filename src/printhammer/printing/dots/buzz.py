@@ -3,10 +3,12 @@
 F. Hendriks (1983), Fig. 7: "Instead of allowing the armature to return fully to the backstop, current pulses
 can be issued that are synchronized with the return of the armature from the paper." No such train is known
 beforehand for a hammer; `find_buzz_train` looks for one, with the hammer's own waveform, in two families:
-even trains, and trains in which each pulse follows the leaving of the pack by a constant delay. The latter
-watch the armature, and can hold a motion that no even train holds, being unstable under a constant period.
-Such a train starts from rest; where its first excursions are too strong for a steady buzz, it may touch the
-backstop once before the dots that count, and settles into the buzz afterwards.
+even trains, and trains in which each pulse follows the armature's departure from the pack by a constant
+delay.
+A delayed train needs a sensor, and can hold a motion that no even train holds because the motion is unstable
+under a constant period. Each train starts from rest; where its first excursions are too strong for a steady
+buzz, the armature may touch the backstop once before the dots that count, and settles into the buzz
+afterwards.
 """
 
 from __future__ import annotations
@@ -30,45 +32,45 @@ from printhammer.support.arrays import BoolArray
 
 MAX_CURRENT: Final = 2.0  # Largest coil current of a train, A: the range of the paper's Fig. 2
 
-FORCES: Final = (0.3, 0.95)  # Peak force of a dot that counts, in units of that of a single pulse
+FORCES: Final = (0.3, 0.95)  # Range of peak forces that count, as fractions of the single-pulse force
 
-FEWEST: Final = 6  # Number of dots without a touch of the backstop that makes buzz printing
+FEWEST: Final = 6  # Consecutive dots without a backstop touch that count as buzz printing
 
 _PULSES: Final = 9
 _PERIODS: Final = 96
 _DELAY_STEP: Final = 2e-6
-"""Step of the delays tried, s."""
+"""Spacing of the delays searched, s."""
 
-_DELAYS: Final = 400  # Most delays tried at that step; a slower hammer is tried at as many, farther apart
+_DELAYS: Final = 400  # Maximum number of delays searched; a slow hammer gets a wider spacing instead
 
 PATIENCE: Final = 3.0
-"""How long a dot is waited for after its firing, in times of the single pulse from firing to leaving."""
+"""Time to wait for a dot after its firing, in times from firing to departure of the single pulse."""
 
 _ZOOMS, _PER_ZOOM = 2, 4
 
 
 class Run(Declared):
-    """The longest run of dots of a train that count, one for each firing.
+    """Longest run of consecutive dots within the force range and without a backstop touch in between.
 
-    Each has a peak force within limits, and there is no touch of the backstop between the first and the last.
+    Each firing of the run makes one dot.
     """
 
-    first: int = part("number of the firing that made the first dot of the run")
-    forces: tuple[float, ...] = part("peak forces of its dots, in units of that of a single pulse")
+    first: int = part("index of the firing that made the first dot of the run")
+    forces: tuple[float, ...] = part("peak forces of the dots, as fractions of the single-pulse force")
     clear: bool = part(
-        "whether there is no lost dot and no touch of the backstop from the first dot of the train, which"
-        " starts from rest, to the last of the run",
-        more="not only the dots that count, the whole burst stays clear",
+        "whether no dot is lost and the backstop is not touched from the first dot of the train, which starts"
+        " from rest, to the last dot of the run",
+        more="the whole burst stays clear, not only the dots that count",
     )
     touches: tuple[int, int, int] = part(
-        "touches of the backstop before the first dot of the run, between its first and its last, and from"
-        " there to the end of the run of the train",
-        more="which is still long enough for a dot after the last firing",
+        "backstop touches before the first dot of the run, between its first and last dot, and after its last"
+        " dot until the simulation ends",
+        more="the simulation lasts long enough for a dot after the last firing",
     )
 
     @property
     def count(self) -> int:
-        """Number of its dots, which may be 0."""
+        """Number of dots in the run; 0 if no dot counts."""
         return len(self.forces)
 
     @property
@@ -78,7 +80,7 @@ class Run(Declared):
 
     @property
     def touches_text(self) -> str:
-        """The touches of the backstop in words."""
+        """The backstop touches as a sentence for a report."""
         before, between, after = self.touches
         return (
             f"Touches of the backstop: {before} before the first dot that counts, {between} between it and"
@@ -87,26 +89,26 @@ class Run(Declared):
 
 
 class BuzzTrain(Run):
-    """One train that was tried, and its longest run of dots that count."""
+    """A simulated train of pulses and its longest run of dots that count."""
 
     kind: Literal["uniform", "delayed"] = part(
         '"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack'
     )
-    interval: float = part("that period or delay, s")
+    interval: float = part("period of a uniform train or delay of a delayed one, s")
     times: tuple[float, ...] = part("firing times, s")
-    peak_current: float = part("largest value of the drive, A (N under a drive that is a force)")
+    peak_current: float = part("largest value of the drive, A (N for a force drive)")
 
 
 class BuzzSearch(Declared):
     """Result of a search for buzz printing."""
 
-    train: BuzzTrain | None = part("the train found")
-    reason: str = part("why there is none, in one sentence; empty if there is one")
+    train: BuzzTrain | None = part("the best train, if it prints enough dots; otherwise None")
+    reason: str = part("why no train prints enough dots, in one sentence; otherwise empty")
     best: BuzzTrain | None = part(
-        "the best attempt, which is `train` if there is one; None if no dot of any train counts"
+        "the best train simulated, equal to `train` on success; None if no dot of any train counts"
     )
-    reference_force: float = part("peak force of the dot of a single pulse, N; 0 if it makes none")
-    tried: int = part("number of trains tried")
+    reference_force: float = part("peak force of the single-pulse dot, N; 0 if the single pulse makes no dot")
+    tried: int = part("number of trains simulated")
 
 
 def find_buzz_train(
@@ -117,31 +119,32 @@ def find_buzz_train(
     forces: tuple[float, float] = FORCES,
     max_current: float = MAX_CURRENT,
 ) -> BuzzSearch:
-    """Look for a train of the hammer's own waveform that prints without touching the backstop.
+    """Search for a pulse train that prints without touching the backstop.
 
-    Even trains come first, since they need no sensor: periods from half the flight time of a single pulse up
-    to its return to the backstop, ever more finely around the best. If none does and stays clear from its
-    first dot on, delays from the leaving of the pack up to that return, every 2 us or four hundred of them,
-    each train built pulse by pulse. A dot may come late: it is waited for three times as long as a single
-    pulse takes from firing to leaving the pack. Of several, a train that stays clear is preferred, then one
-    with more dots, then the one whose weakest dot is strongest. Same hammer, same result.
+    The search is a grid search over one number, refined around the three best values. Even trains come first,
+    since they need no sensor: periods from half the flight time of a single pulse up to its return to the
+    backstop. If no even train both prints enough dots and stays clear from its first dot on, delayed trains
+    follow: delays from 0, at the departure from the pack, up to the return, every 2 us or 400 delays,
+    whichever is coarser. A delayed train is built firing by firing. A dot is waited for three times as long
+    as a single pulse takes from firing to departure. Trains are ranked by whether they have enough dots, then
+    whether they stay clear, then by the number of dots, then by the weakest dot. The search is deterministic.
 
     Parameters
     ----------
     hammer : Hammer
-        A hammer with waveform, pack and backstop.
+        The hammer; it needs a waveform, a pack and a backstop.
     pulses : int, optional
-        Pulses of a train; it starts from rest, so the first dots may be stronger than those that count.
+        Number of pulses in a train. The train starts from rest, so its first dots may be too strong to count.
     fewest : int, optional
-        Dots that must count.
+        Number of consecutive dots required.
     forces : tuple of float, optional
-        Limits of their peak force, in units of that of a single pulse.
+        Range of the peak forces that count, as fractions of the single-pulse force.
     max_current : float, optional
         Largest sum of the currents of overlapping pulses, A.
 
     Returns
     -------
-    BuzzSearch
+    The train, or the reason for the failure and the best train simulated.
         The train, or the reason why there is none and the best attempt.
 
     Raises
@@ -153,16 +156,16 @@ def find_buzz_train(
 
 
 def longest_run(motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES) -> Run:
-    """Return the longest run of dots whose peak forces count, in units of a reference, N.
+    """Return the longest run of dots with a peak force, over `reference_force` (N), within `forces`.
 
-    Of several of the same length, the first; without a dot that counts all touches come before it.
+    The first run wins a tie. Without a dot that counts, every touch is reported as before the run.
     """
     returns = [contact.t_in for contact in touches(motion)]
     best: list[tuple[int, float, float]] = []
     run: list[tuple[int, float, float]] = []
     opening, clear, stays_clear = math.inf, True, False
     for dot in motion.dots:
-        # A contact still open at the end of the run has not shown its peak force.
+        # The peak force of a contact that is still open at the end of the simulation is unknown.
         if dot.flight_time is None or dot.peak_force is None or dot.contact_time is None:
             run, clear = [], False
             continue
@@ -188,9 +191,9 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 
 
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
-    """Return firing times, s, of which each but the first follows the leaving of the pack by a delay, s.
+    """Compute the firing times, s, of a train that fires a constant delay after each departure from the pack.
 
-    There are fewer firings than `pulses` where one of them makes no dot, so that no leaving follows it.
+    The train is shorter than `pulses` if a firing makes no dot, since no departure follows.
     """
     leaving = _leaving(_run(hammer, [0.0], None))
     return (0.0,) if leaving is None else delayed_trains([hammer], [delay], [PATIENCE * leaving], pulses)[0]
@@ -206,13 +209,13 @@ def delayed_trains(
     hopeless: Callable[[DotTable, list[int]], BoolArray] | None = None,
     **options: Any,
 ) -> list[tuple[float, ...]]:
-    """Return the trains of many hammers and delays, s, built side by side; see `delayed_train`.
+    """Compute delayed trains for many hammers and delays, s, in one ensemble per firing; see `delayed_train`.
 
-    `patience` is how long after a firing the leaving of its dot is waited for, s, and `pulses` the number of
-    firings of a train that is not broken off. The trains start from rest, or from `states`: displacement, m,
-    and velocity, m/s. `hopeless` is called with the dots of trains that still grow, and their numbers, and
-    returns which of them are broken off. Further `options` are the `tolerance` of the runs and `threads`, as
-    for `printhammer.Ensemble`.
+    `patience` is the time, s, to wait for a departure after each firing, and `pulses` the number of firings
+    of a complete train. The trains start from rest, or from `states`: displacement, m, and velocity, m/s.
+    `hopeless` is called with the dots of the unfinished trains and their indices, and returns a mask of the
+    trains to abandon. Further `options` are the `tolerance` of the simulations and `threads`, as for
+    `printhammer.Ensemble`.
     """
     threads = options.pop("threads", None)
     trains = [[0.0] for _ in delays]
@@ -248,7 +251,7 @@ def _run(hammer: Hammer, times: Sequence[float], patience: float | None) -> Moti
 
 
 def _leaving(motion: Motion) -> float | None:
-    """Return when the dot of the first firing of a motion ends, s; None if there is none."""
+    """Return the time, s, at which the dot of the first firing ends; None if the firing makes no dot."""
     dot = motion.dots[0]
     if dot.flight_time is None or dot.contact_time is None or not dot.peak_force:
         return None
@@ -256,7 +259,7 @@ def _leaving(motion: Motion) -> float | None:
 
 
 class _Search:
-    """The search for one hammer."""
+    """The search for one hammer, with its settings and its best train so far."""
 
     def __init__(
         self, hammer: Hammer, pulses: int, fewest: int, forces: tuple[float, float], max_current: float
@@ -289,11 +292,11 @@ class _Search:
     def result(self) -> BuzzSearch:
         if not self.reference:
             return BuzzSearch(None, "a single pulse makes no dot", None, 0.0, 0)
-        # Sooner than half a flight time after the last firing, the armature has hardly answered it.
+        # Within half a flight time of the last firing, the armature has hardly responded.
         self._scan(np.linspace(0.5 * self.flight, self.back, _PERIODS, endpoint=False), self._even)
         if not self._done:
             way = self.back - self.leaving
-            # At least two delays, where the armature is back at once.
+            # At least two delays, even if the armature returns at once.
             step = min(max(_DELAY_STEP, way / _DELAYS), 0.5 * way)
             self._scan(np.arange(0.0, way, step), self._delayed)
         if self.best is not None and self.best.count >= self.fewest:
@@ -309,11 +312,11 @@ class _Search:
 
     @property
     def _done(self) -> bool:
-        """Whether no better train is to be looked for."""
+        """Whether a train is good enough to end the search."""
         return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
     def _scan(self, grid: np.ndarray, trial: Callable[[Sequence[float]], list[BuzzTrain]]) -> None:
-        """Try a grid and, unless a train is good enough already, finer ones around the three best places."""
+        """Simulate a grid and, unless a train is good enough, finer grids around the three best trains."""
         trains = {train.interval: train for train in trial(grid.tolist())}
         step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):
@@ -342,7 +345,7 @@ class _Search:
         intervals: Sequence[float],
         trains: Sequence[tuple[float, ...]],
     ) -> list[BuzzTrain]:
-        """Try trains; those in which a dot counts and the current is not too large are returned."""
+        """Simulate trains; return those with a dot that counts and a current within the limit."""
         self.tried += len(trains)
         judged = []
         for interval, times in zip(intervals, trains, strict=True):
@@ -356,5 +359,5 @@ class _Search:
         return judged
 
     def _merit(self, train: BuzzTrain) -> tuple[bool, bool, int, float]:
-        """Return what makes one train better than another."""
+        """Return the sort key by which trains are ranked; larger is better."""
         return train.count >= self.fewest, train.clear, train.count, train.weakest

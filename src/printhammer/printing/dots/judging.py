@@ -1,7 +1,4 @@
-"""Whether dots are within limits, and how far each is off.
-
-How far a dot may be off: limits on force, arrival and extra contacts.
-"""
+"""Judging of dots: deviations of force and arrival from the single-pulse dot, and the limits on them."""
 
 from __future__ import annotations
 
@@ -18,31 +15,31 @@ from printhammer.run.ensemble import DotTable
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
-"""What may be wrong with a wanted dot, in the order of the search; "not run": the run ended before."""
+"""Faults of a requested dot, in the order of precedence; "not run": the simulation ended before the dot."""
 
 
 class Judgement(Declared):
-    """How far dots are off."""
+    """Deviations of dots from the single-pulse dot, and the limits that judge them."""
 
     wanted: BoolArray = column(
-        "1", "where a dot is judged; the others are False and NaN in all that follows", "member firing"
+        "1", "where a dot is judged; elsewhere the other columns are False or NaN", "member firing"
     )
-    run: BoolArray = column("1", "whether the run came so far", "member firing")
+    run: BoolArray = column("1", "whether the simulation reached the dot", "member firing")
     lost: BoolArray = column("1", "whether the firing made no dot", "member firing")
     force_deviation: FloatArray = column(
-        "1", "peak force less that of the single pulse, in parts of it; NaN for a lost dot", "member firing"
+        "1", "relative deviation of the peak force from the single pulse; NaN for a lost dot", "member firing"
     )
     arrival_deviation: FloatArray = column(
-        "s", "touch less slot time and single-pulse flight time", "member firing", more="NaN for a lost dot"
+        "s", "touch minus slot time and single-pulse flight time", "member firing", more="NaN for a lost dot"
     )
     extra_contacts: IntArray = column("1", "further pack contacts", "member firing")
-    limits: Limits = part("by which it is judged")
+    limits: Limits = part("limits that the dots are judged by")
 
     @property
     def faults(self) -> IntArray:
-        """Number of the first fault of each wanted dot in `FAULTS`; -1 for a good one and an unwanted one."""
+        """Index in `FAULTS` of the first fault of each dot; -1 for a good dot and where no dot is judged."""
         first = np.full(self.wanted.shape, -1)
-        # Compared the other way round, a NaN would pass.
+        # The comparisons are negated so that NaN counts as a fault.
         with np.errstate(invalid="ignore"):
             wrong = (
                 ~self.run,
@@ -57,12 +54,12 @@ class Judgement(Declared):
 
     @property
     def good(self) -> BoolArray:
-        """Which wanted dots are within limits."""
+        """Mask of the requested dots that are within limits."""
         return np.asarray(self.wanted & (self.faults < 0))
 
     @property
     def passed(self) -> BoolArray:
-        """Which members have all wanted dots within limits, shape (members,)."""
+        """Mask of the members whose requested dots are all within limits, shape (members,)."""
         return np.asarray((self.faults < 0).all(axis=1))
 
 
@@ -74,12 +71,13 @@ def judge(
     limits: Limits,
     ok: BoolArray | None = None,
 ) -> Judgement:
-    """Judge dots by what their firings did, one firing for each dot.
+    """Judge the dots of an ensemble, one firing per dot.
 
-    `wanted` (members, firings) says which dots to judge; those of a lead-in, for instance, are not.
-    `slot_times` (members, firings), s, need not be those of the firings, and are of no matter where no dot is
-    judged. The `nominal` dot, of the single pulse, is one for all members, or one for each. `ok` (members,)
-    says which runs reached their ends: the last dot of one that did not is not run, its contact may be open.
+    `wanted` (members, firings) is the mask of dots to judge; the dots of a lead-in, for instance, are
+    excluded. `slot_times` (members, firings), s, may differ from the firing times, and are ignored where no
+    dot is judged. `nominal` is the single-pulse dot: one for all members, or one for each. `ok` (members,)
+    says which simulations reached their ends; in the others the last dot counts as "not run", since its
+    contact may be open.
     """
     shape = dots.fired.shape
     for name, values in (("wanted", wanted), ("slot_times", slot_times)):
@@ -109,16 +107,16 @@ def judge(
 
 
 class Limits(Declared):
-    """How far a dot may differ from that of the single pulse. A lost dot is never within limits."""
+    """Limits on the deviation of a dot from the single-pulse dot. A lost dot is never within limits."""
 
     force: float = part(
-        "largest deviation of the peak force to either side, in parts of the single-pulse force", default=0.1
+        "largest absolute deviation of the peak force, relative to the single-pulse force", default=0.1
     )
     arrival: float = part(
-        "largest deviation of the touch from slot time plus single-pulse flight time, to either side, s",
+        "largest absolute deviation of the touch from slot time plus single-pulse flight time, s",
         default=50e-6,
     )
-    extra_contacts: int = part("largest number of further pack contacts", default=0)
+    extra_contacts: int = part("largest number of extra pack contacts", default=0)
 
     def __post_init__(self) -> None:
         for name, unit in (("force", ""), ("arrival", " s"), ("extra_contacts", "")):
@@ -132,7 +130,7 @@ class Limits(Declared):
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The limits in plain text, with microseconds."""
         return (
             f"force within {100.0 * self.force:g} %, arrival within {1e6 * self.arrival:g} us,"
             f" {self.extra_contacts} extra contacts"
@@ -140,7 +138,7 @@ class Limits(Declared):
 
     @property
     def said(self) -> str:
-        """In words, as a summary shows them."""
+        """The limits in words, as a summary shows them."""
         return (
             f"force within {100.0 * self.force:g} %, arrival within {quantity(self.arrival, 's')},"
             f" {self.extra_contacts} extra contacts"
@@ -152,20 +150,21 @@ DOT_MATRIX_SPREAD: Final = 200e-6
 are adequate" in dot matrix printing; F. Hendriks, IBM J. Res. Develop. 27 (1983), introduction; s."""
 
 ENGRAVED_SPREAD: Final = 30e-6
-"""Flight-time variation that an engraved-character line printer bears, s. The paper (introduction): "severe
-print quality degradation [...] occurs when the flight time varies more than a few tens of microseconds"."""
+"""Peak-to-peak flight-time variation that an engraved-character line printer tolerates, s. The paper
+(introduction): "severe print quality degradation [...] occurs when the flight time varies more than a few
+tens of microseconds"."""
 
 PRESETS: Final = {
     "slots": Limits(),
     "dot-matrix": Limits(arrival=0.5 * DOT_MATRIX_SPREAD),
     "engraved": Limits(arrival=0.5 * ENGRAVED_SPREAD),
 }
-"""Limits by name. The spreads of the paper are peak to peak, so that half of each is allowed to either side;
-"slots" are the limits by which drives are compared."""
+"""Limits by name. The spreads of the paper are peak to peak, so half of each is allowed to either side;
+"slots" are the default limits, by which drives are compared."""
 
 
 def limits_named(name: str) -> Limits:
-    """Return the limits of a name."""
+    """Return the preset limits with a name from `PRESETS`."""
     if name not in PRESETS:
         raise InputError.of("limits", name, f"one of {', '.join(PRESETS)}")
     return PRESETS[name]

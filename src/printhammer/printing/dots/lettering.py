@@ -1,16 +1,13 @@
-"""Text to dots: broken into print lines, and set in the built-in font or in a TrueType one.
+"""Text to dots: text is broken into print lines and set in the built-in font or a TrueType font.
 
-The built-in font: dots on nine wires, drawn for this program, every printable character of ASCII.
+The built-in font has nine wires and all printable ASCII characters; it was drawn for this program. Characters
+are five columns wide and six columns apart: ten characters per inch at a column pitch of 1/60 in. Every
+column is a slot in which a wire may be fired, so horizontal strokes are printed at the full slot rate; there
+are no half-dot columns.
 
-Characters have five full columns and are six apart, ten to the inch on a column pitch of 1/60 in. Every
-column is a slot in which a wire may be fired, so that level strokes are printed at the full rate of slots;
-there are no half-dot columns.
-
-TrueType fonts as dots: characters rasterised to the wires of a head.
-
-The size is the largest at which all printable characters of ASCII, and those of the text, fit on the wires.
-Dots are as far apart across as wires are, and a dot is set where the outline covers the middle of its cell,
-hinted by the font.
+A TrueType font is rasterised to the wires of a head, at the largest size at which all printable ASCII
+characters, and those of the text, fit on the wires. The horizontal dot spacing equals the wire spacing, and a
+dot is set where the hinted outline covers the centre of its cell.
 """
 
 from __future__ import annotations
@@ -36,7 +33,7 @@ if TYPE_CHECKING:
 NAME: Final = "nine-wire"
 WIRES: Final = 9
 ADVANCE: Final = 6
-"""Columns from one character to the next."""
+"""Columns from the start of one character to the start of the next."""
 
 _COLUMNS: Final = 5
 _STEP: Final = 7
@@ -45,10 +42,10 @@ _DOT: Final = "#"
 
 @cache
 def glyphs() -> Mapping[str, BoolArray]:
-    """Return the dots of every character of the font: arrays (9, 6), wires from the top by columns."""
+    """Return the dots of each character of the built-in font: (9, 6), wires from the top by columns."""
     text = (files("printhammer.printing.dots") / "fonts" / "nine-wire.txt").read_text("utf-8")
     drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
-    # Blank lines part the groups; the first one says what the file is.
+    # Blank lines separate the groups; the first group says what the file is.
     for group in text.split("\n\n")[1:]:
         heading, *rows = group.strip("\n").split("\n")
         for start in range(0, len(heading), _STEP):
@@ -64,12 +61,12 @@ def glyphs() -> Mapping[str, BoolArray]:
 _STANDARD: Final = "mpl-data/fonts/ttf/DejaVuSansMono.ttf"
 _ASCII: Final = string.digits + string.ascii_letters + string.punctuation
 _LARGER: Final = 2
-"""Size from which on the one that fits is looked for, in wires."""
+"""Largest font size to try, in multiples of the number of wires."""
 
 
 def standard_font() -> Path:
-    """Return the font used where the built-in one has too few wires: DejaVu Sans Mono, of matplotlib."""
-    # Found without importing matplotlib, which takes a while.
+    """Return the path of the default outline font, DejaVu Sans Mono, which ships with Matplotlib."""
+    # Located without importing Matplotlib, which is slow.
     spec = find_spec("matplotlib")
     assert spec is not None
     assert spec.origin is not None
@@ -77,12 +74,12 @@ def standard_font() -> Path:
 
 
 class OutlineFont:
-    """A TrueType or OpenType font at the size at which ASCII and a text fit a number of wires.
+    """A TrueType or OpenType font, sized so that ASCII and a text fit on a number of wires.
 
     Raises
     ------
     InputError
-        The file is no font, or its characters do not fit even at the least size.
+        The file is not a font, or its characters do not fit even at the smallest size.
     """
 
     def __init__(self, path: str | Path, wires: int, text: str = "") -> None:
@@ -94,12 +91,12 @@ class OutlineFont:
         self._font, self._base = _fitted(self.path, wires, "".join(sorted(marks)))
 
     def missing(self, text: str) -> list[str]:
-        """Return the characters that the font lacks, each once, in the order in which they come."""
+        """Return the distinct characters of `text` that the font lacks, in order of occurrence."""
         known = _characters(self.path)
         return [mark for mark in dict.fromkeys(text) if ord(mark) not in known]
 
     def glyph(self, mark: str) -> BoolArray:
-        """Return the dots of one character, wires from the top by columns; at least one column."""
+        """Return the dots of one character, wires from the top by columns, with at least one column."""
         from PIL import Image, ImageDraw
 
         width = max(1, round(self._font.getlength(mark)))
@@ -120,7 +117,7 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
 
 @lru_cache(maxsize=16)
 def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
-    """Return the font at the largest size that fits, and the wires above the base line."""
+    """Return the font at the largest size that fits, and the number of wires above the base line."""
     for size in range(_LARGER * wires, 0, -1):
         font = _opened(path, size)
         boxes = [font.getbbox(mark, mode="1", anchor="ls") for mark in marks]
@@ -140,15 +137,15 @@ def _characters(path: Path) -> frozenset[int]:
     return frozenset(FT2Font(str(path)).get_charmap())
 
 
-COLUMNS: Final = 40  # Characters of a print line by default
+COLUMNS: Final = 40  # Default number of characters in a print line
 
 _NAMED: Final = 8
 
 
 def broken(text: str, columns: int = COLUMNS) -> list[str]:
-    """Break a text into print lines of some characters at most, between words where there are any.
+    """Break a text into print lines of at most `columns` characters, between words where possible.
 
-    Line ends in the text stay, and so do empty lines.
+    Line ends and empty lines of the text are kept.
     """
     lines: list[str] = []
     for line in text.splitlines():
@@ -163,7 +160,7 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 def lettered(
     text: str, wires: int = WIRES, font: str | Path | None = None, columns: int = COLUMNS
 ) -> BoolArray:
-    """Set a text in dots, shape (lines, wires, slots), as `Pattern.from_text` does."""
+    """Set a text in dots, shape (lines, wires, slots); see `Pattern.from_text`."""
     if columns < 1:
         raise InputError.of("columns", columns, "1 or more characters in a line", written=str(columns))
     if not text.strip():

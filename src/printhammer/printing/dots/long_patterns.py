@@ -1,8 +1,8 @@
-"""Long patterns by which drives are judged: the de Bruijn cycle, rows of dots, and a line of text.
+"""Long patterns that drives are judged by: the de Bruijn cycle, rows of dots, and a line of text.
 
-A cycle holds every word of eight slots, but at most eight dots in a row. An error may grow from dot to dot,
-and show only in a longer row: rows have 200 slots, with a dot in every one, or in every second or third. The
-text holds all letters and digits in the built-in font, as each wire of a head prints them.
+The cycle holds every word of eight slots, but at most eight dots in a row. An error may grow from dot to dot
+and show only in a longer row, so rows have 200 slots, with a dot in every slot, every second or every third.
+The text holds all letters and digits in the built-in font, one pattern per wire of the head.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slot
 
 ROW: Final = 200  # Number of slots of a row of dots
 
-STEPS: Final = (1, 2, 3)  # Slots from dot to dot of the rows
+STEPS: Final = (1, 2, 3)  # Slots from one dot to the next in the rows
 
 TEXT: Final = "Pack my box with five dozen liquor jugs 0123456789"
 """The line of text: every letter of the alphabet and every digit."""
@@ -25,7 +25,7 @@ KINDS: Final = get_args(Kind)
 
 
 class LongPattern(NamedTuple):
-    """A long pattern: its kind, the slots at which dots are wanted, and the first slot that is judged."""
+    """A long pattern: its kind, the slots of its dots, and the first slot that is judged."""
 
     kind: Kind
     slots: tuple[int, ...]
@@ -39,9 +39,9 @@ def row_of_dots(step: int = 1) -> tuple[int, ...]:
 
 @cache
 def long_patterns() -> tuple[LongPattern, ...]:
-    """Return the cycle after its lead-in, the rows, and a pattern for each wire of the line of text.
+    """Return the cycle with its lead-in, the rows, and one pattern per wire for the line of text.
 
-    Patterns of a kind follow each other.
+    Patterns of the same kind are consecutive.
     """
     wires = [slots_of(wire) for wire in lettered(TEXT, columns=len(TEXT))[0]]
     return (

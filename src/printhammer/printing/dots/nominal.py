@@ -1,4 +1,4 @@
-"""The dot of the single pulse, by which all others are judged."""
+"""The single-pulse dot, the reference that all other dots are judged by."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from printhammer.run.window import wait_of
 
 
 class SinglePulse(Declared):
-    """The dot of one pulse from rest, as far as dots are judged by it."""
+    """Reference values of the dot that one pulse from rest makes."""
 
     force: float = scalar("N", "largest pack force")
-    flight_time: float = scalar("s", "from firing to touch")
+    flight_time: float = scalar("s", "time from firing to touch")
 
 
 class Nominal(SinglePulse):
-    """What one pulse from rest prints."""
+    """The dot that one pulse from rest makes, with its speed, indentation and energies."""
 
-    impact_speed: float = scalar("m/s", "at touch")
+    impact_speed: float = scalar("m/s", "speed at touch")
     indentation: float = scalar("m", "largest indentation")
     loading_work: float = scalar("J", "work done on the pack up to its largest indentation")
-    pack_loss: float = scalar("J", "energy that the pack keeps")
+    pack_loss: float = scalar("J", "energy dissipated in the pack")
 
 
 def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Nominal:
-    """Fire a hammer once from rest, its own waveform or another, and return what it prints.
+    """Simulate one pulse from rest and return its dot; `waveform` replaces the hammer's own waveform.
 
     Raises
     ------
@@ -81,9 +81,9 @@ def single_pulses(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InThreads],
 ) -> list[SinglePulse | None]:
-    """Fire many hammers that have packs once each from rest, their own waveforms or others.
+    """Simulate one pulse from rest for each of many hammers; `waveforms` replace the hammers' own waveforms.
 
-    Where there is no dot, or the run ended early, None is returned.
+    An entry is None where the pulse makes no dot or the simulation ended early. Every hammer needs a pack.
     """
     if not hammers:
         return []
@@ -104,7 +104,7 @@ def single_pulses(
 
 
 def pulse_of(hammer: Hammer, waveform: Waveform | None = None) -> Waveform:
-    """Return a waveform, by default that of the hammer."""
+    """Return `waveform` or, by default, the waveform of the hammer."""
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None:
         raise InputError(

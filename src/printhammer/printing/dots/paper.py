@@ -1,7 +1,7 @@
-"""Paper that is not the same everywhere: stiffness and front of the pack vary along the line.
+"""Paper that varies along the line: stiffness and front of the pack are random functions of position.
 
-Both are normal and independent of each other; what they are at two places d apart is correlated by
-exp(-d / length), as of a first-order autoregressive process. Draws are cut off at three standard deviations.
+Both are normal and independent of each other, with the correlation exp(-d / length) between two positions d
+apart: a first-order autoregressive process. Draws are clipped at three standard deviations.
 
 A paper file is TOML with the keys ``stiffness``, ``front``, ``length`` and ``seed``, each of them optional::
 
@@ -29,17 +29,17 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import shown
 from printhammer.support.files import read_text
 
-_WIDEST: Final = 3.0  # Standard deviations at which a draw is cut off
+_WIDEST: Final = 3.0  # Standard deviations at which a draw is clipped; arbitrary
 _UNITS: Final = {"stiffness": "1", "front": "m", "length": "m"}
 
 
 class Paper(Declared):
-    """How pack stiffness and front vary along a line, about what the hammer has."""
+    """Random variation of pack stiffness and front along a line, about the values of the hammer."""
 
     stiffness: float = part("standard deviation of the stiffness of the pack, relative", default=0.05)
     front: float = scalar("m", "standard deviation of the front of the pack", default=3e-6)
     length: float = scalar("m", "distance over which the correlation falls to 1/e", default=2e-3)
-    seed: int = part("of the draw", default=0)
+    seed: int = part("seed of the random number generator", default=0)
 
     def __post_init__(self) -> None:
         for name in _UNITS:
@@ -62,7 +62,7 @@ class Paper(Declared):
         Raises
         ------
         InputError
-            The file cannot be read, a key is not known, or a value is not what it should be.
+            The file cannot be read, or it has an unknown key or an invalid value.
         """
         text = read_text(Path(path), "the paper file")
         known = [field.name for field in fields(cls)]
@@ -83,14 +83,14 @@ class Paper(Declared):
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The variation in words, for a report."""
         return (
             f"stiffness {100.0 * self.stiffness:g} %, front {1e6 * self.front:g} µm, correlated over"
             f" {1e3 * self.length:g} mm"
         )
 
     def deviations(self, slots: int, pitch: float) -> FloatArray:
-        """Return stiffness and front, (2, slots), in standard deviations, slots a pitch, m, apart."""
+        """Draw stiffness and front, (2, slots), in standard deviations, for a slot pitch in m."""
         rng = np.random.default_rng(self.seed)
         white = rng.standard_normal((2, slots))
         kept = math.exp(-pitch / self.length) if self.length else 0.0
@@ -100,7 +100,7 @@ class Paper(Declared):
         return np.asarray(np.clip(off, -_WIDEST, _WIDEST))
 
     def hammers(self, hammer: Hammer, slots: int, pitch: float) -> tuple[Hammer, ...]:
-        """Return the hammer as it is at each slot, slots a pitch, m, apart; the platen stays."""
+        """Return the hammer at each slot, for a slot pitch in m; the platen does not move."""
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:

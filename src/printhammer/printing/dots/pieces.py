@@ -1,7 +1,8 @@
-"""A run in which the hammer is another one from firing to firing, as where the paper is not the same.
+"""Simulation of a hammer whose pack changes from firing to firing, as on paper that varies along the line.
 
-It is integrated piece by piece. A piece ends at the next firing; or, where the armature is then inside the
-pack of this piece or of the next one, as soon afterwards as it is inside neither: a contact meets one pack.
+The motion is integrated piece by piece. A piece ends at the next firing; if the armature is then inside the
+pack of this piece or of the next one, the piece is extended until the armature is inside neither, so that a
+contact meets a single pack.
 """
 
 from __future__ import annotations
@@ -21,11 +22,11 @@ from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
 from printhammer.run.start import initial_state
 
-_LATER: Final = 5e-6  # By how much the end of a piece is put off while the armature is inside a pack, s
+_LATER: Final = 5e-6  # Step by which a piece is extended while the armature is inside a pack, s; arbitrary
 
 
 class PiecewiseMotion:
-    """What became of such a run: contacts, dots and energy, as `printhammer.run.motion.Motion` has them."""
+    """Piecewise simulation with the contacts, dots and energy of a `printhammer.run.motion.Motion`."""
 
     def __init__(self, hammer: Hammer, drive: Drive, pieces: Sequence[Motion]) -> None:
         self.hammer = hammer
@@ -34,12 +35,12 @@ class PiecewiseMotion:
 
     @property
     def status(self) -> str:
-        """How the run ended."""
+        """Status of the last piece."""
         return self._pieces[-1].status
 
     @property
     def ok(self) -> bool:
-        """Whether the run reached its end."""
+        """Whether the simulation reached its end."""
         return self._pieces[-1].ok
 
     @property
@@ -49,7 +50,7 @@ class PiecewiseMotion:
 
     @property
     def contacts(self) -> list[Contact]:
-        """All contacts in order of touch; one that is open where pieces meet is one contact."""
+        """All contacts in order of touch; a contact that spans two pieces is merged into one."""
         contacts: list[Contact] = []
         for motion in self._pieces:
             for contact in motion.contacts:
@@ -62,7 +63,7 @@ class PiecewiseMotion:
 
     @property
     def dots(self) -> list[Dot]:
-        """What each firing up to the end of the run did."""
+        """The outcome of each firing up to the end of the simulation."""
         dots: dict[int, Dot] = {}
         for motion in self._pieces:
             for dot in motion.dots:
@@ -85,23 +86,24 @@ class PiecewiseMotion:
 def simulate_pieces(
     hammers: Sequence[Hammer], drive: Drive, duration: float, tolerance: float
 ) -> PiecewiseMotion:
-    """Run a drive on a hammer that is another one from each firing on, from the rest of the first one.
+    """Simulate a drive on a hammer that changes at each firing, from the rest state of the first hammer.
 
     Parameters
     ----------
     hammers : sequence of Hammer
-        One for each firing, which differ in their packs only.
+        One hammer for each firing; they may differ only in their packs.
     drive : Drive
-        A current or a force.
+        The drive: a current or a force.
     duration : float
-        End of the run, s, after the last firing.
+        End of the simulation, s; after the last firing.
     tolerance : float
-        Error allowed in one step.
+        Error tolerance per integration step.
 
     Raises
     ------
     InputError
-        Not one hammer for each firing; a voltage, under which a run cannot be taken up again.
+        The number of hammers is not the number of firings; or the drive is a voltage, under which a run
+        cannot be resumed from displacement and velocity alone.
     """
     times = drive.times
     if len(hammers) != len(times):
@@ -139,7 +141,7 @@ def simulate_pieces(
 
 
 def _joined(first: Contact, then: Contact) -> Contact:
-    """Return a contact of two parts."""
+    """Merge two pieces of one contact."""
     higher = then if then.depth > first.depth else first
     return replace(
         first,

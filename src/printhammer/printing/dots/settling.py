@@ -1,4 +1,4 @@
-"""How a hammer settles after a single pulse: settle-out time, rebounds, and the wear of the backstop."""
+"""Settling of a hammer after a single pulse: settle-out time, rebounds, and backstop wear."""
 
 from __future__ import annotations
 
@@ -24,30 +24,30 @@ from printhammer.run.window import wait_of
 from printhammer.support.arrays import BoolArray
 
 SETTLED: Final = 0.01
-"""Distance from rest, in parts of the stroke, within which the armature counts as settled."""
+"""Distance from rest, as a fraction of the stroke, within which the armature counts as settled."""
 
-CYCLE: Final = 20e-3  # Least duration of the run, s
+CYCLE: Final = 20e-3  # Shortest duration of the simulation, s
 
-_WINDOWS: Final = 2.0  # The same in windows
+_WINDOWS: Final = 2.0  # Shortest duration of the simulation, in windows (`printhammer.run.window`)
 _SPACING: Final = 1e-6
 _BISECTIONS: Final = 40
 
 
 class Wear(Declared):
-    """What the backstop bears."""
+    """Load on the backstop: touches, impulse, energy, largest speed and force."""
 
     touches: int = part("number of touches")
     impulse: float = scalar("N s", "sum over the touches of the change of momentum of the armature")
-    loss: float = scalar("J", "energy that the backstop takes")
+    loss: float = scalar("J", "energy dissipated in the backstop")
     largest_speed: float = scalar("m/s", "largest speed at touch")
     largest_force: float | None = scalar(
-        "N", "largest contact force", more="None on a rigid backstop, where it is not finite"
+        "N", "largest contact force", more="None for a rigid backstop, whose force is not finite"
     )
 
 
 @dataclass(frozen=True)
 class Rebound:
-    """An interval above the backstop between two touches: times, s, and height above the backstop, m."""
+    """Interval between two backstop touches: start and end, s, and largest height above the backstop, m."""
 
     start: float
     end: float
@@ -60,25 +60,25 @@ class Rebound:
 
 
 class Settling(Declared):
-    """What follows a single pulse."""
+    """Settling after a single pulse."""
 
     settle_out: float | None = scalar(
         "s",
-        "time from the firing until the armature stays within `SETTLED` of the stroke from its rest",
-        more="None where it does not within `CYCLE` or the window of its runs, see `printhammer.run.window`",
+        "time from the firing until the armature stays within `SETTLED` of the stroke from its rest position",
+        more="None if it has not settled within `CYCLE` or two windows, see `printhammer.run.window`",
     )
     rebounds: int = part("number of rebounds from the backstop higher than `SETTLED` of the stroke")
-    highest: float = part("height of the highest rebound, in parts of the stroke; 0 without any")
+    highest: float = part("height of the highest rebound, as a fraction of the stroke; 0 without a rebound")
     restitution: float | None = part(
-        "speed after the first touch of the backstop over the speed before; None where it does not leave"
+        "speed after the first backstop touch over the speed before; None if the armature does not leave"
     )
-    wear: Wear = part("what the backstop bears until the end of the run")
+    wear: Wear = part("load on the backstop until the end of the simulation")
     coil_work: float = scalar("J", "net work of the coil")
-    status: str = part("how the run ended")
+    status: str = part("status of the simulation")
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
-    """Fire a hammer once from rest, its own waveform or another, and watch it settle."""
+    """Simulate one pulse from rest, by default the hammer's own, and measure the settling."""
     if hammer.position is None:
         raise InputError(
             f"{hammer.path}: the hammer has no backstop",
@@ -109,17 +109,17 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
 
 
 def touches(motion: Motion | PiecewiseMotion) -> list[Contact]:
-    """List the touches of the backstop, the rest at the start excluded."""
+    """List the backstop touches; the contact at rest before the first firing is excluded."""
     return [contact for contact in motion.contacts if contact.surface == "backstop" and not contact.initial]
 
 
 def wear_of(motion: Motion | PiecewiseMotion) -> Wear:
-    """Return what the backstop bears in a motion."""
+    """Compute the load on the backstop in a motion."""
     mass, contacts = motion.hammer.mass, touches(motion)
     forces = [contact.peak_force for contact in contacts if contact.peak_force is not None]
     return Wear(
         touches=len(contacts),
-        # Of a contact that is still open the armature is at rest in the end.
+        # A contact that is still open ends with the armature at rest on the backstop.
         impulse=sum(mass * ((contact.v_out or 0.0) - contact.v_in) for contact in contacts),
         loss=sum(contact.loss for contact in motion.contacts if contact.surface == "backstop"),
         largest_speed=max((-contact.v_in for contact in contacts), default=0.0),
@@ -128,7 +128,7 @@ def wear_of(motion: Motion | PiecewiseMotion) -> Wear:
 
 
 def rebounds(motion: Motion, position: float) -> list[Rebound]:
-    """List the intervals above a backstop at a position, m, between touches."""
+    """List the intervals between consecutive touches of a backstop at `position`, m."""
     times, x = motion.maxima
     intervals = []
     for before, after in itertools.pairwise(touches(motion)):
@@ -140,13 +140,16 @@ def rebounds(motion: Motion, position: float) -> list[Rebound]:
 
 
 def settled_from(away: BoolArray) -> int:
-    """Return the number of the first sample from which on none is away; that of all where the last one is."""
+    """Return the index from which on no sample is away; the number of samples if the last one is away."""
     places = np.flatnonzero(away)
     return int(places[-1]) + 1 if places.size else 0
 
 
 def _settled(motion: Motion, rest: float, limit: float) -> float | None:
-    """Return the last time at which the armature is farther from its rest than a limit, s."""
+    """Locate by bisection the time, s, of the last departure from within `limit` (m) of the rest position.
+
+    The time counts from the firing; None if the armature is never away, or away at the end.
+    """
     count = round((motion.end - motion.start) / _SPACING) + 1
     grid = np.union1d(np.linspace(motion.start, motion.end, count), motion.maxima[0])
     place = settled_from(np.abs(motion.at(grid)[0] - rest) > limit)

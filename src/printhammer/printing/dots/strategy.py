@@ -1,6 +1,7 @@
-"""Strategies: from what is wanted to a drive. Open loop here; tables and feedback are others of the kind.
+"""Drive strategies: functions from a requested dot pattern to a drive.
 
-Patterns of slots: times, one period apart, at each of which a dot is wanted or not.
+The open loop is here; compensation tables and feedback are strategies too. A pattern is a row of slots, times
+one period apart, in each of which a dot is requested or not.
 """
 
 from __future__ import annotations
@@ -20,17 +21,17 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import pulse_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the cycle
+SLOTS: Final = 8  # Number of slots of a pattern from rest, and order of the de Bruijn cycle
 
-LEAD_IN: Final = 64  # Slots of the cycle that are run before the first one that is judged
+LEAD_IN: Final = 64  # Slots simulated before the first judged slot of the cycle
 
 FIRST_SLOT: Final = 1e-3
-"""Time of slot 0 in a run, s: a drive may fire ahead of a slot, and no drive fires before time 0."""
+"""Time of slot 0, s: a drive may fire ahead of a slot, but not before time 0."""
 
 
 @cache
 def eight_slot_patterns() -> BoolArray:
-    """Return the 255 patterns of eight slots in which at least one dot is wanted, (255, 8), read-only.
+    """Return the 255 patterns of eight slots with at least one dot, (255, 8), read-only.
 
     Row n holds the binary digits of n + 1, the most significant one in slot 0.
     """
@@ -44,8 +45,8 @@ def eight_slot_patterns() -> BoolArray:
 def de_bruijn(order: int = SLOTS) -> BoolArray:
     """Return a binary de Bruijn cycle: read around, it holds every word of `order` slots exactly once.
 
-    It is the least one in the order of a dictionary: the Lyndon words whose length divides the order, one
-    after another (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is from 1 to 16,
+    The cycle is the lexicographically smallest one: the concatenation of the Lyndon words whose length
+    divides the order (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is 1 to 16,
     the shape (2**order,); read-only.
     """
     if not 1 <= order <= 16:
@@ -54,7 +55,7 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
         )
     cycle: list[int] = []
     word = [0]
-    # Duval's algorithm: the Lyndon words up to a length, in order.
+    # Duval's algorithm: the Lyndon words up to length `order`, in lexicographic order.
     while word:
         if order % len(word) == 0:
             cycle += word
@@ -69,34 +70,32 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
 
 
 def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> BoolArray:
-    """Return once around the de Bruijn cycle of an order, its own last slots before it.
+    """Return one turn of the de Bruijn cycle, preceded by its own last `lead_in` slots.
 
-    The run begins at rest, `lead_in` slots before the cycle does, with what the cycle ends with. So at every
-    slot that is judged, from number `lead_in` on, the past is that of a cycle without end, for `lead_in`
-    slots at least.
+    The run begins at rest with the lead-in, so that every judged slot, from index `lead_in` on, has the same
+    past as in an endless cycle for at least `lead_in` slots.
     """
     cycle = de_bruijn(order)
     return np.concatenate([np.resize(cycle[::-1], lead_in)[::-1], cycle])
 
 
 def slots_of(pattern: npt.ArrayLike) -> tuple[int, ...]:
-    """Return the numbers of the slots at which a dot is wanted."""
+    """Return the indices of the slots with a dot."""
     return tuple(np.flatnonzero(np.asarray(pattern, dtype=np.bool_)).tolist())
 
 
 def slot_times(slots: Sequence[int] | IntArray, rate: float, first: float = FIRST_SLOT) -> FloatArray:
-    """Return the times of some slots, s; of an array of numbers of slots an array of the same shape."""
+    """Return the times of slots, s, for slot indices of any shape."""
     return first + np.asarray(slots, dtype=np.float64) / rate
 
 
 class Strategy(Protocol):
-    """A way to drive a hammer: a function that gives a drive for each pattern.
+    """A drive strategy: a function that returns a drive for each dot pattern.
 
-    It is called with the hammer that is driven, which may differ from the one that the strategy was made for,
-    the patterns as the numbers of the slots at which dots are wanted, and the slots per second, Hz. Each
-    drive has one firing for each wanted dot, in order; slot 0 is at `FIRST_SLOT` of
-    `printhammer.printing.dots.strategy`, so that a dot may be fired ahead of its slot. What it gives for a
-    pattern must not depend on the others.
+    It is called with the hammer to drive, which may differ from the hammer that the strategy was designed
+    for, the patterns as indices of the slots with a dot, and the slot rate, Hz. Each drive has one firing for
+    each requested dot, in order; slot 0 is at `FIRST_SLOT` of `printhammer.printing.dots.strategy`, so that a
+    dot may be fired ahead of its slot. The drive of a pattern must not depend on the other patterns.
     """
 
     def __call__(
@@ -107,17 +106,17 @@ class Strategy(Protocol):
 
 
 def open_loop(hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> Sequence[Drive]:
-    """Fire the waveform of the hammer at every slot at which a dot is wanted, whatever the hammer does."""
+    """Fire the hammer's waveform at every slot with a dot, without compensation."""
     return OpenLoop()(hammer, patterns, rate)
 
 
 class OpenLoop:
-    """As `open_loop`, with another waveform than that of the hammer.
+    """The open loop with an optional waveform in place of the hammer's own; see `open_loop`.
 
     Parameters
     ----------
     waveform : Waveform, optional
-        What is fired.
+        Waveform to fire; by default that of the hammer.
     """
 
     name = "open loop"
@@ -135,12 +134,12 @@ class OpenLoop:
 def checked_drives(
     strategy: Strategy, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
 ) -> Sequence[Drive]:
-    """Return the drives of a strategy.
+    """Call a strategy and check its drives.
 
     Raises
     ------
     InputError
-        It gives another number of drives, or drives with another number of firings, than is wanted.
+        The number of drives, or the number of firings of a drive, does not match the patterns.
     """
     drives = strategy(hammer, patterns, rate)
     if len(drives) != len(patterns):

@@ -1,4 +1,4 @@
-"""Patterns printed by a strategy: all of them run as one ensemble, and judged."""
+"""Trial printing: simulate patterns under a strategy as one ensemble, and judge the dots."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 
 class Case(NamedTuple):
-    """A hammer at a rate, Hz, and the single-pulse dot by which it is judged."""
+    """A hammer, the single-pulse dot that judges it, and a slot rate, Hz."""
 
     hammer: Hammer
     nominal: SinglePulse
@@ -31,20 +31,20 @@ class Case(NamedTuple):
 
 
 class Trial(Declared):
-    """What became of all patterns in all cases: members by case first, then by pattern."""
+    """Outcome of all patterns in all cases; members are ordered by case, then by pattern."""
 
     cases: tuple[Case, ...] = part("hammers and rates")
-    patterns: tuple[tuple[int, ...], ...] = part("numbers of the slots at which dots are wanted")
-    drives: Sequence[Drive] = part("what drove each member")
+    patterns: tuple[tuple[int, ...], ...] = part("indices of the slots with a dot")
+    drives: Sequence[Drive] = part("drive of each member")
     slots: IntArray = column(
-        "1", "number of the slot of each firing; -1 where there is none", "member firing"
+        "1", "index of the slot of each firing; -1 where there is no firing", "member firing"
     )
-    due: FloatArray = column("s", "time of that slot", "member firing")
-    ends: FloatArray = column("s", "ends of the runs", "member")
-    dots: DotTable = part("what the firings did")
-    judgement: Judgement = part("how far off they are")
-    statuses: tuple[str, ...] = part("how the runs ended")
-    extra: ExtraDots | None = part("extra contacts", more="if asked for", default=None)
+    due: FloatArray = column("s", "slot time of each firing", "member firing")
+    ends: FloatArray = column("s", "end times of the simulations", "member")
+    dots: DotTable = part("dots of the firings")
+    judgement: Judgement = part("deviations and faults of the dots")
+    statuses: tuple[str, ...] = part("status of each simulation")
+    extra: ExtraDots | None = part("extra contacts", more="if requested", default=None)
 
     @property
     def passed(self) -> BoolArray:
@@ -52,7 +52,7 @@ class Trial(Declared):
         return np.asarray(self.judgement.passed.reshape(len(self.cases), -1).all(axis=1))
 
     def rows(self, case: int) -> slice:
-        """Return the places of the members of a case, by its number."""
+        """Return the member indices of a case."""
         return slice(case * len(self.patterns), (case + 1) * len(self.patterns))
 
 
@@ -68,12 +68,12 @@ def attempt(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> Trial:
-    """Print all of some patterns in all of some cases, from rest.
+    """Simulate all patterns in all cases from rest, and judge the dots.
 
-    Patterns are numbers of the slots at which dots are wanted, at least one each; slots before `judged_from`,
-    one for all patterns or one for each, are a lead-in. With `extra` every extra contact is kept too.
+    A pattern lists the indices of its slots with a dot, at least one. Slots before `judged_from`, one index
+    for all patterns or one for each, are a lead-in. With `extra`, every extra contact is recorded.
 
-    Each member has a status: a run that could not go on is no exception, and does not pass.
+    Each member has a status: a simulation that fails raises no exception, and its pattern does not pass.
     """
     own = [checked_drives(strategy, case.hammer, patterns, case.rate) for case in cases]
     drives = joined(own)
@@ -83,7 +83,7 @@ def attempt(
         row[: len(pattern)] = pattern
     rates = np.repeat([case.rate for case in cases], len(patterns))
     due = FIRST_SLOT + slots / rates[:, np.newaxis]
-    # A drive may fire its last dot ahead of the slot, or after it.
+    # A drive may fire its last dot ahead of the slot or after it.
     fired = [fired_of(strategy, case.hammer, each[0]) for case, each in zip(cases, own, strict=True)]
     waits = waits_of([case.hammer for case in cases], fired, effort.threads)
     ends = np.maximum(firings_of(drives).last, due.max(axis=1)) + np.repeat(waits, len(patterns))
@@ -111,6 +111,6 @@ def attempt(
 
 
 def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
-    """Return the waveform that sets the window of runs: the strategy's, the hammer's, or the drive's."""
+    """Return the waveform that sets the simulation length: the strategy's, the hammer's or the drive's."""
     own = getattr(strategy, "waveform", None)
     return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)

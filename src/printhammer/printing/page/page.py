@@ -1,20 +1,19 @@
-"""The printed page: every dot at its true place and as dark as it was struck.
+"""The printed page: the position and darkness of every dot.
 
-Each wire of each print line is a run of its own, from rest; all of them are one ensemble. The carriage passes
-slot n at the time of the slot, n / rate after slot 0, at the speed rate x pitch. A dot lands where the
-carriage is at touch; all dots are shifted together by what the carriage moves in the flight time of the
-single pulse, which a printer allows for. What is left is the placement error: arrival deviation x speed.
+Each wire of each print line is a separate simulation from rest; all of them form one ensemble. The carriage
+passes slot n at n / rate after slot 0, at the speed rate x pitch. A dot lands where the carriage is at touch;
+all dots are shifted together by the carriage travel during the flight time of the single pulse, which a
+printer allows for. The remaining offset is the placement error: arrival deviation x carriage speed.
 
-How dark a dot is: its optical density is that of the single-pulse dot in the proportion of the peak forces,
-so that its darkness, the share of the light that does not come back, is 1 - 10^-density. This is an
-assumption: ink in proportion to force, density in proportion to ink. Dots are as wide as the wire.
+Darkness: the optical density of a dot is that of the single-pulse dot times the ratio of the peak forces, and
+its darkness, the fraction of light absorbed, is 1 - 10^-density. This is an assumption: ink in proportion to
+force, density in proportion to ink. Dots are as wide as the wire.
 
-Print heads: where the wires are, how thick they are, and how dark a dot of theirs is.
-
-The paper says of the head only that its wires are arranged in columns and that the carriage moves a fraction
-of a metre per second. The numbers here are assumptions in the manner of the heads of the time: nine wires
-1/72 in apart and about as thick as that, columns of dots 1/60 in apart, so that a character of six columns
-takes a tenth of an inch; 18 and 24 wires on the same height, thinner.
+Print heads: positions and diameter of the wires, and the darkness of a dot. The paper says of the head only
+that its wires are arranged in columns and that the carriage moves a fraction of a metre per second. The
+defaults are assumptions modelled on heads of the time: nine wires 1/72 in apart and about as thick as that,
+dot columns 1/60 in apart, so that a character of six columns is a tenth of an inch wide; 18 and 24 thinner
+wires over the same height.
 """
 
 from __future__ import annotations
@@ -49,27 +48,27 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 DENSITY: Final = 1.0
-"""Optical density of the dot of a single pulse, an assumption: a tenth of the light comes back."""
+"""Optical density of the single-pulse dot, an assumption: a tenth of the light is reflected."""
 
 _THICKNESS: Final = 4 / 3
 _HEIGHT: Final = 9 * 25.4e-3 / 72
 LINE_GAP: Final = 1 / 3
-"""Between print lines, in parts of the height of the wires."""
+"""Gap between print lines, as a fraction of the height of the wire column."""
 
 
 class Head(Declared):
     """A print head: one column of wires on a carriage."""
 
     wires: int = part("number of wires")
-    wire_pitch: float = scalar("m", "from wire to wire")
+    wire_pitch: float = scalar("m", "distance between neighbouring wires")
     pitch: float = scalar(
-        "m", "from one column of dots to the next", more="carriage speed = rate of slots x pitch"
+        "m", "distance between neighbouring dot columns", more="carriage speed = slot rate x pitch"
     )
-    wire_diameter: float = scalar("m", "also that of a dot")
-    density: float = part("optical density of the dot of a single pulse", default=DENSITY)
+    wire_diameter: float = scalar("m", "diameter of a wire and of its dot")
+    density: float = part("optical density of the single-pulse dot", default=DENSITY)
     line_gap: float = part(
-        "between print lines, in parts of the height of the wires",
-        more="0 for drawings that go on from line to line",
+        "gap between print lines, as a fraction of the height of the wire column",
+        more="0 for drawings that continue from line to line",
         default=LINE_GAP,
     )
 
@@ -83,7 +82,7 @@ class Head(Declared):
 
     @property
     def line_pitch(self) -> float:
-        """From print line to print line, m: the height of the wires, and the gap."""
+        """Distance between print lines, m: the height of the wire column plus the gap."""
         return (1.0 + self.line_gap) * self.wires * self.wire_pitch
 
 
@@ -102,17 +101,17 @@ def head_of(
     density: float = DENSITY,
     line_gap: float = LINE_GAP,
 ) -> Head:
-    """Return a head of an assumed kind: as high as that of nine wires, whatever their number.
+    """Return a head with assumed dimensions, as high as a head of nine wires, whatever the number of wires.
 
     Parameters
     ----------
     wires, density, line_gap
         As for `Head`.
     pitch : float, optional
-        From slot to slot, m; by default 1/60 in for 9 wires, else as from wire to wire.
+        Distance between slots, m; by default 1/60 in for 9 wires, else the wire pitch.
     wire_diameter : float, optional
-        Thickness of the wires, m; by default 0.35, 0.25 and 0.2 mm for 9, 18 and 24 wires, else a third more
-        than from wire to wire.
+        Diameter of the wires, m; by default 0.35, 0.25 and 0.2 mm for 9, 18 and 24 wires, else 4/3 of the
+        wire pitch.
     """
     if wires < 1:
         raise InputError.of("wires", wires, "a positive number", file="head")
@@ -135,54 +134,54 @@ _MOST_DOTS: Final = 5_000_000
 
 
 class Page(Result, rows="dot"):
-    """What was printed: every wanted dot, every extra contact, every run."""
+    """A printed page: every requested dot, every extra contact, every simulation."""
 
-    hammer: Hammer = part("the hammer of every wire")
-    pattern: Pattern = part("what was wanted")
-    head: Head = part("where the wires are, and how thick")
-    rate: float = scalar("Hz", "slots per second")
-    strategy: str = scalar("", "name of the way to drive")
-    nominal: Nominal = part("the dot of the single pulse")
-    limits: Limits = part("by which dots are judged")
-    line: IntArray = column("1", "print line", "dot", more="where a dot is wanted, counted from 0")
-    wire: IntArray = column("1", "wire, the topmost one is 0", "dot")
+    hammer: Hammer = part("hammer of every wire")
+    pattern: Pattern = part("requested dots")
+    head: Head = part("wire positions and diameter")
+    rate: float = scalar("Hz", "slot rate")
+    strategy: str = scalar("", "name of the drive strategy")
+    nominal: Nominal = part("single-pulse dot")
+    limits: Limits = part("limits that the dots are judged by")
+    line: IntArray = column("1", "print line", "dot", more="of the requested dot, counted from 0")
+    wire: IntArray = column("1", "wire; the topmost is 0", "dot")
     slot: IntArray = column("1", "slot", "dot", more="counted from 0")
-    run: BoolArray = column("1", "whether the run came so far", "dot")
+    run: BoolArray = column("1", "whether the simulation reached the dot", "dot")
     lost: BoolArray = column("1", "whether the firing made no dot", "dot")
     fault: IntArray = part(
-        "number of the first fault in `printhammer.printing.dots.judging.FAULTS`",
+        "index of the first fault in `printhammer.printing.dots.judging.FAULTS`",
         more="-1 for a dot within limits",
         repr=False,
     )
     arrival_deviation: FloatArray = column(
         "s",
-        "touch less slot time and nominal flight time",
+        "touch minus slot time and nominal flight time",
         "dot",
-        more="NaN for a lost dot, as in all that follows",
+        more="NaN for a lost dot, as in the columns that follow",
     )
-    flight_time: FloatArray = column("s", "from firing to touch", "dot")
+    flight_time: FloatArray = column("s", "time from firing to touch", "dot")
     peak_force: FloatArray = column("N", "largest pack force", "dot")
     indentation: FloatArray = column("m", "largest indentation", "dot")
-    extra_contacts: IntArray = column("1", "further pack contacts", "dot")
+    extra_contacts: IntArray = column("1", "number of extra pack contacts", "dot")
     extra_of: IntArray = column("1", "dot that the extra contact belongs to", "extra")
     extra_arrival: FloatArray = part(
-        "touch of each extra contact less slot time and nominal flight time, s", repr=False
+        "touch of each extra contact minus slot time and nominal flight time, s", repr=False
     )
     extra_force: FloatArray = column("N", "largest pack force of the extra contact", "extra")
     run_line: IntArray = column(
-        "1", "print line of the run", "member", more="a wire without a wanted dot in a line has none"
+        "1", "print line of the simulation", "member", more="a wire without a dot in a line has no simulation"
     )
-    run_wire: IntArray = column("1", "wire of the run", "member")
-    status: TextArray = column("1", "how the run ended", "member")
-    tolerance: float = part("error allowed in one step of the integration")
+    run_wire: IntArray = column("1", "wire of the simulation", "member")
+    status: TextArray = column("1", "status of the simulation", "member")
+    tolerance: float = part("error tolerance per integration step")
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Title in one line."""
         return f"page printed by {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return what is on the paper: dots, where they are, how dark they are."""
+        """Summarise the page: dots within limits, placement, flight times, darkness."""
         on, count = self.printed, self.line.size
         dots = f"{count} wanted, {int(on.sum())} printed, {int(self.lost.sum())} lost"
         if not self.run.all():
@@ -234,7 +233,7 @@ class Page(Result, rows="dot"):
         }
 
     def entries(self) -> Entries:
-        """Return the columns: those of the fields, faults by name, and places on the paper."""
+        """Return the columns: those of the fields, faults by name, and positions on the paper."""
         (x, y), (extra_x, extra_y) = self.places, self.extra_places
         more = (
             ("fault", "1", "first fault, by the limits", "dot", _FAULTS[self.fault]),
@@ -256,18 +255,18 @@ class Page(Result, rows="dot"):
 
     @property
     def printed(self) -> BoolArray:
-        """Which dots are on the paper."""
+        """Mask of the dots that are on the paper."""
         return self.run & ~self.lost
 
     @property
     def good(self) -> BoolArray:
-        """Which dots are within the limits."""
+        """Mask of the dots that are within limits."""
         return np.asarray(self.fault < 0)
 
     @property
-    @derived("m", "place less wanted place, along the line", "dot")
+    @derived("m", "position minus intended position, along the line", "dot")
     def placement_error(self) -> FloatArray:
-        """How far each dot is from its place, m, positive where the carriage goes; NaN without a dot."""
+        """Distance from the intended position, m, positive in the carriage direction; NaN without a dot."""
         return self.arrival_deviation * self.speed
 
     @property
@@ -277,31 +276,31 @@ class Page(Result, rows="dot"):
         return self.peak_force / self.nominal.force
 
     @property
-    @derived("1", "share of the light that does not come back", "dot")
+    @derived("1", "fraction of light absorbed", "dot")
     def darkness(self) -> FloatArray:
-        """Share of the light that does not come back from the dot, 0 to 1; NaN without one."""
+        """Fraction of light that the dot absorbs, 0 to 1; NaN without a dot."""
         return darkness(self.density)
 
     @property
     def density(self) -> FloatArray:
-        """Optical density of each dot; NaN without one."""
+        """Optical density of each dot; NaN without a dot."""
         return self.head.density * self.force_ratio
 
     @property
     def places(self) -> tuple[FloatArray, FloatArray]:
-        """Where each dot is, m: from the middle of slot 0 to the right, from the topmost wire down."""
+        """Position of each dot, m: from the centre of slot 0 to the right, from the topmost wire down."""
         across, down = self.intended
         return np.asarray(across + self.placement_error), down
 
     @property
     def intended(self) -> tuple[FloatArray, FloatArray]:
-        """Where each dot is wanted, m; as `places`."""
+        """Intended position of each dot, m; coordinates as in `places`."""
         down = self.line * self.head.line_pitch + self.wire * self.head.wire_pitch
         return np.asarray(self.slot * self.head.pitch), np.asarray(down, dtype=np.float64)
 
     @property
     def extra_places(self) -> tuple[FloatArray, FloatArray]:
-        """Where each extra contact is, m; as `places`."""
+        """Position of each extra contact, m; coordinates as in `places`."""
         across, down = self.intended
         return np.asarray(across[self.extra_of] + self.extra_arrival * self.speed), down[self.extra_of]
 
@@ -316,11 +315,11 @@ class Page(Result, rows="dot"):
         return {name: int((self.fault == number).sum()) for number, name in enumerate(FAULTS)}
 
     def worst_place(self, slots: int) -> tuple[int, int]:
-        """Return where the print is worst.
+        """Locate the worst print: return the print line and first slot of the worst window of `slots` slots.
 
-        What counts is the sum, over some slots in a row of a print line, of what is off: a lost dot counts 1,
-        another one its placement error in slots and its deviation in density, an extra contact its density.
-        The place is a print line and the first of its slots, counted from 0; of several the first.
+        The measure is summed over the window: a lost dot counts 1, a printed dot its placement error in slots
+        plus its deviation in density, an extra contact its density. Both indices count from 0; the first
+        window wins a tie.
         """
         off = np.abs(self.placement_error) / self.head.pitch + np.abs(self.density - self.head.density)
         worth = np.where(self.printed, np.nan_to_num(off), 1.0)
@@ -330,13 +329,13 @@ class Page(Result, rows="dot"):
         many = min(slots, self.pattern.slots)
         total = np.cumsum(np.pad(sums, ((0, 0), (1, 0))), axis=1)
         windows = total[:, many:] - total[:, :-many]
-        # Rounding tells no two places apart.
+        # Rounded, so that floating-point noise does not decide between equal windows.
         line, first = np.unravel_index(int(np.argmax(np.round(windows, 9))), windows.shape)
         return int(line), int(first)
 
 
 def darkness(density: npt.ArrayLike) -> FloatArray:
-    """Return the share of the light that does not come back from ink of an optical density."""
+    """Return the fraction of light absorbed by ink of an optical density."""
     return np.asarray(1.0 - 10.0 ** -np.asarray(density, dtype=np.float64))
 
 
@@ -353,28 +352,28 @@ def print_page(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> Page:
-    """Print a pattern, or a text in the built-in font, with a hammer on every wire.
+    """Print a pattern, or a text in the built-in font, with the same hammer on every wire.
 
     Parameters
     ----------
     hammer : Hammer
         The hammer of every wire.
     what : Pattern or str
-        What is wanted; a text is set in the built-in font of nine wires.
+        Requested dots; a text is set in the built-in font of nine wires.
     rate : float or str
-        Slots per second, Hz, or text with a unit: how often a wire may be fired. The carriage moves one pitch
-        in a slot.
+        Slot rate, Hz, or text with a unit: the largest firing rate of a wire. The carriage moves one pitch
+        per slot.
     waveform : Waveform, optional
-        What every firing does in open loop, and the single pulse; by default the hammer's own.
+        Waveform of every firing in open loop, and of the single pulse; by default the hammer's own.
     strategy, limits
         As for `printhammer.safe_rate`.
     head : Head, optional
-        Where the wires are, and how thick; by default `printhammer.printing.page.page.head_of` their number.
+        Wire positions and diameter; by default `printhammer.printing.page.page.head_of` the number of wires.
 
     Returns
     -------
     Page
-        With a status for each run; a run that could not go on is no exception.
+        The page, with a status for each simulation; a failed simulation raises no exception.
     """
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):
@@ -428,7 +427,7 @@ def print_page(
 
 
 def _dots_of(trial: Trial) -> dict[str, Any]:
-    """Return what became of the dots of some wires, one wire after the other."""
+    """Collect the columns of the dots and extra contacts of a trial, wire after wire."""
     ((_hammer, single, _rate),) = trial.cases
     dots, extra, judged, wanted = trial.dots, trial.extra, trial.judgement, trial.slots >= 0
     assert extra is not None

@@ -1,6 +1,6 @@
-"""Patterns: which wire is to make a dot in which slot of which print line.
+"""Patterns: the dots requested of each wire in each slot of each print line, and their files.
 
-Pattern files: dots as TOML or as a bitmap, read and written back.
+Patterns are read from and written to TOML or bitmap files.
 
 A pattern file has four keys, all of them required::
 
@@ -13,11 +13,11 @@ A pattern file has four keys, all of them required::
       ...
     ]
 
-Each row is one wire, each character one slot: ``#`` where a dot is wanted, ``.`` where none is. All rows have
+Each row is one wire, each character one slot: ``#`` for a dot, ``.`` for an empty slot. All rows have
 the same length, and their number is a multiple of `wires`: print line after print line, wires from the top.
 
-In a bitmap every pixel is a slot of a wire; dark and opaque ones are dots. Rows of pixels that are missing in
-the last print line are empty.
+In a bitmap every pixel is a slot of a wire; dark, opaque pixels are dots. Missing pixel rows of the last
+print line are empty.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ FORMAT: Final = 1  # Version of the pattern file format
 
 BITMAPS: Final = {".png": "PNG", ".pbm": "PPM", ".bmp": "BMP"}
 SUFFIXES: Final = (".toml", *BITMAPS)
-"""Ends of names of bitmaps, and of all files that hold patterns."""
+"""File suffixes of bitmaps, and of all pattern files."""
 
 _KEYS: Final = ("format", "name", "wires", "rows")
 _DOT, _EMPTY = "#", "."
@@ -50,9 +50,9 @@ _MOST_PIXELS: Final = 50_000_000
 
 
 def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolArray]:
-    """Read name and dots, shape (lines, wires, slots), as `Pattern.load` does.
+    """Read the name and the dots, shape (lines, wires, slots), of a pattern file; see `Pattern.load`.
 
-    The name of a bitmap is that of the file, without its end.
+    The name of a bitmap is the file name without its suffix.
     """
     source = Path(path)
     suffix = source.suffix.lower()
@@ -67,7 +67,7 @@ def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolA
 
 
 def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArray]:
-    """Read the text of a pattern file; the sentence of an error names key and value."""
+    """Parse the text of a pattern file; `source` is the name used in error messages."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -96,7 +96,7 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArra
 
 
 def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
-    """Return the dots of rows of marks, print line by print line."""
+    """Parse rows of marks into dots, shape (lines, wires, slots)."""
     if len(rows) % wires:
         raise InputError(
             f"{source}: rows has {len(rows)} rows",
@@ -153,7 +153,7 @@ def _bitmap(path: Path, wires: int) -> BoolArray:
 
 
 def pattern_toml(name: str, dots: BoolArray) -> str:
-    """Return the text of a pattern file; reading it back gives the same name and dots."""
+    """Render a pattern as the text of a pattern file; parsing the text restores name and dots."""
     _lines, wires, slots = dots.shape
     marks = np.where(dots.reshape(-1, slots), _DOT, _EMPTY)
     rows = "\n".join(f'  "{"".join(row)}",' for row in marks.tolist())
@@ -162,7 +162,7 @@ def pattern_toml(name: str, dots: BoolArray) -> str:
 
 
 def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
-    """Write a pattern file or a bitmap, as `Pattern.save` does."""
+    """Write a pattern file or a bitmap; see `Pattern.save`."""
     target = Path(path)
     suffix = target.suffix.lower()
     content: Any
@@ -182,26 +182,26 @@ def write_pattern(path: str | Path, name: str, dots: BoolArray) -> None:
 
 MOST_WIRES: Final = 1000
 MOST_CELLS: Final = 50_000_000
-"""Wires of a head and cells of a pattern above which it is refused."""
+"""Largest number of wires of a head, and of cells of a pattern."""
 
 _TITLE: Final = 60
 
 
 class Pattern(Declared):
-    """The dots that are wanted.
+    """The requested dots.
 
     Raises
     ------
     InputError
-        The array is of another shape, too large, or wants no dot at all.
+        The array has the wrong shape, is too large, or contains no dot.
     """
 
-    name: str = part("what it is")
+    name: str = part("name of the pattern")
     dots: BoolArray = column(
         "1",
-        "True where a dot is wanted",
+        "True where a dot is requested",
         "line wire slot",
-        more="lines and wires from the top, slots from the left, each one column of dots; read-only",
+        more="lines and wires from the top, slots from the left, each slot one column of dots; read-only",
     )
 
     def __post_init__(self) -> None:
@@ -233,19 +233,19 @@ class Pattern(Declared):
         Parameters
         ----------
         text : str
-            What to print; line ends in it stay.
+            Text to print; line ends are kept.
         wires : int, optional
             Number of wires.
         font : path, optional
             A TrueType font; by default the built-in font for 9 wires, of
             `printhammer.printing.dots.lettering`, and DejaVu Sans Mono for others.
         columns : int, optional
-            Most characters of a print line.
+            Largest number of characters in a print line.
 
         Raises
         ------
         InputError
-            No text, characters that the font lacks, a font that cannot be read.
+            The text is empty, the font lacks a character, or the font file cannot be read.
         """
         if not 1 <= wires <= MOST_WIRES:
             raise InputError.of("wires", wires, f"1 to {MOST_WIRES}", written=str(wires))
@@ -264,12 +264,13 @@ class Pattern(Declared):
         path : path
             The file.
         wires : int, optional
-            Number of wires: for a bitmap 9 by default; a pattern file states it, and then it has to be that.
+            Number of wires. For a bitmap, 9 by default; a pattern file states its own number, which must
+            match.
         """
         return cls(*read_pattern(path, wires))
 
     def save(self, path: str | Path) -> None:
-        """Write a pattern file (.toml) or a bitmap (.png, .pbm, .bmp), whole or not at all."""
+        """Write a pattern file (.toml) or a bitmap (.png, .pbm, .bmp); the file is replaced atomically."""
         write_pattern(path, self.name, self.dots)
 
     @property

@@ -1,11 +1,9 @@
-"""The damping study: what backstops and packs of other materials would buy.
+"""The damping study: safe rate and settling with other backstop and pack materials.
 
 "Passive damping methods should be improved, probably requiring a breakthrough in materials", F. Hendriks, IBM
-J. Res. Develop. 27 (1983), discussion. Here materials are exchanged one at a time, the print force being
-kept: the amplitude of the waveform is set anew so that the single pulse prints as hard as before. Then the
-hammer is fired once and watched until it settles, and its safe rate is looked for.
-
-Backstops and packs of other materials, for the damping study.
+J. Res. Develop. 27 (1983), discussion. The study replaces one material at a time at constant print force: the
+amplitude of the waveform is adjusted so that the single pulse prints as hard as before. Then the hammer is
+fired once and simulated until it settles, and its safe rate is computed.
 """
 
 from __future__ import annotations
@@ -40,30 +38,30 @@ from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray, TextArray
 
 KINDS: Final = ("as it is", "hard", "elastomer", "pack")
-"""What may be changed: nothing, the constants of the hard backstop, the backstop for an elastomer, the
-pack."""
+"""What a material changes: nothing, the constants of the hard backstop, the backstop law (to an elastomer),
+or the pack."""
 
 STIFFNESSES: Final = (1.0 / 9.0, 1.0 / 3.0, 3.0)
 DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
-"""Factors on stiffness and damping of a hard backstop."""
+"""Factors on stiffness and damping of a hard backstop; arbitrary."""
 
 ELASTOMERS: Final = (8e7, 8e8)
-"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about what the paper says of them, and ten times
-that."""
+"""Stiffness of the elastomers, N/m^1.5: 10 N at 25 um, about the value that the paper states, and ten times
+that value."""
 
-RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)  # Relaxation times of the elastomers, s
+RELAXATIONS: Final = (0.0, 10e-6, 30e-6, 100e-6, 300e-6)  # Relaxation times of the elastomers, s; arbitrary
 
-PACKS: Final = (0.5, 2.0)  # Factors on the stiffness of the pack
+PACKS: Final = (0.5, 2.0)  # Factors on the stiffness of the pack; arbitrary
 
-PACK_DAMPINGS: Final = (0.1, 0.4)  # Damping ratios of packs of a spring and a dashpot
+PACK_DAMPINGS: Final = (0.1, 0.4)  # Damping ratios of spring-and-dashpot packs; arbitrary
 
 
 class Material(Declared):
-    """What is other than in the hammer that is studied."""
+    """A replacement of one material of the studied hammer."""
 
     kind: str = part("one of `KINDS`")
-    label: str = part("what it is, in a few words")
-    changes: Mapping[str, Any] = part("constants, options and parts as `Hammer.replace` takes them")
+    label: str = part("short description")
+    changes: Mapping[str, Any] = part("constants, options and parts to replace, as for `Hammer.replace`")
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -76,11 +74,11 @@ class Material(Declared):
 
 
 def materials(hammer: Hammer, single: Nominal) -> list[Material]:
-    """List the materials that are studied for a hammer, and its single-pulse dot, unless others are given.
+    """List the default materials for a hammer and its single-pulse dot.
 
-    Hard backstops have other constants of equations (6) and (7); elastomers are after Kuwabara and Kono;
-    packs are softer and harder ones of equation (5), and springs with a dashpot, the spring such that the
-    loading work of the single-pulse dot presses it with the force of that dot.
+    Hard backstops have other constants of equations (6) and (7); elastomers follow Kuwabara and Kono; packs
+    are softer and harder ones of equation (5), and springs with a dashpot. The stiffness of such a spring is
+    chosen so that the loading work of the single-pulse dot compresses it to the force of that dot.
     """
     listed = [Material("as it is", "as it is", {})]
     backstop, pack = hammer.backstop, hammer.pack
@@ -88,7 +86,7 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     if hard is not None and hard.damping is not None and hard.stiffness is not None:
         k, damping = hard.stiffness, hard.damping
         listed += [
-            # The rebound depends on l v / k alone: with both a factor larger, only the duration changes.
+            # The restitution depends on l v / k alone: scaling both only changes the contact time.
             Material(
                 "hard", f"k and l x {f:.2g}", {"backstop.stiffness": f * k, "backstop.damping": f * damping}
             )
@@ -126,13 +124,13 @@ def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     return listed
 
 
-CURRENT: Final = 2.0  # Largest current by default, A
+CURRENT: Final = 2.0  # Default current limit, A
 
-STEP: Final = 25.0  # Step of the grid of rates by default, Hz
+STEP: Final = 25.0  # Default step of the rate grid, Hz
 
 LEAST: Final = 0.6
 MOST: Final = 1.6
-"""Factors on the amplitude between which the one that prints as hard is looked for."""
+"""Range of the amplitude factors searched for the nominal print force."""
 
 _COARSE: Final = 41
 _FINE: Final = 9
@@ -140,23 +138,23 @@ _ROUNDS: Final = 5
 
 
 class DampingStudy(Result):
-    """What other materials do at the same print force.
+    """Effect of other materials at the same print force.
 
-    Where `status` is neither "ok" nor "current limit", the numbers are NaN.
+    The numbers are NaN unless `status` is "ok" or "current limit".
     """
 
-    hammer: Hammer = part("the hammer that is studied")
-    limits: Limits = part("how far a dot may be off, for the safe rates")
-    current_limit: float = scalar("A", "largest current allowed")
-    nominal: Nominal = part("single-pulse dot of the hammer", more="its force is kept")
-    materials: tuple[Material, ...] = part("what is exchanged")
+    hammer: Hammer = part("the studied hammer")
+    limits: Limits = part("limits on the dots, for the safe rates")
+    current_limit: float = scalar("A", "current limit")
+    nominal: Nominal = part("single-pulse dot of the hammer", more="every material prints with its force")
+    materials: tuple[Material, ...] = part("materials that replace those of the hammer")
     status: TextArray = column(
         "",
-        "what became of it",
+        "status of the material",
         "material",
-        more='"ok"; "current limit" where the print force takes more current than is allowed (the numbers'
-        ' are those with that current all the same); "no hammer", "does not rest", "force not reached", or'
-        " how the run ended",
+        more='"ok"; "current limit" if the print force needs a current above the limit (the numbers are then'
+        ' those with that current); "no hammer", "does not rest", "force not reached", or the status of the'
+        " simulation",
     )
     amplitude: FloatArray = column("1", "factor on the amplitude of the waveform", "material")
     peak_current: FloatArray = column("A", "largest current", "material", more="the absolute value")
@@ -166,34 +164,34 @@ class DampingStudy(Result):
         "s",
         "settle-out time",
         "material",
-        more="from the firing until the armature stays within a hundredth of the stroke from rest; NaN where"
-        " it does not within 20 ms or two windows of its runs",
+        more="from the firing until the armature stays within a hundredth of the stroke from rest; NaN if"
+        " it has not settled within 20 ms or two windows",
     )
     rebounds: FloatArray = column("1", "rebounds higher than a hundredth of the stroke", "material")
-    highest: FloatArray = column("1", "highest rebound, in parts of the stroke", "material")
+    highest: FloatArray = column("1", "highest rebound, as a fraction of the stroke", "material")
     restitution: FloatArray = column(
         "1",
         "speed after the first touch of the backstop over the speed before",
         "material",
-        more="0 where the armature does not leave",
+        more="0 if the armature stays on the backstop",
     )
     impulse: FloatArray = column("N s", "change of momentum at the backstop after a single pulse", "material")
-    loss: FloatArray = column("J", "energy that the backstop takes after a single pulse", "material")
+    loss: FloatArray = column("J", "energy dissipated in the backstop after a single pulse", "material")
     backstop_force: FloatArray = column("N", "largest backstop force", "material")
     coil_work: FloatArray = column("J", "net work of the coil in a single pulse", "material")
     safe_rate: FloatArray = column(
-        "Hz", "safe rate", "material", more="NaN where not even the first rate of the grid passes"
+        "Hz", "safe rate", "material", more="NaN if not even the first rate of the grid passes"
     )
-    grid: FloatArray = part("rates that were tried, Hz", repr=False)
-    tolerance: float = part("error allowed in one step of the integration", more="settling excepted")
+    grid: FloatArray = part("grid of rates, Hz", repr=False)
+    tolerance: float = part("error tolerance per integration step", more="except for settling")
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Title in one line."""
         return f"damping study of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return the materials, a row each."""
+        """Tabulate the materials, one row each."""
         rates = [None if math.isnan(rate) else f"{rate:g}" for rate in self.safe_rate.tolist()]
         if self.best is not None:
             rates[self.best] = styled("best", rates[self.best])
@@ -216,24 +214,24 @@ class DampingStudy(Result):
         )
 
     def notes(self) -> dict[str, Any]:
-        """Return limits, print force and the grid of rates."""
+        """Return the limits, the print force and the rate grid."""
         return {"limits": self.limits.text, "single_force": self.nominal.force, **grid_notes(self.grid)}
 
     @property
-    @derived("", "what is exchanged", "material")
+    @derived("", "kind of replacement", "material")
     def kind(self) -> list[str]:
-        """What is exchanged, one of `printhammer.printing.rates.damping.KINDS` each."""
+        """Kinds of the replacements, each one of `printhammer.printing.rates.damping.KINDS`."""
         return [material.kind for material in self.materials]
 
     @property
-    @derived("", "for what", "material")
+    @derived("", "replacement material", "material")
     def label(self) -> list[str]:
-        """For what it is exchanged, in a few words each."""
+        """Short descriptions of the replacement materials."""
         return [material.label for material in self.materials]
 
     @property
     def best(self) -> int | None:
-        """Number of the material with the highest safe rate within the current limit; None without any."""
+        """Index of the material with the highest safe rate within the current limit; None without any."""
         allowed = np.where((self.status == "ok") & ~np.isnan(self.safe_rate), self.safe_rate, -np.inf)
         return int(np.argmax(allowed)) if np.isfinite(allowed).any() else None
 
@@ -254,26 +252,26 @@ def damping_study(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> DampingStudy:
-    """Exchange the materials of backstop and pack, and see what settles sooner and prints faster.
+    """Replace the materials of backstop and pack, and compare settling and safe rates.
 
-    The tolerance is that of print forces and safe rates. Settling is always computed at the default tolerance
+    The tolerance applies to print forces and safe rates. Settling is always computed at the default tolerance
     of `printhammer.simulate`.
 
     Parameters
     ----------
     hammer : Hammer
-        The hammer that is studied, with pack, backstop and waveform.
+        The studied hammer, with pack, backstop and waveform.
     others : sequence of Material, optional
-        What is exchanged; by default those of `printhammer.printing.rates.damping.materials`.
+        Replacements; by default those of `printhammer.printing.rates.damping.materials`.
     current : float or str, optional
-        Largest current allowed, A, or text with a unit.
+        Current limit, A, or text with a unit.
     limits, first, last, step
         As for `printhammer.safe_rate`.
 
     Returns
     -------
     DampingStudy
-        With a status for each material.
+        The study, with a status for each material.
     """
     allowed = read_positive(current, "A", "current")
     grid = rate_grid(first, last, step)
@@ -312,7 +310,7 @@ def damping_study(
         driven.append(made[k].replace("waveform", larger, source="the same print force"))
     dots = single_pulses(driven, effort=effort.quiet)
     for k, exchanged, dot in zip(left.tolist(), driven, dots, strict=True):
-        # At the default tolerance: energies of single runs are not worth a risk.
+        # At the default tolerance: the energies of single runs need it and cost little.
         settling = settle(exchanged)
         wear = settling.wear
         if settling.status != "ok" or dot is None:
@@ -350,11 +348,11 @@ def damping_study(
 
 
 def tuned(hammers: Sequence[Hammer], force: float, effort: Effort) -> FloatArray:
-    """Return factors on the amplitudes of waveforms with which single pulses print with a force.
+    """Compute the amplitude factors with which single pulses print with a given force, N.
 
-    The factor is looked for from `LEAST` to `MOST` on a grid, then on ever finer ones: where the force first
-    rises through that wanted, of several such places the one nearest to 1. It is good to 1e-6; NaN where
-    there is none.
+    The search covers `LEAST` to `MOST` on a grid, then ever finer grids around the crossing where the force
+    first rises through `force`; of several crossings the one nearest to a factor of 1 is refined. Factors are
+    accurate to 1e-6; NaN where no crossing is bracketed.
     """
     scales = np.tile(np.linspace(LEAST, MOST, _COARSE), (len(hammers), 1))
     factors = np.full(len(hammers), np.nan)

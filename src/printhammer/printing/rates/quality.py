@@ -1,4 +1,4 @@
-"""The quality report: what a hammer prints at a rate, how evenly, and what it costs."""
+"""The quality report: dots within limits, spreads, wear and energy of a hammer at a slot rate."""
 
 from __future__ import annotations
 
@@ -47,29 +47,29 @@ from printhammer.run.window import wait_of
 from printhammer.support.arguments import checked
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-PITCH: Final = 25.4e-3 / 60.0  # Distance of neighbouring slots on the paper by default, m: sixty to the inch
+PITCH: Final = 25.4e-3 / 60.0  # Default distance between neighbouring slots on the paper, m: 60 per inch
 
 _SPREADS: Final = {"flight_time": "s", "force": "N", "indentation": "m", "arrival": "s", "placement": "m"}
 
-MOST_SLOTS: Final = 20_000  # Number of slots above which a pattern is refused
+MOST_SLOTS: Final = 20_000  # Largest number of slots in a pattern
 
 
 class Spread(Declared):
-    """How some numbers are spread; of none, all but their number is NaN."""
+    """Statistics of a sample; all but the count are NaN if the sample is empty."""
 
-    count: int = part("how many there are")
+    count: int = part("sample size")
     mean: float = part("mean")
-    deviation: float = part("standard deviation about the mean")
-    low: float = part("least")
-    high: float = part("largest")
+    deviation: float = part("standard deviation")
+    low: float = part("minimum")
+    high: float = part("maximum")
 
     @property
     def peak_to_peak(self) -> float:
-        """Largest less least."""
+        """Maximum minus minimum."""
         return self.high - self.low
 
     def said(self, unit: str, single: float | None = None) -> str:
-        """Return the spread in words, of quantities in a unit, beside that of the single pulse."""
+        """Return the statistics in words, in a unit, with the single-pulse value for comparison."""
         if not self.count:
             return "–"
         mean, most = (quantity(each, unit, bare=True) for each in (self.mean, self.peak_to_peak))
@@ -78,27 +78,27 @@ class Spread(Declared):
 
 
 class Quality(Result):
-    """What a hammer prints at a rate, dot by dot for those that are judged, how evenly, and what it costs."""
+    """Print quality of a hammer at a rate: the judged dots, their statistics, wear and energy."""
 
-    hammer: Hammer = part("what is driven")
-    strategy: str = scalar("", "how, in words")
-    drive: Drive = part("what drove it", repr=False)
-    rate: float = scalar("Hz", "slots per second", name="rate_Hz")
-    wanted: BoolArray = part("the pattern, one for each slot, the lead-in among it", repr=False)
+    hammer: Hammer = part("driven hammer")
+    strategy: str = scalar("", "name of the drive strategy")
+    drive: Drive = part("drive of the run", repr=False)
+    rate: float = scalar("Hz", "slot rate", name="rate_Hz")
+    wanted: BoolArray = part("mask of the slots with a dot, lead-in included", repr=False)
     judged_from: int = scalar(
-        "1", "first slot that is judged", more="those before are a lead-in", name="judged_from_slot"
+        "1", "first judged slot", more="earlier slots are a lead-in", name="judged_from_slot"
     )
-    limits: Limits = part("by which dots are judged")
-    nominal: Nominal = part("the single-pulse dot")
-    slot: IntArray = column("1", "number of the slot", "dot", dtype=np.int32)
+    limits: Limits = part("limits that the dots are judged by")
+    nominal: Nominal = part("single-pulse dot")
+    slot: IntArray = column("1", "index of the slot", "dot", dtype=np.int32)
     flight_time: FloatArray = column(
-        "s", "from firing to touch", "dot", more="NaN for a lost dot, as in all that follows"
+        "s", "time from firing to touch", "dot", more="NaN for a lost dot, as in the columns that follow"
     )
     force: FloatArray = column("N", "largest pack force", "dot")
     indentation: FloatArray = column("m", "largest indentation", "dot")
-    arrival_deviation: FloatArray = column("s", "touch less slot time and nominal flight time", "dot")
+    arrival_deviation: FloatArray = column("s", "touch minus slot time and nominal flight time", "dot")
     lost: BoolArray = column("1", "whether the firing made no dot", "dot", dtype=np.int8)
-    extra_contacts: IntArray = column("1", "further pack contacts", "dot", dtype=np.int32)
+    extra_contacts: IntArray = column("1", "number of extra pack contacts", "dot", dtype=np.int32)
     fault: IntArray = column(
         "1",
         "first fault of the dot, -1 for a good one",
@@ -106,24 +106,24 @@ class Quality(Result):
         dtype=np.int32,
         attrs={"codes": ", ".join(f"{code} {name}" for code, name in enumerate(FAULTS))},
     )
-    wear: Wear = part("what the backstop bears in the whole run", more="lead-in and settle-out included")
-    energy: Ledger = part("energy of the whole run")
+    wear: Wear = part("load on the backstop in the whole run", more="lead-in and settle-out included")
+    energy: Ledger = part("energy ledger of the whole run")
     heat: float | None = part(
-        "heat of the coil in the whole run, J", more="None for a hammer without `coil.resistance`"
+        "coil heat in the whole run, J", more="None for a hammer without `coil.resistance`"
     )
     fired: int = part("number of firings in the whole run")
-    pitch: float = scalar("m", "distance of neighbouring slots on the paper", name="pitch_m")
-    paper: Paper | None = part("how the pack varies along the line", more="None where it does not")
-    status: str = part("how the run ended")
-    tolerance: float = part("error allowed in one step of the integration")
+    pitch: float = scalar("m", "distance between neighbouring slots on the paper", name="pitch_m")
+    paper: Paper | None = part("variation of the pack along the line", more="None for uniform paper")
+    status: str = part("status of the run")
+    tolerance: float = part("error tolerance per integration step")
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Title in one line."""
         return f"quality of {self.hammer.name} at {self.rate:g} Hz"
 
     def summary(self) -> Summary:
-        """Return the figures of the report: dots within limits, spreads, classes of print, wear and work."""
+        """Summarise the report: dots within limits, spreads, classes of print, wear and work."""
         count, good = len(self.slot), int((self.fault < 0).sum())
         what = "the de Bruijn cycle of order 8" if self.judged_from > 0 else f"{len(self.wanted)} slots"
         lost, extra = int(self.lost.sum()), int(self.extra_contacts.sum())
@@ -194,84 +194,85 @@ class Quality(Result):
         return bool((self.fault < 0).all())
 
     @property
-    @derived("1", "part of the wanted dots that are lost")
+    @derived("1", "fraction of requested dots that are lost")
     def missing(self) -> float:
-        """Part of the wanted dots that are lost."""
+        """Fraction of requested dots that are lost."""
         return float(self.lost.mean())
 
     @property
     def flight_time_spread(self) -> Spread:
-        """How the flight times are spread, s."""
+        """Statistics of the flight times, s."""
         return spread_of(self.flight_time)
 
     @property
     def force_spread(self) -> Spread:
-        """How the peak forces are spread, N."""
+        """Statistics of the peak forces, N."""
         return spread_of(self.force)
 
     @property
     def indentation_spread(self) -> Spread:
-        """How the indentations are spread, m."""
+        """Statistics of the indentations, m."""
         return spread_of(self.indentation)
 
     @property
     def arrival_spread(self) -> Spread:
-        """How the arrivals are spread about slot time plus single-pulse flight time, s."""
+        """Statistics of the arrivals relative to slot time plus single-pulse flight time, s."""
         return spread_of(self.arrival_deviation)
 
     @property
     def placement_spread(self) -> Spread:
-        """How far from their places the dots are on the paper, m: arrival deviation times carriage speed."""
+        """Statistics of the placement error on the paper, m: arrival deviation times carriage speed."""
         return spread_of(self.arrival_deviation * self.rate * self.pitch)
 
     @property
-    @derived("1", "whether arrivals vary as little as dot matrix printing bears", name="dot_matrix_tolerance")
+    @derived("1", "whether the arrivals meet the dot-matrix tolerance", name="dot_matrix_tolerance")
     def dot_matrix(self) -> bool:
-        """Whether no dot is lost and arrivals vary by 200 us at most, what dot matrix printing bears.
+        """Whether no dot is lost and the arrivals vary by at most 200 us, as dot matrix printing needs.
 
-        Where every dot is fired at its slot they vary as the flight times do, which are those of the paper.
+        If every dot is fired at its slot, arrivals vary as the flight times do, for which the paper states
+        the limit.
         """
         return self._within(DOT_MATRIX_SPREAD)
 
     @property
-    @derived("1", "whether arrivals vary as little as engraved characters bear", name="engraved_tolerance")
+    @derived("1", "whether the arrivals meet the engraved-character tolerance", name="engraved_tolerance")
     def engraved(self) -> bool:
-        """Whether no dot is lost and arrivals vary by 30 us at most, what engraved characters bear."""
+        """Whether no dot is lost and the arrivals vary by at most 30 us, as engraved characters need."""
         return self._within(ENGRAVED_SPREAD)
 
     def _within(self, peak_to_peak: float) -> bool:
-        # Comparison with the NaN of dots that are lost or not run is False.
+        # Lost dots and dots not run are NaN, which the spread would ignore.
         known = not np.isnan(self.arrival_deviation).any()
         return bool(known and self.arrival_spread.peak_to_peak <= peak_to_peak)
 
     @property
     @derived("N s", "change of momentum at the backstop for each firing", name="backstop_impulse_per_dot_N_s")
     def backstop_impulse(self) -> float:
-        """Change of momentum at the backstop for each firing, N s: wear."""
+        """Change of momentum at the backstop per firing, N s: a measure of wear."""
         return self.wear.impulse / self.fired
 
     @property
-    @derived("J", "energy that the backstop takes for each firing", name="backstop_loss_per_dot_J")
+    @derived("J", "energy dissipated in the backstop for each firing", name="backstop_loss_per_dot_J")
     def backstop_loss(self) -> float:
-        """Energy that the backstop takes for each firing, J: wear."""
+        """Energy dissipated in the backstop per firing, J: a measure of wear."""
         return self.wear.loss / self.fired
 
     @property
     @derived("J", "net work of the drive for each firing", name="work_per_dot_J")
     def work(self) -> float:
-        """Net work of the drive for each firing, J."""
+        """Net work of the drive per firing, J."""
         return (self.energy.coil_work + self.energy.drive_work) / self.fired
 
     @property
     @derived("W", "net work of the drive over the duration of all slots", name="mean_power_W")
     def mean_power(self) -> float:
-        """Net work of the drive over the duration of all slots, W."""
+        """Net work of the drive divided by the duration of all slots, W."""
         return self.work * self.fired * self.rate / len(self.wanted)
 
     @property
-    @derived("W", "heat of the coil over the duration of all slots", name="mean_heat_W")
+    @derived("W", "coil heat over the duration of all slots", name="mean_heat_W")
     def mean_heat(self) -> float | None:
-        """Heat of the coil over the duration of all slots, W; None without `coil.resistance`."""
+        """Coil heat divided by the duration of all slots, W; None without `coil.resistance`."""
         return None if self.heat is None else self.heat * self.rate / len(self.wanted)
 
 
@@ -288,25 +289,25 @@ def quality(
     paper: Paper | None = None,
     tolerance: float = TOLERANCE,
 ) -> Quality:
-    """Print a pattern from rest, and report how well.
+    """Print a pattern from rest, and report its quality.
 
     Parameters
     ----------
     hammer : Hammer
-        What is driven.
+        The hammer to drive.
     rate : float or str
-        Slots per second, Hz, or text with a unit.
+        Slot rate, Hz, or text with a unit.
     pattern : str, int or bool array, optional
-        The slots: text such as "10110111", 1 where a dot is wanted; a number of dots without a gap; or truth
-        values. By default once around the binary de Bruijn cycle of order 8, in which every word of eight
-        slots occurs once, after 64 slots of it that are not judged.
+        The slots: text such as "10110111", 1 for a dot; a number of dots in consecutive slots; or a boolean
+        mask. By default one turn of the binary de Bruijn cycle of order 8, which contains every word of eight
+        slots exactly once, after a lead-in of 64 slots that are not judged.
     strategy, limits, nominal, tolerance
         As for `printhammer.safe_rate`.
     pitch : float or str, optional
-        Distance of neighbouring slots on the paper, m, or text with a unit.
+        Distance between neighbouring slots on the paper, m, or text with a unit.
     paper : Paper, optional
-        How stiffness and front of the pack vary along the line; by default they do not. From the firing of a
-        dot on the pack is that of its slot. A strategy knows nothing of it but what its sensor shows.
+        Variation of pack stiffness and front along the line; by default none. Each dot meets, from its firing
+        on, the pack at its slot. A strategy knows of the variation only through its sensor.
 
     Returns
     -------
@@ -321,7 +322,7 @@ def quality(
     single = single_pulse(hammer, tolerance=tolerance) if nominal is None else nominal
     slots = slots_of(wanted)
     places = None if paper is None else paper.hammers(hammer, len(wanted), slot_pitch)
-    # A closed loop meets the paper while it drives.
+    # A closed loop senses the paper while it drives.
     along = None if places is None else getattr(strategy, "along", None)
     way = strategy if along is None else along(places)
     drive = checked_drives(way, hammer, [slots], slot_rate)[0]
@@ -372,7 +373,7 @@ def quality(
 
 
 def pattern_of(pattern: str | int | npt.ArrayLike) -> BoolArray:
-    """Read a pattern as `quality` takes it: where dots are wanted, slot by slot."""
+    """Convert a pattern, as `quality` accepts it, to a mask of the slots with a dot."""
     if isinstance(pattern, str):
         if not pattern or set(pattern) - {"0", "1"}:
             raise InputError.of("pattern", pattern, "slots such as '10110111'")
@@ -399,7 +400,7 @@ def _verdict(good: bool, what: str) -> str:
 
 
 def spread_of(values: FloatArray) -> Spread:
-    """Return how numbers are spread; NaN among them are left out."""
+    """Compute the statistics of numbers; NaN are ignored."""
     known = values[~np.isnan(values)]
     if not known.size:
         return Spread(0, math.nan, math.nan, math.nan, math.nan)
@@ -407,7 +408,7 @@ def spread_of(values: FloatArray) -> Spread:
 
 
 def dot_table(dots: Sequence[Dot], times: FloatArray) -> DotTable:
-    """Return the dots of a motion with its firing times, s, as the table that an ensemble has of a member."""
+    """Return the dots of one motion, with its firing times (s), as an ensemble table of one member."""
 
     def column(name: str) -> FloatArray:
         values = [getattr(dot, name) for dot in dots]

@@ -1,12 +1,12 @@
-"""The safe rate: how fast a hammer prints any pattern of dots well.
+"""The safe rate: the largest slot rate up to which a hammer prints every pattern within limits.
 
-R(limits) is the largest rate of a grid such that at it and at every rate of the grid below it all dots are
-within limits: those of all 255 patterns of eight slots from rest, and those of long patterns. These are the
-binary de Bruijn cycle of order 8, in which every word of eight slots occurs once, after 64 slots of it, rows
-of 200 slots, and a line of text.
+R(limits) is the largest rate of a grid such that, there and at every lower rate of the grid, all dots are
+within limits: those of all 255 patterns of eight slots from rest, and those of the long patterns. The long
+patterns are the binary de Bruijn cycle of order 8, which contains every word of eight slots exactly once,
+after a lead-in of 64 slots; rows of 200 slots; and a line of text.
 
-By default the grid begins at 100 Hz: ten milliseconds are several times the time in which such a
-hammer settles, so that below that every dot is a single pulse from rest.
+By default the grid begins at 100 Hz: 10 ms is several times the settle-out time of such a hammer, so below
+100 Hz every dot is a single pulse from rest.
 """
 
 from __future__ import annotations
@@ -50,34 +50,32 @@ LAST: Final = 4000.0  # Last rate of the grid, Hz
 
 STEP: Final = 5.0  # Step of the grid, Hz
 
-MOST_RATES: Final = 10_000  # Number of rates above which a grid is refused
+MOST_RATES: Final = 10_000  # Largest number of rates in a grid
 
-_AT_ONCE: Final = 16  # Number of rates of one ensemble
+_AT_ONCE: Final = 16  # Number of rates per ensemble
 _HAMMERS_AT_ONCE: Final = 32
 
 
 class Failure(Declared):
-    """The dot that is off first at the first rate that does not pass."""
+    """The first dot outside the limits at the first rate that does not pass."""
 
-    rate: float = scalar("Hz", "slots per second")
-    pattern: str = part(
-        "the slots up to this dot, 1 where a dot is wanted; of a long pattern the last eight at most"
-    )
+    rate: float = scalar("Hz", "slot rate")
+    pattern: str = part("the slots up to this dot, 1 for a dot; of a long pattern at most the last eight")
     kind: Literal["from rest"] | Kind = part('"from rest", or the kind of the long pattern')
-    slot: int = part("number of its slot; in the cycle counted from the end of the lead-in")
+    slot: int = part("index of the slot; in the cycle counted from the end of the lead-in")
     dot: int = part("number of the dot in its pattern, counted from 1")
     fault: str = part("one of `printhammer.printing.dots.judging.FAULTS`")
     deviation: float = part(
-        "of the force, in parts of the single-pulse force, or of the arrival, s, or number of extra contacts",
-        more="NaN where the fault is another one",
+        "relative force deviation, arrival deviation, s, or number of extra contacts, depending on the fault",
+        more="NaN for the other faults",
     )
     share: float = part(
-        "fraction of the patterns from rest that do not pass at this rate; in a long pattern, of its dots"
+        "fraction of the patterns from rest that fail at this rate; for a long pattern, fraction of its dots"
     )
 
     @property
     def text(self) -> str:
-        """One sentence."""
+        """The failure in one sentence."""
         where = {
             "from rest": f"the last dot of the pattern {self.pattern}",
             "cycle": f"the last dot in the cycle after {self.pattern[:-1]}",
@@ -95,59 +93,57 @@ class Failure(Declared):
 
 
 class SafeRate(Result):
-    """How fast a hammer prints any pattern well."""
+    """The largest rate up to which a hammer prints every pattern within limits."""
 
-    hammer: Hammer = part("what is driven")
-    strategy: str = scalar("", "how, in words")
-    limits: Limits = part("how far a dot may be off")
-    nominal: SinglePulse = part("the single-pulse dot by which the others are judged")
-    rate: float = scalar(
-        "Hz", "the safe rate", more="NaN where not even the first rate passes", name="safe_rate"
-    )
+    hammer: Hammer = part("driven hammer")
+    strategy: str = scalar("", "name of the drive strategy")
+    limits: Limits = part("limits on the dots")
+    nominal: SinglePulse = part("single-pulse dot that judges the others")
+    rate: float = scalar("Hz", "safe rate", more="NaN if not even the first rate passes", name="safe_rate")
     failure: Failure | None = part(
-        "what is wrong first at the next rate", more="None where the grid ends before"
+        "first failure at the next rate", more="None if every rate of the grid passes"
     )
-    rates: FloatArray = coordinate("Hz", "slots per second", "rate", more="those that were run", name="rate")
+    rates: FloatArray = coordinate("Hz", "slot rate", "rate", more="simulated rates only", name="rate")
     passed: BoolArray = column("1", "whether all dots are within limits", "rate", dtype=np.int8)
     force_low: FloatArray = column(
         "1",
-        "least deviation of a force from that of the single pulse",
+        "smallest deviation of a force from that of the single pulse",
         "rate",
-        more="in parts of the latter; NaN where no dot is printed, as in all three that follow",
+        more="relative to the latter; NaN if no dot is printed, as in the three columns that follow",
     )
     force_high: FloatArray = column("1", "largest deviation of a force from that of the single pulse", "rate")
-    arrival_low: FloatArray = column("s", "earliest arrival, less slot time and nominal flight time", "rate")
-    arrival_high: FloatArray = column("s", "latest arrival, less slot time and nominal flight time", "rate")
+    arrival_low: FloatArray = column("s", "earliest arrival, minus slot time and nominal flight time", "rate")
+    arrival_high: FloatArray = column("s", "latest arrival, minus slot time and nominal flight time", "rate")
     lost: IntArray = column("1", "number of lost dots", "rate", dtype=np.int32)
     extra_contacts: IntArray = column("1", "number of extra contacts", "rate", dtype=np.int32)
     long_run: BoolArray = column(
         "1",
-        "whether the long patterns were run after those from rest",
+        "whether the long patterns were simulated",
         "rate",
-        more="they are not where one of these does not pass",
+        more="only if all patterns from rest pass",
         dtype=np.int8,
     )
     multiplier: FloatArray = column(
         "1",
-        "factor by which a small error in a row grows from dot to dot",
+        "multiplier of a small error from dot to dot in a row",
         "rate",
-        more="negative where it alternates; NaN where the row is no periodic orbit, and for a closed loop",
+        more="negative if the error alternates; NaN for a row without a periodic orbit and for a closed loop",
     )
     peak_drive: float = scalar(
         "A",
         "largest absolute value of the drives at the safe rate",
-        more="N of a force; NaN where there is no safe rate",
+        more="in N for a force; NaN if there is no safe rate",
     )
     step: float = scalar("Hz", "step of the grid")
-    tolerance: float = part("error allowed in one step of the integration")
+    tolerance: float = part("error tolerance per integration step")
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Title in one line."""
         return f"safe rate of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return the safe rate and what limits it."""
+        """Summarise the safe rate and its limiting failure."""
         none, waveform = math.isnan(self.rate), self.hammer.waveform
         more = "at least " if self.at_least else ""
         first, last = float(self.rates[0]), float(self.rates[-1])
@@ -174,7 +170,7 @@ class SafeRate(Result):
         return self.failure is None
 
     def notes(self) -> dict[str, Any]:
-        """Return the limits, what fails first and the single pulse."""
+        """Return the limits, the first failure and the single-pulse dot."""
         return {
             "limits": self.limits.text,
             "first_failure": "" if self.failure is None else self.failure.text,
@@ -199,34 +195,33 @@ def safe_rate(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InThreads],
 ) -> SafeRate:
-    """Find the largest rate up to which a hammer prints every pattern well.
+    """Find the largest rate up to which a hammer prints every pattern within limits.
 
     Parameters
     ----------
     hammer : Hammer
-        What is driven.
+        The hammer to drive.
     strategy : Strategy, optional
-        How; by default open loop.
+        Drive strategy; by default open loop.
     limits : Limits, optional
-        How far a dot may be off; by default 10 % of the force, 50 us, no extra contacts.
+        Limits on the dots; by default 10 % of the force, 50 us, no extra contacts.
     nominal : SinglePulse, optional
-        The single-pulse dot by which the others are judged; by default that of the hammer. For a hammer that
-        differs from the one that a drive was made for, that of the latter.
+        The single-pulse dot that judges the others; by default that of the hammer. For a hammer that differs
+        from the design of a drive, pass the dot of the design.
     first, last, step : float or str, optional
         The grid of rates, Hz, or text with a unit.
     stop : bool, optional
-        Whether to stop at the first rate that does not pass; otherwise the rates up to the last one are run
-        as well, for a chart.
+        Whether to stop at the first rate that does not pass; otherwise all rates of the grid are simulated,
+        for a chart.
     long : bool, optional
-        Whether the dots of the cycle, of rows and of a line of text have to be within limits too, beside
-        those of the patterns from rest.
+        Whether the cycle, the rows and the line of text must pass too, besides the patterns from rest.
     progress : callable, optional
-        Called with the rate, Hz, up to which all is run.
+        Called with the last simulated rate, Hz.
 
     Returns
     -------
     SafeRate
-        The rate, what limits it, and the deviations at every rate that was run.
+        The rate, its limiting failure, and the deviations at every simulated rate.
     """
     grid = rate_grid(first, last, step)
     bounds = Limits() if limits is None else limits
@@ -272,7 +267,7 @@ def safe_rate(
         rate=safe,
         failure=failure,
         rates=grid[: len(rows)],
-        # Dear where pulses overlap, so only of the rate that is found.
+        # Expensive where pulses overlap, so computed only at the safe rate.
         peak_drive=max(
             (drive.peak for trial, case in best for drive in trial.drives[trial.rows(case)]), default=math.nan
         ),
@@ -284,19 +279,19 @@ def safe_rate(
 
 
 def _said_of_row(growth: float) -> str:
-    """Return the multiplier of a row, and what comes of it, in words."""
+    """Describe the multiplier of a row in words."""
     more = ": dots alternate, within limits" if growth < -1.0 else ""
     return f"multiplier {growth:+.3f} from dot to dot{more}"
 
 
 def rate_grid(first: float | str, last: float | str, step: float | str) -> FloatArray:
-    """Return a grid of rates, Hz."""
+    """Return a grid of rates, Hz, from `first` to at most `last`."""
     low, high, apart = (
         read_positive(value, "Hz", name) for value, name in ((first, "first"), (last, "last"), (step, "step"))
     )
     if high < low:
         raise InputError.of("last", last, f"a rate not below the first one, {low:g} Hz", said=": expected")
-    # The last rate belongs to the grid also where the division is rounded down.
+    # The last rate belongs to the grid even if the division is rounded down.
     count = math.floor((high - low) / apart * (1.0 + 1e-12)) + 1
     if count > MOST_RATES:
         raise InputError(f"{count} rates", key="rates", expected=f"at most {MOST_RATES}")
@@ -304,23 +299,23 @@ def rate_grid(first: float | str, last: float | str, step: float | str) -> Float
 
 
 def grid_notes(grid: FloatArray) -> dict[str, float]:
-    """Return what the attributes of a Dataset say of a grid of rates, Hz."""
+    """Return the dataset attributes that describe a grid of rates, Hz."""
     step = float(grid[1] - grid[0]) if len(grid) > 1 else 0.0
     return {"first_rate": float(grid[0]), "last_rate": float(grid[-1]), "step": step}
 
 
 def from_rest(*, every: bool) -> list[tuple[int, ...]]:
-    """Return the patterns of eight slots, by the numbers of the slots at which dots are wanted.
+    """Return the patterns of eight slots, each as the indices of the slots with a dot.
 
-    That is `every` one of the 255, or only the 128 that begin with a dot: in an open loop from rest the
-    others are some of these, later.
+    With `every`, all 255; otherwise the 128 that begin with a dot, which are enough in open loop from rest
+    since the other patterns are delayed copies of these.
     """
     patterns = [slots_of(row) for row in eight_slot_patterns()]
     return [slots for slots in patterns if every or slots[0] == 0]
 
 
 def attempt_long(cases: Sequence[Case], strategy: Strategy = open_loop, **options: Any) -> Trial:
-    """Print the long patterns in all cases, with options of `printhammer.printing.dots.trial.attempt`."""
+    """Simulate the long patterns in all cases; options as for `printhammer.printing.dots.trial.attempt`."""
     patterns = long_patterns()
     begin = [pattern.judged_from for pattern in patterns]
     return attempt(cases, [pattern.slots for pattern in patterns], strategy, judged_from=begin, **options)
@@ -333,10 +328,10 @@ def multipliers(
     effort: Effort,
     step: int = 1,
 ) -> FloatArray:
-    """Compute the multipliers of rows with a dot in every `step`-th slot, (rows,).
+    """Compute the multipliers of rows with a dot in every `step`-th slot, shape (hammers,).
 
-    Each row has a hammer and a rate, Hz; see `printhammer.derivatives.rows.row_multipliers`. NaN for a closed
-    loop, which corrects errors itself.
+    Each row belongs to a hammer and a rate, Hz; see `printhammer.derivatives.rows.row_multipliers`. The
+    multipliers are NaN for a closed loop, which corrects errors itself.
     """
     if hasattr(strategy, "along"):
         return np.full(len(hammers), np.nan)
@@ -346,7 +341,7 @@ def multipliers(
 
 
 def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
-    """Return what a safe rate says of one rate, by the names of its fields, from the runs of some cases."""
+    """Return the columns of a safe rate at one rate, from the trials of that rate."""
 
     def joined(name: str) -> npt.NDArray[Any]:
         return np.concatenate(
@@ -369,9 +364,9 @@ def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
 
 
 def _failure(trial: Trial, case: int, *, long: bool) -> Failure:
-    """Return the failure that comes in the earliest slot, of several that of the first pattern.
+    """Return the failure in the earliest slot; the first pattern wins a tie.
 
-    Of long patterns that of the first one that does not pass.
+    For long patterns, only the first pattern that does not pass is searched.
     """
     rows, judgement = trial.rows(case), trial.judgement
     faults, slots = judgement.faults[rows], trial.slots[rows]
@@ -409,9 +404,9 @@ def all_pass(
     limits: Limits,
     effort: Effort,
 ) -> BoolArray:
-    """Return whether all patterns, from rest and long ones, are within limits, for each hammer at a rate.
+    """Whether all patterns, from rest and long, are within limits, for each case (hammer and rate).
 
-    Arguments as for `printhammer.printing.dots.trial.attempt`.
+    Arguments are those of `printhammer.printing.dots.trial.attempt`.
     """
     options: dict[str, Any] = {"limits": limits, "effort": effort}
     patterns = from_rest(every=strategy is not open_loop)
@@ -435,11 +430,10 @@ def safe_rates(
     limits: Limits,
     effort: Effort,
 ) -> FloatArray:
-    """Return the safe rates of some hammers on a grid of ascending rates, Hz; arguments as for `all_pass`.
+    """Compute the safe rates of many hammers on an ascending grid of rates, Hz; arguments as for `all_pass`.
 
-    Each hammer is judged by its own one of `singles`; progress is the number of hammers whose rate
-    is found, and of all. The rate is NaN where not even the first one of the grid passes, and the last
-    one where all pass.
+    Each hammer is judged by its own entry of `singles`; progress counts the hammers whose safe rate is known.
+    The rate is NaN if not even the first rate of the grid passes, and the last rate of the grid if all pass.
     """
     rates = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))

@@ -1,4 +1,4 @@
-"""Tolerance yield: how many hammers of a production still print well, and how fast."""
+"""Tolerance yield: the fraction of a production that prints within limits, and the safe rates."""
 
 from __future__ import annotations
 
@@ -28,77 +28,77 @@ from printhammer.results.summary import (
 from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
-SPREAD: Final = 0.01  # Relative spread of a constant, to either side, by default
+SPREAD: Final = 0.01  # Default relative spread of a constant, to either side; arbitrary
 
-STEP: Final = 25.0  # Step of the grid of rates by default, Hz: coarser than that of one safe rate
+STEP: Final = 25.0  # Default step of the rate grid, Hz: coarser than for a single safe rate
 
-MOST: Final = 100_000  # Number of hammers above which a yield is refused
+MOST: Final = 100_000  # Largest number of hammers in a yield
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"
-"""The constant whose spread is that of its distance from the backstop, since the origin is arbitrary."""
+"""The constant whose spread applies to its distance from the backstop, since the origin of x is arbitrary."""
 
 FIXED: Final = ("backstop.position", "platen")
-"""Constants that have no spread unless it is stated: the origin, and one that enters no force."""
+"""Constants without a default spread: the origin, and the platen, which enters no force."""
 
 
 _SHARES: Final = (0.95, 0.5)
-"""Shares of the hammers whose largest common rates a summary tells."""
+"""Fractions of the hammers whose largest common rates a summary reports."""
 
 
 class ToleranceYield(Result):
-    """Random hammers, and which of them print well."""
+    """Yield of randomly drawn hammers: constants, single-pulse dots, and which print within limits."""
 
-    hammer: Hammer = part("the design")
-    strategy: str = scalar("", "how the hammers are driven, in words")
-    limits: Limits = part("how far a dot may be off")
-    rate: float = part("rate at which they are tried, Hz", more="NaN where their safe rates were looked for")
-    spreads: Mapping[str, float] = part("relative spread of each constant that varies, to either side")
+    hammer: Hammer = part("design hammer")
+    strategy: str = scalar("", "name of the drive strategy")
+    limits: Limits = part("limits on the dots")
+    rate: float = part("slot rate of the test, Hz", more="NaN if safe rates were computed instead")
+    spreads: Mapping[str, float] = part("relative spread of each varying constant, to either side")
     factors: FloatArray = column(
         "1",
-        "constant over that of the design; of the front, its distance",
+        "constant over that of the design; for the front, its distance from the backstop",
         "member constant",
-        more="in the order of `spreads`; the distance of the front is that from the backstop",
+        more="in the order of `spreads`",
         name="factor",
     )
-    judged_by: Judged = scalar("", '"own" or "design"', more="whose single-pulse dot is the measure")
+    judged_by: Judged = scalar("", '"own" or "design"', more="whose single-pulse dot judges the others")
     status: TextArray = column(
         "1",
-        "what became of the hammer",
+        "status of the hammer",
         "member",
-        more='"ok", "no hammer" where the constants make none, "does not rest", "makes no dot"',
+        more='"ok", "no hammer" if the constants are invalid, "does not rest", "makes no dot"',
     )
     single_force: FloatArray = column(
-        "N", "force of the single-pulse dot", "member", more="NaN where there is none"
+        "N", "force of the single-pulse dot", "member", more="NaN if the hammer makes no dot"
     )
     single_flight_time: FloatArray = column(
-        "s", "flight time of the single-pulse dot", "member", more="NaN where there is none"
+        "s", "flight time of the single-pulse dot", "member", more="NaN if the hammer makes no dot"
     )
     passed: BoolArray = column(
         "1",
         "whether every pattern is within limits",
         "member",
-        more="at `rate`, or where there is none at the first rate of the grid",
+        more="at `rate`, or at the first rate of the grid if `rate` is NaN",
         dtype=np.int8,
     )
     safe_rates: FloatArray = column(
         "Hz",
         "safe rate",
         "member",
-        more="NaN where not even the first rate passes, or where it was not looked for",
+        more="NaN if not even the first rate passes, or if safe rates were not computed",
         name="safe_rate",
     )
-    grid: FloatArray = part("rates that were tried, Hz", repr=False)
-    seed: int = scalar("1", "seed of the draw")
-    tolerance: float = part("error allowed in one step of the integration")
+    grid: FloatArray = part("grid of rates, Hz", repr=False)
+    seed: int = scalar("1", "seed of the random draw")
+    tolerance: float = part("error tolerance per integration step")
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Title in one line."""
         return f"tolerance yield of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return the yield, or how safe rates are spread."""
+        """Summarise the yield, or the spread of the safe rates."""
         spreads = sorted(set(self.spreads.values()))
         within = f"{100.0 * spreads[0]:g} %" + (f" to {100.0 * spreads[-1]:g} %" if len(spreads) > 1 else "")
         odd = self.status[self.status != "ok"]
@@ -129,7 +129,7 @@ class ToleranceYield(Result):
         return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
-        """Return limits, spreads and the grid of rates, and the rate where there is one."""
+        """Return the limits, the spreads, the rate grid, and the rate of the test if there is one."""
         return {
             "limits": self.limits.text,
             "spreads": dict(self.spreads),
@@ -138,27 +138,27 @@ class ToleranceYield(Result):
         }
 
     @property
-    @derived("", "what varies", "constant", kind="coordinate")
+    @derived("", "varying constant", "constant", kind="coordinate")
     def constant(self) -> list[str]:
-        """Names of the constants that vary."""
+        """Names of the varying constants."""
         return list(self.spreads)
 
     @property
-    @derived("1", "part of the hammers that pass")
+    @derived("1", "fraction of hammers that pass")
     def share(self) -> float:
-        """Part of the hammers that pass; those that are none or make no dot do not."""
+        """Fraction of hammers that pass; invalid hammers and hammers without a dot count as failures."""
         return float(self.passed.mean())
 
     @property
     def share_error(self) -> float:
-        """Standard error of the share as of a plain random draw; a Sobol sequence does better."""
+        """Standard error of the fraction, as for a simple random sample; the Sobol sequence does better."""
         count = len(self.passed)
-        # Of a share of 0 or 1 the plain formula would say that it is exact.
+        # At 0 or 1 the plain binomial formula would report no error at all.
         share = (self.passed.sum() + 0.5) / (count + 1.0)
         return float(math.sqrt(share * (1.0 - share) / count))
 
     def share_at(self, rate: float) -> float:
-        """Return the part of the hammers whose safe rate is a rate, Hz, or more."""
+        """Return the fraction of hammers whose safe rate is at least `rate`, Hz."""
         return float((self.safe_rates >= rate).mean())
 
 
@@ -179,33 +179,33 @@ def tolerance_yield(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> ToleranceYield:
-    """Draw hammers whose constants are spread about those of a design, and see which print well.
+    """Draw hammers whose constants vary about those of a design, and find which print within limits.
 
-    Every constant is drawn evenly within its spread, by a scrambled Sobol sequence.
+    Every constant is uniform within its spread, drawn by a scrambled Sobol sequence.
 
     Parameters
     ----------
     hammer : Hammer
-        The design.
+        The design hammer.
     rate : float or str, optional
-        Slots per second, Hz, or text with a unit, at which all patterns from rest and the cycle are to be
-        within limits. Without it the safe rate of each hammer is looked for.
+        Slot rate, Hz, or text with a unit, at which all patterns from rest and the long patterns must be
+        within limits. Without it, the safe rate of each hammer is computed.
     number : int, optional
         Number of hammers.
     spreads : float or mapping, optional
-        Relative spread to either side of every constant, or by key, such as {"magnet.Am": 0.02}; constants
-        that are not named then stay as they are.
+        Relative spread to either side: one number for every constant, or a mapping by key, such as
+        {"magnet.Am": 0.02}, in which unnamed constants do not vary.
     seed : int, optional
-        Of the draw.
+        Seed of the random draw.
     judged_by : str, optional
-        "own": the dots of a hammer are judged by its own single pulse, as if each were adjusted; "design": by
-        that of the design.
+        "own": each hammer is judged by its own single-pulse dot, as if each printer were adjusted;
+        "design": all hammers are judged by the dot of the design.
     strategy, limits, first, last, step
         As for `printhammer.safe_rate`.
 
     Returns
     -------
-    ToleranceYield
+    The yield, with a status for each hammer.
         With a status for each hammer.
     """
     count = read_count(number, "number")
@@ -262,12 +262,12 @@ def tolerance_yield(
 
 
 def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, float]:
-    """Return the spread of each constant of a hammer that varies.
+    """Return the spread of each varying constant of a hammer.
 
     Raises
     ------
     InputError
-        A spread is not from 0 to below 1, a constant is not known or zero, or none varies.
+        A spread is negative or at least 1, a constant is unknown or zero, or no constant varies.
     """
     constants = hammer.constants
     wanted: dict[str, Any]
@@ -289,9 +289,9 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
-    """Draw factors on constants, (number, constants), evenly within their spreads to either side.
+    """Draw factors on constants, (number, constants), uniform within the spreads to either side.
 
-    They come from a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
+    The points are a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
     """
     from scipy.stats import qmc
 
@@ -303,7 +303,7 @@ def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
 
 
 def _changes(hammer: Hammer, spreads: Iterable[str], factors: FloatArray) -> list[dict[str, float]]:
-    """Return the constants of the hammers, SI, by the factors on those of the design."""
+    """Return the constants of each drawn hammer, SI, from the factors on those of the design."""
     zero = {key: hammer.origin if key == GAP else 0.0 for key in spreads}
     values = {key: hammer.constants[key].si for key in zero}
     return [

@@ -1,9 +1,8 @@
-"""Unit-to-unit variability: how far the constants of a production are spread, independently.
+"""Unit-to-unit variability of a production, and perturbations of a hammer.
 
-What it states is a diagonal covariance of the constants. Hammers are drawn from it, normally distributed, and
-its sigma points lie one standard deviation to either side of the design along each constant.
-
-Hammers that differ a little from the one that a drive was made for: supply, travel, forms, drift.
+`Variability` is a diagonal covariance of the constants: hammers are drawn from a normal distribution, and its
+sigma points lie one standard deviation to either side of the design along each constant. A `Perturbation` is
+a single deviation from the design of a drive: supply, travel, forms, drift.
 """
 
 from __future__ import annotations
@@ -28,31 +27,29 @@ from printhammer.support.arrays import FloatArray
 
 
 class Perturbation(Declared):
-    """By how much a hammer differs; everything 0 by default."""
+    """Relative changes of a hammer; all 0 by default."""
 
     current: float = part(
-        "relative change of every current, as by the supply rail: 0.03 for 3 % more", default=0.0
+        "relative change of every current, e.g. by the supply voltage: 0.03 for 3 % more", default=0.0
     )
     travel: float = part(
-        "by how much pack and platen lie farther from the armature, m: the wire travel", default=0.0
+        "distance by which pack and platen move away from the armature, m: the wire travel", default=0.0
     )
     forms: float = part(
-        "relative change of the thickness of the pack, the number of forms",
-        more="the platen stays, so that the front of the pack comes nearer",
+        "relative change of the pack thickness, i.e. of the number of forms",
+        more="the platen does not move, so the front of the pack comes nearer",
         default=0.0,
     )
-    magnet: float = part(
-        "relative change of the flux of the permanent magnet, Am of equation (3)", default=0.0
-    )
+    magnet: float = part("relative change of the permanent-magnet flux, Am of equation (3)", default=0.0)
     damping: float = part(
-        "relative change of the damping of the backstop",
-        more="that is l of equation (7), or the relaxation time of an elastomer",
+        "relative change of the backstop damping",
+        more="l of equation (7), or the relaxation time of an elastomer",
         default=0.0,
     )
 
     @property
     def name(self) -> str:
-        """In words, such as "current +3 %, travel -10 µm"; "nominal" where nothing differs."""
+        """The changes in words, such as "current +3 %, travel -10 µm"; "nominal" without a change."""
         words = [
             f"{key} {1e6 * value:+.3g} µm" if key == "travel" else f"{key} {100.0 * value:+.3g} %"
             for key, value in asdict(self).items()
@@ -63,10 +60,10 @@ class Perturbation(Declared):
 
 @checked
 def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
-    """Return a hammer that differs by a perturbation.
+    """Return a perturbed copy of a hammer.
 
-    The current enters equation (3) as Bm I. Every current a factor larger is therefore the same as Bm that
-    factor larger, and a strategy that knows nothing of it stays as it is.
+    The current enters equation (3) as Bm I. Scaling every current is therefore the same as scaling Bm, and a
+    strategy that is unaware of the change needs no modification.
     """
     changes: dict[str, Any] = {}
     for key, value in asdict(by).items():
@@ -125,10 +122,10 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
 def changed(
     hammer: Hammer, changes: Iterable[tuple[Mapping[str, Any], str]]
 ) -> tuple[list[Hammer], list[str]]:
-    """Return hammers with other constants, and what becomes of each: "ok", "no hammer" or "does not rest".
+    """Return modified hammers and the status of each: "ok", "no hammer" or "does not rest".
 
-    For each there is what `Hammer.replace` takes, and its source. Where there are no changes, or there is no
-    hammer with these constants, it is the hammer itself.
+    Each change is a mapping as for `Hammer.replace`, with its source. Without changes, or if the constants
+    are invalid ("no hammer"), the entry is the hammer itself.
     """
     made, status = [], []
     for change, source in changes:
@@ -151,26 +148,22 @@ CONSTANTS: Final = {
     "travel": (("pack.front",),),
     "paper": (("pack.stiffness",),),
 }
-"""The constants that each standard deviation is that of: the first group of which a hammer has any."""
+"""Constants that each standard deviation applies to: the first group with a constant of the hammer."""
 
-_TRIES: Final = 10  # How often as many hammers are drawn as are wanted
+_TRIES: Final = 10  # Maximum number of batches drawn, each of the requested size
 WIDEST: Final = 3.0
-"""Standard deviations at which a draw is cut off."""
+"""Standard deviations at which a draw is clipped; arbitrary."""
 
 
 class Variability(Declared):
-    """Standard deviations of the constants of a production, each constant independent of the others."""
+    """Standard deviations of the constants of a production, independent of each other."""
 
-    magnet: float = part(
-        "of F0 and Am of equation (3), of the area of a pole or the force constant, relative", default=0.01
-    )
-    spring: float = part("of Bs and As of equation (4), of preload and stiffness, relative", default=0.01)
-    damping: float = part("of damping, relaxation time or restitution of the backstop, relative", default=0.2)
-    current: float = part(
-        "of all currents, relative: Bm of equation (3), or the resistance of the coil", default=0.05
-    )
-    travel: float = part("of the distance of pack and platen, m", default=10e-6)
-    paper: float = part("of the stiffness of the pack, relative", default=0.1)
+    magnet: float = part("F0 and Am of equation (3), pole area, or force constant, relative", default=0.01)
+    spring: float = part("Bs and As of equation (4), or preload and stiffness, relative", default=0.01)
+    damping: float = part("damping, relaxation time or restitution of the backstop, relative", default=0.2)
+    current: float = part("all currents, relative: Bm of equation (3), or the coil resistance", default=0.05)
+    travel: float = part("distance of pack and platen, m", default=10e-6)
+    paper: float = part("stiffness of the pack, relative", default=0.1)
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
@@ -183,7 +176,7 @@ class Variability(Declared):
 
     @classmethod
     def of(cls, hammer: Hammer) -> Variability:
-        """Return the usual one, without what a hammer has no constants of."""
+        """Return the default variability, with 0 where a hammer lacks the constants."""
         known = hammer.constants.keys()
         there = {
             name for name, groups in CONSTANTS.items() if known & {key for keys in groups for key in keys}
@@ -192,7 +185,7 @@ class Variability(Declared):
 
     @property
     def text(self) -> str:
-        """In words."""
+        """The standard deviations in words, for a report."""
         words = [
             f"{name} {1e6 * value:g} µm" if name == "travel" else f"{name} {100.0 * value:g} %"
             for name, value in asdict(self).items()
@@ -201,16 +194,16 @@ class Variability(Declared):
         return ", ".join(words) or "none"
 
     def times(self, factor: float) -> Variability:
-        """Return the same with all standard deviations a factor larger."""
+        """Return a copy with all standard deviations scaled by `factor`."""
         return Variability(**{name: factor * value for name, value in asdict(self).items()})
 
     def constants(self, hammer: Hammer) -> dict[str, float]:
-        """Return the standard deviation of each constant of a hammer that varies, in SI.
+        """Return the standard deviation of each varying constant of a hammer, in SI.
 
         Raises
         ------
         InputError
-            The hammer has none of the constants of a standard deviation that is not 0.
+            The hammer has none of the constants of a nonzero standard deviation.
         """
         spread: dict[str, float] = {}
         known = hammer.constants
@@ -231,14 +224,14 @@ class Variability(Declared):
         return spread
 
     def draw(self, hammer: Hammer, count: int, seed: int) -> list[Hammer]:
-        """Return random hammers, normally distributed, no constant beyond three standard deviations.
+        """Draw `count` hammers from the normal distribution, clipped at three standard deviations.
 
-        Those that are no hammers, or do not rest at the backstop, are drawn again.
+        Draws that are invalid, or do not rest at the backstop, are replaced by new draws.
         """
         return [drawn for _row, drawn in self.draw_rows(hammer, count, seed)]
 
     def draw_rows(self, hammer: Hammer, count: int, seed: int) -> list[tuple[FloatArray, Hammer]]:
-        """Draw hammers as `draw` does, each after the deviations of its constants in standard deviations."""
+        """Draw hammers as `draw` does, each with its constants' deviations in standard deviations."""
         rng = np.random.default_rng(seed)
         drawn: list[tuple[FloatArray, Hammer]] = []
         for _ in range(_TRIES):
@@ -258,16 +251,16 @@ class Variability(Declared):
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:
-        """Return the hammers of which one constant is one standard deviation off, up or down."""
+        """Return the sigma points: hammers with one constant shifted by one standard deviation."""
         own = np.eye(len(self.constants(hammer)))
         points = self.hammers(hammer, np.concatenate([own, -own]))
         return [point for point in points if point is not None]
 
     def hammers(self, hammer: Hammer, rows: FloatArray) -> list[Hammer | None]:
-        """Return the hammers whose constants are off by standard deviations (M, constants).
+        """Return the hammers whose constants are shifted by `rows` (M, constants) standard deviations.
 
-        The constants are in the order of `constants`. There is none where it would be no hammer, or not rest
-        at the backstop.
+        The constants are in the order of `constants`. An entry is None if the hammer is invalid or does not
+        rest at the backstop.
         """
         spread = self.constants(hammer)
         changes: list[tuple[dict[str, Any], str]] = []
