@@ -1,4 +1,4 @@
-"""Tables along one more axis that a firmware knows: rail, temperature of the coil, gap, or forms."""
+"""Compensation tables along one more axis known to the firmware: rail, coil temperature, gap, or forms."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _MILLIONTH: Final = 1e-6
 
 @dataclass(frozen=True)
 class Axis:
-    """Something that firmware knows and that changes the hammer."""
+    """A quantity that is known to the firmware and changes the hammer."""
 
     unit: str
     meaning: str
@@ -55,13 +55,13 @@ class Axis:
 
 
 def _on_rail(hammer: Hammer, value: float) -> Hammer:
-    """Return a hammer whose driver is on another rail, V."""
+    """Return the hammer with its driver on another rail, V."""
     _check_driver(hammer, "rail")
     return hammer.replace("waveform.voltage", value)
 
 
 def _warm(hammer: Hammer, value: float) -> Hammer:
-    """Return a hammer whose coil has another temperature, degC."""
+    """Return the hammer with another coil temperature, degC."""
     _check_driver(hammer, "temperature")
     return hammer.replace("coil.temperature", value)
 
@@ -78,7 +78,7 @@ AXES: Final = {
     "temperature": Axis("degC", "temperature of the coil", _warm),
     "gap": Axis(
         "m",
-        "by how much pack and platen lie farther away",
+        "distance by which pack and platen move away",
         lambda hammer, value: perturbed(hammer, Perturbation(travel=value)),
     ),
     "forms": Axis(
@@ -91,14 +91,14 @@ AXES: Final = {
 
 @dataclass(frozen=True)
 class AxisTables:
-    """A table for each of some ascending values of an axis, in SI; between two it is interpolated."""
+    """Tables for ascending values of an axis, SI, with interpolation between them."""
 
     axis: str
     values: tuple[float, ...]
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Return the table for a value; where two ways do not belong together, that of the nearer value."""
+        """Interpolate the table at a value; entries of different branches are taken from the nearer value."""
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -115,7 +115,7 @@ class AxisTables:
         return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return the table for a value as a way to drive a hammer, with the pulses of that value."""
+        """Return the table for a value as a drive strategy, with the pulses of that value."""
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)
@@ -126,9 +126,9 @@ class AxisTables:
         return TableStrategy(table, other)
 
     def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
-        """Return the text of the C header, arrays `[value][rate][history]`, as `CompensationTable` does.
+        """Render the tables as a C header with arrays `[value][rate][history]`, as for one table.
 
-        Values of a gap are in nanometres, those of other axes in millionths. A function of the header
+        Values of a gap are in nanometres, values of other axes in millionths of the SI unit. A C function
         interpolates between them.
         """
         unit, first = checked_tick(tick), self.tables[0]
@@ -147,17 +147,17 @@ class AxisTables:
         return header_text(head, first.rates, times, unit, along)
 
     def quantised(self, tick: float | str) -> AxisTables:
-        """Return the tables as a timer with a tick, s or text, holds them."""
+        """Return the tables rounded to a timer tick, s or text."""
         return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
 
     def size(self, tick: float | str = NANOSECOND) -> int:
-        """Return how many bytes the arrays of the C header take with a tick, s, or text with a unit."""
+        """Return the size of the C header's arrays in bytes, for a tick, s, or text with a unit."""
         times = {name: np.stack([getattr(table, name) for table in self.tables]) for name in COLUMNS}
         bits, first = bits_of(times, checked_tick(tick)), self.tables[0]
         return size_of(first.rates.size, times[COLUMNS[0]].shape[-1], bits, len(self.values))
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the rows of all tables, with the value of the axis in front."""
+        """Return the rows of all tables, with the axis value as first column."""
         import pandas as pd
 
         head = f"{self.axis} [{AXES[self.axis].unit}]"
@@ -167,7 +167,7 @@ class AxisTables:
         return pd.concat(parts, ignore_index=True)
 
     def to_dataset(self) -> xr.Dataset:
-        """Return all tables with the axis as first dimension."""
+        """Return all tables, with the axis as first dimension."""
         import xarray as xr
 
         along = xr.DataArray(np.array(self.values), dims=self.axis, name=self.axis)
@@ -176,9 +176,9 @@ class AxisTables:
         return xr.concat(parts, along, combine_attrs="drop_conflicts")
 
     def save(self, path: str | Path, *, tick: float | str = NANOSECOND, budget: int | None = None) -> None:
-        """Write the tables as a C header (.h), or as .csv, .json, .nc, .zarr or .parquet, by the ending.
+        """Write the tables as a C header (.h), or as .csv, .json, .nc, .zarr or .parquet, by the file suffix.
 
-        A header has times in ticks, s, and no more bytes than a budget.
+        A header has times in ticks, s, and must fit the budget, bytes.
         """
         suffix = Path(path).suffix.lower()
         if suffix == ".h":
@@ -189,7 +189,7 @@ class AxisTables:
             save_dataset(self.to_dataset(), path)
 
     def summary(self) -> Summary:
-        """Return the pulse from rest and how far off the entries are, a row for each value."""
+        """Tabulate the pulse from rest and the worst deviation, one row per axis value."""
         columns = [
             Cells(self.axis, self.values, AXES[self.axis].unit, ".6g"),
             Cells("width from rest", [float(table.width[0, 0]) for table in self.tables], "s"),
@@ -216,7 +216,7 @@ def tune_along(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> AxisTables:
-    """Tune a table for each of some values of an axis; every dot is like the single pulse of the hammer.
+    """Tune a table for each of several axis values; every dot equals the single pulse of the nominal hammer.
 
     Parameters
     ----------
@@ -225,12 +225,12 @@ def tune_along(
     axis : str
         A name of `AXES`.
     values : sequence of float or str
-        Ascending values, in SI, or texts with units; two at least.
+        Ascending values, SI, or text with units; at least two.
 
     Raises
     ------
     InputError
-        The axis is not known, the values do not ascend, or as for `printhammer.tune`.
+        The axis is unknown, the values do not ascend, or as for `printhammer.tune`.
     """
     if axis not in AXES:
         raise InputError.of("axis", axis, f"one of {', '.join(AXES)}")

@@ -1,11 +1,10 @@
-"""Dead time: from switching on to impact, against rail voltage and temperature of the coil.
+"""Dead time: the time from switching on to impact, as a function of rail voltage and coil temperature.
 
-A warm coil draws less current and a low rail lets it rise later, so that a dot comes later and is struck
-less hard. Firmware that knows both fires earlier and longer: for each rail and temperature of a grid the
-hammer's own pulse is fired from rest, and then the pulse is sought, by its width, that gives the same blow:
-a speed of impact, by default that of the hammer's own pulse at its own rail and temperature.
-
-The C header of a dead time: rails, temperatures, tables of times, and a function between their entries.
+A warm coil draws less current and a low rail lets the current rise more slowly, so the dot comes later and
+softer. Firmware that knows both can fire earlier and longer. For each rail and temperature of a grid, the
+hammer's own pulse is simulated from rest; then the pulse width is solved for that gives a constant impact
+speed ("blow"), by default that of the own pulse at the rail and temperature of the hammer file. The results
+can be exported as a C header with tables and an interpolating function.
 """
 
 from __future__ import annotations
@@ -49,9 +48,9 @@ def header_text(
     temperature: FloatArray,
     tables: Mapping[str, FloatArray],
 ) -> str:
-    """Return a C header (C99) with rails in millivolts, tenths of a degree and nanoseconds.
+    """Render a C header (C99) in millivolts, tenths of a degree Celsius, and nanoseconds.
 
-    `tables` are times by name, s, over rails, V, and temperatures, degC; what is NaN becomes 0.
+    `tables` are times, s, by name, over rails, V, and temperatures, degC; NaN becomes 0.
     """
     prefix = c_code.identifier(hammer)
     upper, guard = prefix.upper(), f"{prefix}_dead_time_h".upper()
@@ -109,61 +108,61 @@ static inline int32_t {prefix}_between(
 
 
 MOST: Final = 10_000
-"""Number of pairs of rail and temperature above which a grid is refused."""
+"""Largest number of pairs of rail and temperature in a grid."""
 
 LONGEST: Final = 8.0
-"""Width of the longest pulse, and length of a run, in parts of the flight time at the own rail."""
+"""Width of the longest pulse, and length of a simulation, in flight times at the nominal rail."""
 
 SHORTEST: Final = 1.0 / 64.0
-"""Width of the shortest one, in parts of the flight time with the longest."""
+"""Width of the shortest pulse, as a fraction of the flight time with the longest."""
 
 _DOUBLINGS: Final = 6
-_WIDTH_ERROR: Final = 1e-9  # Of the flight time
-_SAME: Final = 1e-9  # Of the blow
+_WIDTH_ERROR: Final = 1e-9  # Tolerance of the width, in flight times
+_SAME: Final = 1e-9  # Relative tolerance of the blow
 
 
 class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
-    """From switching on to impact, against rail and temperature of the coil."""
+    """Time from switching on to impact, as a function of rail and coil temperature."""
 
-    hammer: Hammer = part("the hammer")
-    blow: float = scalar("m/s", "speed of impact that is the same everywhere")
+    hammer: Hammer = part("driven hammer")
+    blow: float = scalar("m/s", "impact speed that the solved widths give")
     own_width: float = scalar("s", "width of the hammer's own pulse")
-    own_time: float = scalar("s", "time from switching on to impact with it at the own rail and temperature")
+    own_time: float = scalar("s", "time from switching on to impact with it at nominal rail and temperature")
     voltage: FloatArray = coordinate("V", "rail voltage", "voltage")
     temperature: FloatArray = coordinate("degC", "temperature of the coil", "temperature")
     time: FloatArray = column(
         "s",
-        "time from switching on to impact with the own pulse",
+        "time from switching on to impact with the hammer's own pulse",
         "voltage temperature",
-        more="NaN, as the three that follow, where it does not reach what it strikes",
+        more="NaN, as the three columns that follow, if the hammer does not reach the pack",
     )
-    speed: FloatArray = column("m/s", "speed of impact with it", "voltage temperature")
-    current: FloatArray = column("A", "largest current with it", "voltage temperature")
-    heat: FloatArray = column("J", "heat of the coil with it", "voltage temperature")
+    speed: FloatArray = column("m/s", "impact speed with the own pulse", "voltage temperature")
+    current: FloatArray = column("A", "largest current with the own pulse", "voltage temperature")
+    heat: FloatArray = column("J", "coil heat with the own pulse", "voltage temperature")
     status: TextArray = column(
-        "", "how the run with the own pulse ended", "voltage temperature", more="as a motion says it"
+        "", "status of the simulation with the own pulse", "voltage temperature", more="as for a motion"
     )
     strongest: FloatArray = column(
-        "m/s", "speed of impact with a pulse that lasts until then", "voltage temperature"
+        "m/s", "impact speed with a pulse that lasts until impact", "voltage temperature"
     )
     width: FloatArray = column(
         "s",
-        "width of the pulse with the blow",
+        "pulse width that gives the blow",
         "voltage temperature",
-        more="NaN, as the two that follow, where no width gives it",
+        more="NaN, as the two columns that follow, if no width gives the blow",
     )
     width_time: FloatArray = column(
         "s", "time from switching on to impact with that width", "voltage temperature"
     )
-    width_heat: FloatArray = column("J", "heat of the coil with that width", "voltage temperature")
+    width_heat: FloatArray = column("J", "coil heat with that width", "voltage temperature")
 
     @property
     def title(self) -> str:
-        """What it is of."""
+        """Title in one line."""
         return f"dead time of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return the times against rail and temperature, and where no width gives the blow."""
+        """Tabulate the times over rail and temperature, and state where no width gives the blow."""
         own = f"{quantity(self.own_width, 's')}, impact after {quantity(self.own_time, 's')}"
         rail, coil = np.meshgrid(self.voltage, self.temperature, indexing="ij")
         columns = [
@@ -197,22 +196,22 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     @property
     def reached(self) -> float:
-        """Strongest blow reached at every rail and temperature that gives a blow, m/s; 0 without any."""
+        """Largest blow reached at every rail and temperature that gives any, m/s; 0 if none does."""
         known = self.strongest[np.isfinite(self.strongest)]
         return float(known.min()) if known.size else 0.0
 
     def to_header(self) -> str:
-        """Return a C header (C99) with widths and dead times in nanoseconds, and a function between them."""
+        """Render a C header (C99): widths and dead times in nanoseconds, and an interpolating function."""
         tables = {"width": self.width, "dead_time": self.width_time}
         return header_text(self.hammer.name, self.hammer.fingerprint, self.voltage, self.temperature, tables)
 
     def save(self, path: str | Path) -> None:
-        """Write the table, a C header (.h) among others, by the ending of the name; whole or not at all.
+        """Write the table in the format of the file suffix, a C header (.h) among others, atomically.
 
         Raises
         ------
         InputError
-            The name ends in none of `ENDINGS`, or the file cannot be written.
+            The suffix is not one of `ENDINGS`, or the file cannot be written.
         """
         if Path(path).suffix.lower() == ".h":
             write_file(Path(path), self.to_header())
@@ -222,7 +221,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """One firing from rest."""
+    """Outcome of one firing from rest; NaN if nothing is struck."""
 
     time: float = np.nan
     speed: float = np.nan
@@ -241,24 +240,24 @@ def dead_time(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InOneThread],
 ) -> DeadTime:
-    """Find how long a hammer takes from switching on to impact, and which pulse gives the same blow.
+    """Compute the time from switching on to impact, and the pulse width that gives the same blow.
 
     Parameters
     ----------
     hammer : Hammer
-        A hammer whose waveform is a driver on a rail.
+        The hammer, whose waveform must be a driver on a rail.
     voltage : sequence of float or str, optional
-        Rails, V, which are put in order; by default that of the waveform, and 10 % less and more.
+        Rail voltages, V, in any order; by default that of the waveform, and 10 % less and more.
     temperature : sequence of float or str, optional
-        Temperatures of the coil, degC; by default 20, 60 and 100 degC.
+        Coil temperatures, degC; by default 20, 60 and 100 degC.
     blow : float or str, optional
-        Speed of impact, m/s, whose pulse is sought; by default that of the hammer's own pulse at its own rail
+        Impact speed, m/s, that the widths are solved for; by default that of the own pulse at nominal rail
         and temperature, which a lower rail or a warmer coil may not reach.
 
     Raises
     ------
     InputError
-        The hammer has no driver with a width, does not strike at its own rail, or the grid is too large.
+        The hammer has no driver with a width, does not strike at its nominal rail, or the grid is too large.
     """
     waveform = hammer.waveform
     own: Any = waveform
@@ -312,7 +311,7 @@ def dead_time(
 
 
 def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_Fired, float]:
-    """Return the firing at the own rail, and how long a run must be; InputError if nothing is struck."""
+    """Return the firing at the nominal rail, and the simulation length, s; `InputError` without impact."""
     span = 4.0 * float(waveform.width)  # type: ignore[attr-defined]
     for _ in range(_DOUBLINGS):
         fired = _fire(hammer, waveform, span, tolerance)
@@ -327,7 +326,7 @@ def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_F
 
 
 def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fired:
-    """Fire once from rest; NaN where nothing is struck within a time, s."""
+    """Simulate one firing from rest for `span`, s; the numbers are NaN if nothing is struck."""
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.simulate import simulate
 
@@ -343,9 +342,9 @@ def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fi
 def _same_blow(
     hammer: Hammer, pulse: Waveform, wanted: float, longest: _Fired, tolerance: float
 ) -> float | None:
-    """Return the width of a pulse, s, with a speed of impact, m/s; None where there is none.
+    """Solve for the pulse width, s, that gives an impact speed, m/s; return None if no width does.
 
-    What comes after the impact of the longest pulse changes nothing, so that no wider one is asked for.
+    The search ends at the flight time of the longest pulse, since current after the impact has no effect.
     """
     from scipy.optimize import brentq
 
@@ -364,7 +363,7 @@ def _same_blow(
 
 
 def _shortest(pulse: Waveform, width: float) -> float:
-    """Return the least width, s, from one on by powers of two, that a pulse can have."""
+    """Return the smallest width, s, of the form `width` times a power of two, that a pulse accepts."""
     for doubling in range(2 * _DOUBLINGS):
         with suppress(InputError):
             of_width(pulse, width * 2.0**doubling)

@@ -1,26 +1,22 @@
-"""Thermal duty: the largest rate at which a coil stays below a temperature, and how long it stands more.
+"""Thermal duty: the largest dot rate at which a coil stays below a temperature, and the time it bears more.
 
-The coil is one thermal mass, or two: the winding, of temperature T, and the body around it, of temperature B.
+The coil is modelled as one thermal mass, or as two: winding, temperature T, and surrounding body, temperature
+B.
 
-    C dT/dt  = f E(T) - (T - B) / R          winding, of heat capacity C, by the thermal resistance R
-    C' dB/dt = (T - B) / R - (B - A) / R'    body, of C', to an ambient temperature A by R'
+      C dT/dt  = f E(T) - (T - B) / R          winding, heat capacity C, thermal resistance R to the body
+      C' dB/dt = (T - B) / R - (B - A) / R'    body, heat capacity C', R' to the ambient temperature A
 
-f is the number of dots a second and E(T) the heat of one (`printhammer.control.duty`); one mass is the
-winding alone with B = A. When all is steady the winding is f E(T) (R + R') above the ambient temperature, so
-that the largest rate at a limit L is (L - A) / (E(L) (R + R')): with one limit it falls with the ambient
-temperature in one proportion, whatever rail and driver do.
+f is the dot rate and E(T) the heat of one dot (`dot_heat`, `heat_of`); with one mass, B = A. In the steady
+state the winding is f E(T) (R + R') above ambient, so the largest rate at a limit L is (L - A) / (E(L) (R +
+R')): for a given limit it decreases linearly with the ambient temperature, whatever the rail and the driver.
 
-Source: the lumped thermal network of any text on heat transfer. Validity: pulses that are short beside the
-warming of the winding, so that their heat is even in time. Weakness: the winding has one temperature, where a
-real one is hotter inside.
+Source: the lumped thermal network of any text on heat transfer. Validity: pulses that are short compared with
+the warming of the winding, so that their heat is averaged over time. Weakness: the winding has one
+temperature, whereas a real winding is hotter inside.
 
-Heat of one dot in the coil, as a function of the temperature of its winding.
-
-The resistance of copper rises by 0.393 % a kelvin of that at 20 degC. A time on a rail that is long beside
-L / R draws less current through a warm winding, and heats it less; a current that a driver keeps up heats it
-more; a driver that meters the energy of a dot heats it the same.
-
-Heat of one dot of a hammer: what its standard waveform leaves in the coil.
+Heat of one dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A pulse on a
+rail that is long compared with L / R draws less current through a warm winding and heats it less; a driver
+that regulates the current heats it more; a driver that regulates the energy of a dot heats it the same.
 """
 
 from __future__ import annotations
@@ -48,32 +44,32 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
 COLDEST: Final = REFERENCE - 1.0 / COPPER
-"""Temperature at which the straight line of the resistance would reach zero, degC."""
+"""Temperature at which the linear law of resistance reaches zero, degC."""
 
 FEEDS: Final = ("voltage", "current", "energy")
-"""What a driver keeps the same when the coil gets warm."""
+"""Quantity that a driver keeps constant as the coil warms."""
 
 
 @dataclass(frozen=True)
 class DotHeat:
-    """Heat of one dot over the temperature of the winding."""
+    """Heat of one dot as a function of the winding temperature."""
 
     temperature: tuple[float, ...]
     """Temperatures, degC, ascending; one or more."""
     heat: tuple[float, ...]
-    """Heat of one dot there, J."""
+    """Heat of one dot at these temperatures, J."""
     feed: str
-    """One of `FEEDS`: how the heat goes on outside the temperatures, and between them in proportion to it."""
+    """One of `FEEDS`: the law by which the heat is extrapolated and interpolated."""
     on_time: float = 0.0
-    """Time for which the driver is on for one dot, s; 0 where it is not known."""
+    """On-time of the driver per dot, s; 0 if unknown."""
 
     @property
     def most(self) -> float:
-        """Largest rate at which the driver is off between dots, Hz."""
+        """Largest rate at which the driver switches off between dots, Hz."""
         return 1.0 / self.on_time if self.on_time > 0.0 else math.inf
 
     def at(self, temperature: float) -> float:
-        """Return the heat of one dot at a temperature of the winding, degC; J."""
+        """Return the heat of one dot, J, at a winding temperature, degC."""
         shares = [
             heat / _share(self.feed, place) for heat, place in zip(self.heat, self.temperature, strict=True)
         ]
@@ -81,19 +77,19 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Return the heat of one dot from that at 20 degC, J, and the quantity that its driver keeps constant."""
+    """Return the heat of one dot from its value at 20 degC, J, and the driver's constant quantity."""
     if feed not in FEEDS:
         raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
 
 
 def read_temperature(value: float | str, name: str) -> float:
-    """Read a temperature, degC or text with that unit, at which copper has a resistance.
+    """Read a temperature, degC or text with that unit, and check that it is above `COLDEST`.
 
     Raises
     ------
     InputError
-        It is no temperature, or below the one at which the line of the resistance reaches zero.
+        The value is not a temperature, or the linear law gives copper no resistance at it.
     """
     temperature = read_number(value, "degC", name)
     if not temperature > COLDEST:
@@ -102,13 +98,13 @@ def read_temperature(value: float | str, name: str) -> float:
 
 
 def _share(feed: str, temperature: float) -> float:
-    """Return the heat of one dot in parts of that at 20 degC."""
+    """Return the heat of one dot relative to that at 20 degC."""
     warm = 1.0 + COPPER * (temperature - REFERENCE)
     return {"voltage": 1.0 / warm, "current": warm, "energy": 1.0}[feed]
 
 
 HOTTEST: Final = 1500.0
-"""Temperature beyond which a steady one counts as none, degC: copper has melted."""
+"""Upper bound of a steady temperature, degC, above the melting point of copper."""
 
 _TOLERANCE: Final = 1e-9
 
@@ -118,11 +114,11 @@ class ThermalCoil:
     """A coil as one thermal mass, or two."""
 
     resistance: float
-    """From the winding to the body, or to the ambient temperature where there is no body, K/W."""
+    """Thermal resistance from the winding to the body, or to ambient without a body, K/W."""
     capacity: float | None = None
-    """Heat capacity of the winding, J/K; None where it is not known, and no time follows."""
+    """Heat capacity of the winding, J/K; None if unknown, and then times are NaN."""
     body_resistance: float = 0.0
-    """From the body to the ambient temperature, K/W; 0 for one thermal mass."""
+    """Thermal resistance from the body to ambient, K/W; 0 for one thermal mass."""
     body_capacity: float | None = None
     """Heat capacity of the body, J/K."""
 
@@ -133,45 +129,45 @@ class ThermalCoil:
 
 
 class ThermalDuty(Result, rows="ambient burst"):
-    """The largest rates of a coil, and what faster bursts are allowed."""
+    """Largest continuous rates of a coil, and the allowed bursts at higher rates."""
 
-    coil: ThermalCoil = part("the thermal masses")
+    coil: ThermalCoil = part("thermal model")
     heat: DotHeat = part("heat of one dot")
-    limit: float = scalar("degC", "largest temperature of the winding")
+    limit: float = scalar("degC", "temperature limit of the winding")
     limit_heat: float = scalar("J", "heat of one dot at that temperature")
     ambient: FloatArray = coordinate("degC", "ambient temperature", "ambient")
     rate: FloatArray = column(
         "Hz",
-        "dots per second that the coil stands for ever",
+        "largest continuous dot rate",
         "ambient",
-        more="0 where it is too hot at rest; at most so many that the driver is off between dots",
+        more="0 if ambient exceeds the limit; at most the rate at which the driver switches off between dots",
     )
-    burst: FloatArray = coordinate("Hz", "dots per second while it fires", "burst")
+    burst: FloatArray = coordinate("Hz", "dot rate in a burst", "burst")
     temperature: FloatArray = column(
         "degC",
-        "temperature of the winding when it fires at that rate for ever",
+        "steady temperature of the winding at that rate",
         "ambient burst",
-        more="infinite where it would melt",
+        more="infinite if the winding would melt",
     )
     time: FloatArray = column(
         "s",
-        "time of firing at that rate, from cold, until the winding is at the limit",
+        "time from ambient temperature to the limit at that rate",
         "ambient burst",
-        more="infinite where it never is; NaN where no heat capacity is given",
+        more="infinite if the limit is never reached; NaN without a heat capacity",
     )
     share: FloatArray = column(
         "1",
-        "part of the time that it may fire at that rate, in turns short beside the warming",
+        "largest duty cycle at that rate, for bursts short compared with the warming",
         "ambient burst",
     )
 
     @property
     def title(self) -> str:
-        """What the rates are for."""
+        """Title in one line."""
         return f"thermal duty of a coil up to {self.limit:g} degC"
 
     def summary(self) -> Summary:
-        """Return the largest rates, a row each ambient temperature, and what bursts are allowed."""
+        """Tabulate the largest rates and the allowed bursts, one row per ambient temperature."""
         fast, ambient = np.meshgrid(self.burst, self.ambient, indexing="ij")
         temperature, time = (
             np.where(np.isfinite(each), each, np.nan).T.ravel() for each in (self.temperature, self.time)
@@ -213,29 +209,29 @@ def thermal_duty(
     body_resistance: float | str | None = None,
     body_capacity: float | str | None = None,
 ) -> ThermalDuty:
-    """Find how many dots a second a coil stands without getting hotter than a limit.
+    """Compute the largest dot rates at which a coil stays below a temperature limit.
 
     Parameters
     ----------
     heat : float, str or DotHeat
-        Heat of one dot with the winding at 20 degC, J or text with a unit; or a function of its temperature,
-        see `printhammer.control.duty.heat_of`.
+        Heat of one dot with the winding at 20 degC, J or text with a unit; or a function of the winding
+        temperature, see `printhammer.control.duty.heat_of`.
     thermal_resistance : float or str
-        From the winding to the ambient temperature, or to the body where there is one, K/W.
+        Thermal resistance from the winding to ambient, or to the body if there is one, K/W.
     limit : float or str
-        Largest temperature of the winding, degC.
+        Temperature limit of the winding, degC.
     ambient : sequence of float or str, optional
         Ambient temperatures, degC.
     burst : sequence of float or str, optional
-        Rates, Hz, of which to tell how hot, how long and how much of the time; by default the largest that
-        the coil stands at any of the ambient temperatures.
+        Burst rates, Hz, for which to compute temperature, time and duty cycle; by default the largest
+        continuous rate at any of the ambient temperatures.
     feed : str, optional
-        What the driver keeps the same as the coil gets warm: "voltage", "current" or "energy".
+        Quantity that the driver keeps constant as the coil warms: "voltage", "current" or "energy".
     thermal_capacity : float or str, optional
-        Heat capacity of the winding, J/K, without which no time is known.
+        Heat capacity of the winding, J/K; without it no time is computed.
     body_resistance, body_capacity : float or str, optional
-        Thermal resistance from the body around the winding to the ambient temperature, K/W, and its heat
-        capacity, J/K; both or none.
+        Thermal resistance from the body around the winding to ambient, K/W, and heat capacity of the body,
+        J/K; both or neither.
     """
     one_dot = heat if isinstance(heat, DotHeat) else dot_heat(heat, feed)
     if (body_resistance is None) != (body_capacity is None):
@@ -283,7 +279,7 @@ def thermal_duty(
 
 
 def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> float:
-    """Return the temperature, degC, that the winding comes to at an ambient one and a rate, Hz."""
+    """Solve for the steady winding temperature, degC, at an ambient temperature and a rate, Hz; or inf."""
 
     def excess(temperature: float) -> float:
         return rate * heat.at(temperature) * coil.whole - (temperature - ambient)
@@ -292,10 +288,10 @@ def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> flo
 
 
 def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate: float) -> float:
-    """Return how long, s, a coil at an ambient temperature may be fired at a rate, Hz, up to a limit."""
+    """Integrate the warming from ambient temperature at a rate, Hz; return the time to the limit, s."""
     if limit <= ambient:
         return 0.0
-    # At and below the largest steady rate the limit is never passed.
+    # At or below the largest continuous rate the limit is never exceeded.
     if rate * heat.at(limit) * coil.whole <= limit - ambient:
         return math.inf
     if coil.capacity is None:
@@ -323,7 +319,7 @@ def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate
         times = run.t_events or [np.zeros(0)]
         if times[0].size:
             return float(times[0][0])
-        # Hardly faster than what it stands for ever: the limit comes late.
+        # Just above the continuous rate the limit may come arbitrarily late.
         if span > 64.0 * slowest:
             return math.inf
         span *= 4.0
@@ -340,22 +336,22 @@ def _rate(value: float | str, heat: DotHeat) -> float:
 
 
 TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
-"""Temperatures of the winding at which a hammer with a driver is fired, degC."""
+"""Winding temperatures at which a hammer with a driver is simulated, degC."""
 
-_LEFT: Final = 1e-3  # Current that may be left at the end, in parts of the largest
+_LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its largest
 _DOUBLINGS: Final = 8
 
 
 def heat_of(hammer: Hammer) -> DotHeat:
-    """Return the heat of one dot of a hammer over the temperature of its winding.
+    """Compute the heat of one dot of a hammer as a function of the winding temperature.
 
-    A driver fires it from rest with its coil at `TEMPERATURES`; a current is taken to be kept up whatever the
-    resistance.
+    A driver is simulated from rest at the coil temperatures `TEMPERATURES`; a waveform that is a current is
+    assumed to be regulated, whatever the resistance.
 
     Raises
     ------
     InputError
-        The hammer has no resistance of the coil, its waveform is a force, or its current does not end.
+        The hammer has no coil resistance, its waveform is a force, or its current does not decay.
     """
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.energy import squared_current
@@ -383,7 +379,7 @@ def heat_of(hammer: Hammer) -> DotHeat:
 
 
 def _copper_loss(hammer: Hammer, drive: PulseTrain) -> float:
-    """Return the heat of the coil of one firing until its current has ended, J."""
+    """Simulate one firing until its current has decayed; return the coil heat, J."""
     from printhammer.run.simulate import simulate
 
     span = 4.0 * drive.waveform.support

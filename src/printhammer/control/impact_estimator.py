@@ -1,24 +1,23 @@
-"""The time of impact from samples of the coil: a matched filter for what the pack does to the signal.
+"""Impact time from samples of coil current or voltage, by a matched filter with nuisance parameters.
 
-While the armature moves it induces a voltage in its coil, and when it strikes that changes: the current,
-which had dipped, turns, or the voltage of the open coil of a permanent magnet falls. Two runs of the nominal
-hammer, one with its pack and one with the pack out of reach, say what to expect: their difference d(t) is
-zero up to the touch. Samples y less those of the run without pack are then taken for
+The moving armature induces a voltage in its coil, which changes at the impact: the current, which had dipped,
+turns, or the open-circuit voltage of a coil with a permanent magnet falls. Two simulations of the nominal
+hammer, with and without its pack, give the expected signature: their difference d(t) is zero up to the touch.
+The samples y minus the signal without pack are modelled as
 
-    a d(t - shift) + b0 + b1 t + noise,
+  a d(t - shift) + b0 + b1 t + noise
 
-within a window around the touch, and the shift is that at which least is left over: for each shift the
-least squares in a and b are linear, so that a filter of fixed weights gives them (a matched filter with
-nuisance parameters, or generalised likelihood ratio; S. M. Kay, *Fundamentals of Statistical Signal
-Processing: Detection Theory*, 1998, ch. 7). The straight line takes what differs slowly between a unit and
-the nominal hammer: resistance, temperature, rail.
+in a window around the touch, and the estimate is the shift with the least residual. For each shift, a, b0 and
+b1 are a linear least-squares fit, so the score is a filter with fixed weights (a matched filter, the
+generalised likelihood ratio; S. M. Kay, *Fundamentals of Statistical Signal Processing: Detection Theory*,
+1998, ch. 7). The straight line absorbs slow differences between a unit and the nominal hammer: resistance,
+temperature, rail.
 
-The estimator sees samples, the pulse that was fired, and the nominal hammer; nothing of the unit. Delay and
-bandwidth of the probe, where they are known, are part of the template. An estimate is flagged where the
-samples are unlike any impact, near an edge of the driver above all, which a delay that nobody stated leaves
-in the difference; or where it lies at the end of what was searched.
-
-How the current or the voltage of a coil is sampled: noise, rate, bits, and the span of the converter.
+The estimator knows the samples, the fired pulse and the nominal hammer, but nothing of the unit. Delay and
+bandwidth of the probe, if known, are part of the template. An estimate is flagged if the samples do not
+resemble an impact, in particular near an edge of the driver, which an unstated probe delay leaves in the
+difference; or if the estimate is at the end of the search range. `Sampling` describes the converter: noise,
+rate, resolution and range.
 """
 
 from __future__ import annotations
@@ -42,65 +41,66 @@ from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import FloatArray
 
-PHASES: Final = 8  # Shifts within the time from sample to sample that are tried
-BEFORE: Final = 1.0  # What is looked at before the touch, in parts of the contact
-AFTER: Final = 0.6  # And after it
-REACH: Final = 0.15  # How far the impact is looked for around that of the nominal hammer, of its flight time
-FAINTEST: Final = 5.0  # Least size of what is found, in standard deviations
-_DEGREE: Final = 1  # Of the polynomial
-_LEAST: Final = 8  # Samples of the window
-_MOST: Final = 200_000  # Samples of a record
-_SPAN: Final = 1.5  # Of the converter, in parts of the largest value around the touch
-_FLOWING: Final = 0.02  # Current at the touch below which it counts as over, in parts of its largest
-_MOST_BEFORE: Final = 0.5  # Most that is looked at before the touch, in parts of the flight time
-_AROUND: Final = 0.2  # Largest shift within a window, in parts of the contact
-_FINEST: Final = 400  # Steps of the shifts in a contact
-_MOVES: Final = 3  # How often a window is moved
+PHASES: Final = 8  # Number of trial shifts per sampling interval
+BEFORE: Final = 1.0  # Length of the window before the touch, in contact times
+AFTER: Final = 0.6  # Length of the window after the touch, in contact times
+REACH: Final = 0.15  # Half-width of the search range about the nominal impact, in flight times
+FAINTEST: Final = 5.0  # Detection threshold, in standard deviations
+_DEGREE: Final = 1  # Degree of the nuisance polynomial
+_LEAST: Final = 8  # Smallest number of samples in the window
+_MOST: Final = 200_000  # Largest number of samples in a record
+_SPAN: Final = 1.5  # Range of the converter, relative to the largest value around the touch
+_FLOWING: Final = 0.02  # Current at the touch below which it counts as decayed, relative to its largest
+_MOST_BEFORE: Final = 0.5  # Largest length of the window before the touch, in flight times
+_AROUND: Final = 0.2  # Largest shift within a window, in contact times
+_FINEST: Final = 400  # Largest number of shifts per contact time
+_MOVES: Final = 3  # Maximum number of window positions tried
 _FIRM: Final = ("pack.stiffness", "pack.damping")
-_SOFT: Final = 1e-9  # Part of these that a pack has which does nothing
+_SOFT: Final = 1e-9  # Factor on these constants that makes a pack negligible
 
 
 _UNLIKE: Final = 0.5
 """Ratio of unexplained to explained signal energy above which an estimate is flagged.
 
-Units of `impact-wire` reach 0.4 with errors of 2 us; a delay of 5 us that nobody stated has 1.5, and 30 us.
+Units of `impact-wire` reach 0.4 with errors of 2 us; an unstated probe delay of 5 us gives 1.5, and errors of
+30 us.
 """
 
 _TOO_LARGE: Final = 2.5
-"""Ratio to the nominal impact above which a match is no impact; units of `impact-wire` reach 1.3."""
+"""Amplitude, relative to nominal, above which a match is rejected; units of `impact-wire` reach 1.3."""
 
 UNSEEN, EDGE, UNLIKE, END = "unseen", "edge", "unlike", "end"
-"""Flags of an estimate: no impact in the samples; samples unlike an impact, near an edge of the driver or
+"""Flags of an estimate: no impact detected; samples unlike an impact, near an edge of the driver or
 elsewhere; an estimate at the end of the search range."""
 
 
 class ImpactEstimate(Declared):
-    """Estimated time of impact, with a flag where the estimate is doubtful."""
+    """Estimated impact time, with a flag if the estimate is doubtful."""
 
-    time: float = part("from firing to impact, s; NaN where none shows")
+    time: float = part("time from firing to impact, s; NaN if no impact is detected")
     flag: str = part(
-        '"unseen", "edge", "unlike" or "end", as the module says; empty where nothing speaks against'
+        '"unseen", "edge", "unlike" or "end", as the module describes; empty for a trusted estimate'
     )
     clearness: float = part("amplitude of the impact in the signal, in standard deviations of a sample")
 
 
 class ImpactEstimator:
-    """Times of impact from samples of the coil, for one pulse of a hammer.
+    """Estimator of impact times from samples of the coil, for one pulse of a hammer.
 
     Parameters
     ----------
     hammer : Hammer
-        The nominal hammer, with a pack and a coil that a voltage drives.
+        The nominal hammer, with a pack and a voltage-driven coil.
     sampling : Sampling
-        How the coil is sampled.
+        Sampling of the coil.
     pulse : Waveform, optional
-        The pulse that is fired; by default that of the hammer.
+        The fired pulse; by default that of the hammer.
 
     Raises
     ------
     InputError
-        The pulse is no voltage, it makes no dot, too few samples fall on the contact, or nothing of the
-        impact is to be expected in them.
+        The pulse is not a voltage or makes no dot, too few samples fall on the contact, or the expected
+        signature is below the noise.
     """
 
     def __init__(self, hammer: Hammer, sampling: Sampling, pulse: Waveform | None = None) -> None:
@@ -148,7 +148,7 @@ class ImpactEstimator:
         free = self._without_pack(sampling, fine)
         true = sampling.shown(fine, sampling.of(run))
         touch = round(self._shown_at / self.step * PHASES)
-        # An open switch lets the coil rise far above what it shows of the impact.
+        # The open-circuit voltage may exceed the signature of the impact by far.
         ahead = before if sampling.signal == "current" else 0
         around = slice(max(touch - PHASES * ahead, 0), touch + PHASES * after)
         self.sampling = sampling.scaled_to(_SPAN * max(float(true[around].max()), 0.0) or 1.0)
@@ -164,17 +164,17 @@ class ImpactEstimator:
 
     @property
     def clearness(self) -> float:
-        """Size of what the impact of the nominal hammer does, in standard deviations of the samples."""
+        """Amplitude of the nominal impact's signature, in standard deviations of a sample."""
         return float(self._filters[2][len(self._filters[2]) // 2]) / self.sampling.deviation
 
     def __call__(self, samples: FloatArray) -> float:
-        """Return the time from firing to impact, s, as `estimate` has it; NaN where none shows."""
+        """Return the estimated time from firing to impact, s; NaN if no impact is detected."""
         return self.estimate(samples).time
 
     def estimate(self, samples: FloatArray) -> ImpactEstimate:
         """Estimate the time from firing to impact, and flag a doubtful estimate.
 
-        `samples` are the first `count` from the firing on, A or V; more are left unread.
+        `samples`, A or V, begin at the firing; samples beyond the first `count` are ignored.
         """
         left = np.asarray(samples, np.float64)[: self.count] - self._free
         windows = sliding_window_view(left, self._size)
@@ -205,27 +205,27 @@ class ImpactEstimator:
         return ImpactEstimate(shown - self.sampling.delay, flag, clearness)
 
     def _energy(self, windows: FloatArray) -> FloatArray:
-        """Return the sums of squares of windows without their straight lines."""
+        """Return the sums of squares of windows after removal of their straight-line fits."""
         return np.asarray((windows**2).sum(axis=1) - ((windows @ self._base) ** 2).sum(axis=1))
 
     def _likeness(self, windows: FloatArray) -> FloatArray:
-        """Return how much windows are like what the touch in their place does: 1 is the same form."""
+        """Return the correlation of windows with the signature at their centre: 1 for the same shape."""
         _shifts, weights, sizes = self._filters
         middle = len(weights) // 2
         found = windows @ weights[middle] / sizes[middle]
-        # What is no more than noise is like nothing.
+        # A floor at the noise energy keeps the correlation of pure noise small.
         least = self._size * self.sampling.deviation**2
         return np.asarray(found / np.sqrt(np.maximum(self._energy(windows), least)))
 
     @cached_property
     def _base(self) -> FloatArray:
-        """Orthonormal polynomials over a window, (window, degree + 1)."""
+        """Orthonormal polynomials over a window, shape (window, degree + 1)."""
         offsets = np.arange(self._size) - self._before
         return np.asarray(np.linalg.qr(np.vander(offsets / self._size, _DEGREE + 1))[0], np.float64)
 
     @cached_property
     def _filters(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Shifts of the touch within a window, s, the weights of the filter of each, and what they weigh."""
+        """Shifts of the touch within a window, s, the filter weights of each, and the weights' norms."""
         offsets = self.step * (np.arange(self._size) - self._before)
         grid = max(self.step / PHASES, self.contact / _FINEST)
         count = math.ceil(_AROUND * self.contact / grid)
@@ -236,7 +236,7 @@ class ImpactEstimator:
         return shifts, rows, np.sqrt((rows**2).sum(axis=1))
 
     def _dot(self) -> tuple[float, float]:
-        """Return flight time and time of contact of the nominal hammer, s."""
+        """Simulate the nominal dot; return its flight time and contact time, s."""
         dot: Any = simulate(self.hammer, PulseTrain(self.pulse), points=2).dots[0]
         if dot.flight_time is not None and dot.contact_time is not None:
             return float(dot.flight_time), float(dot.contact_time)
@@ -248,7 +248,7 @@ class ImpactEstimator:
         )
 
     def _without_pack(self, sampling: Sampling, fine: FloatArray) -> FloatArray:
-        """Return the signal where the pack does nothing, A or V; where that run ends early, its last."""
+        """Simulate the signal without a pack, A or V, held at its last value if the simulation ends early."""
         known = self.hammer.constants
         away = self.hammer.replace({key: _SOFT * known[key].si for key in _FIRM if key in known})
         run = simulate(away, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
@@ -299,7 +299,7 @@ class ImpactEstimator:
 
 
 def _vertex(score: FloatArray, place: int) -> float:
-    """Return where the parabola through a largest value and its neighbours is highest, in steps from it."""
+    """Return the vertex of the parabola through a maximum and its neighbours, in steps from the maximum."""
     if not 0 < place < score.size - 1:
         return 0.0
     before, here, after = score[place - 1 : place + 2].tolist()
@@ -314,15 +314,15 @@ _MOST_BITS: Final = 24
 
 
 class Sampling(Declared):
-    """A converter that samples the current in a coil, or the voltage across it, from the firing on."""
+    """An A/D converter that samples the coil current or voltage from the firing on."""
 
-    signal: Signal = part("what is sampled, current or voltage", default="current")
+    signal: Signal = part("sampled signal, current or voltage", default="current")
     noise: float = part("standard deviation of a sample, A or V", default=0.0)
-    sampling_rate: float = scalar("Hz", "samples per second", default=1e6)
-    bits: int = part("of the converter", default=12)
+    sampling_rate: float = scalar("Hz", "sampling rate", default=1e6)
+    bits: int = part("resolution of the converter, bits", default=12)
     full_scale: float | None = part(
-        "largest value that is shown, A or V, beside 0 as the least; None for half as much again as the"
-        " single pulse shows around its impact",
+        "upper end of the range, A or V, which begins at 0; None for 1.5 times the largest value of the"
+        " nominal signal around the impact",
         default=None,
     )
 
@@ -349,25 +349,25 @@ class Sampling(Declared):
 
     @property
     def unit(self) -> str:
-        """SI unit of what is sampled."""
+        """SI unit of the signal."""
         return UNITS[self.signal]
 
     def scaled_to(self, largest: float) -> Sampling:
-        """Return the same with a span, A or V, unless it has one."""
+        """Return a copy with the range `largest`, A or V, unless a range is set."""
         return self if self.full_scale is not None else replace(self, full_scale=largest)
 
     @property
     def step(self) -> float:
-        """Step of the converter, A or V; not a number before it has a span."""
+        """Quantisation step, A or V; NaN without a range."""
         return math.nan if self.full_scale is None else self.full_scale / 2.0**self.bits
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of a sample with its rounding, A or V."""
+        """Standard deviation of a sample, quantisation included, A or V."""
         return math.hypot(self.noise, self.step / math.sqrt(12.0))
 
     def of(self, motion: Motion) -> FloatArray:
-        """Return the true values of what is sampled at the output times of a motion, A or V."""
+        """Return the true signal at the output times of a motion, A or V."""
         values = motion.current if self.signal == "current" else motion.voltage
         return np.asarray(values, np.float64)
 
@@ -377,11 +377,11 @@ class Sampling(Declared):
         return slow if self.delay == 0.0 else np.interp(times - self.delay, times, slow)
 
     def clipped(self, values: FloatArray) -> FloatArray:
-        """Return values as far as the span goes, from 0 on, A or V."""
+        """Clip values to the range, A or V."""
         span = math.inf if self.full_scale is None else self.full_scale
         return np.clip(values, 0.0, span)
 
     def read(self, values: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Return what is shown of true values, A or V, of any shape."""
+        """Return readings of true values, A or V, of any shape, with noise, quantisation and clipping."""
         noisy = values + self.noise * rng.standard_normal(values.shape)
         return self.clipped(np.rint(noisy / self.step) * self.step)

@@ -1,4 +1,4 @@
-"""How well samples of the coil tell the time of impact, against noise, sampling rate and bits."""
+"""Errors of impact times estimated from coil samples, versus noise, sampling rate and resolution."""
 
 from __future__ import annotations
 
@@ -30,48 +30,48 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 MOST: Final = 2000
-"""Number of ways to sample above which a study is refused."""
+"""Largest number of sampling settings in a study."""
 
-_MOST_MISSED: Final = 0.99  # Of the impacts that a sensor does not see
+_MOST_MISSED: Final = 0.99  # Largest fraction of missed impacts of a sensor
 _MOST_DOTS: Final = 10_000
 _CELLS: Final = "noise sampling_rate bits"
 
 
 class ImpactTime(Result, rows=_CELLS):
-    """Errors of times of impact that are estimated from the current or the voltage of the coil.
+    """Errors of impact times that are estimated from the current or the voltage of the coil.
 
-    Bias and standard deviation on the nominal hammer are what noise, sampling and rounding do; those over
-    units are what the differences between hammers add, which no averaging takes away.
+    Bias and standard deviation on the nominal hammer are due to noise, sampling and quantisation; those over
+    units add the differences between hammers, which averaging over dots does not reduce.
     """
 
-    hammer: Hammer = part("the hammer")
-    signal: str = part("what is sampled, current or voltage")
-    variability: Variability = part("of the constants of the units")
-    flight_time: float = scalar("s", "from firing to impact on the nominal hammer")
-    dots: int = part("dots in each way to sample")
+    hammer: Hammer = part("nominal hammer")
+    signal: str = part("sampled signal, current or voltage")
+    variability: Variability = part("variability of the units")
+    flight_time: float = scalar("s", "flight time of the nominal hammer")
+    dots: int = part("number of dots per setting")
     noise: FloatArray = coordinate("", "standard deviation of a sample, A or V", "noise")
-    sampling_rate: FloatArray = coordinate("Hz", "samples per second", "sampling_rate")
-    bits: IntArray = coordinate("1", "bits of the converter", "bits")
-    bias: FloatArray = column("s", "mean error on the nominal hammer", _CELLS, more="NaN if none is seen")
+    sampling_rate: FloatArray = coordinate("Hz", "sampling rate", "sampling_rate")
+    bits: IntArray = coordinate("1", "resolution of the converter", "bits")
+    bias: FloatArray = column("s", "mean error on the nominal hammer", _CELLS, more="NaN without a detection")
     deviation: FloatArray = column("s", "standard deviation of the error on the nominal hammer", _CELLS)
-    missed: FloatArray = column("1", "share of its impacts that are not seen", _CELLS)
+    missed: FloatArray = column("1", "fraction of its impacts that are not detected", _CELLS)
     flagged: FloatArray = column(
-        "1", "share of its impacts whose estimates are flagged, and not used", _CELLS
+        "1", "fraction of its impacts whose estimates are flagged and not used", _CELLS
     )
     unit_bias: FloatArray = column("s", "mean error over units", _CELLS)
     unit_deviation: FloatArray = column("s", "standard deviation of the error over units", _CELLS)
-    unit_missed: FloatArray = column("1", "share of the impacts of units that are not seen", _CELLS)
+    unit_missed: FloatArray = column("1", "fraction of the units' impacts that are not detected", _CELLS)
     unit_flagged: FloatArray = column(
-        "1", "share of the impacts of units whose estimates are flagged, and not used", _CELLS
+        "1", "fraction of the units' impacts whose estimates are flagged and not used", _CELLS
     )
 
     @property
     def title(self) -> str:
-        """What it is of."""
+        """Title in one line."""
         return f"time of impact of {self.hammer.name} from the {self.signal} of its coil"
 
     def summary(self) -> Summary:
-        """Return the errors, a row for each way to sample."""
+        """Tabulate the errors, one row per sampling setting."""
         noise, rate, bits = np.meshgrid(self.noise, self.sampling_rate, self.bits, indexing="ij")
         columns = [
             Cells("noise", 1e3 * noise.ravel(), f"m{self.unit}", ".3g"),
@@ -89,16 +89,16 @@ class ImpactTime(Result, rows=_CELLS):
         return Summary([Grid(columns, self.title, most=24)])
 
     def entries(self) -> Entries:
-        """Return the arrays, the noise in the unit of the signal."""
+        """Return the arrays, with the noise in the unit of the signal."""
         entries = super().entries()
         note, values = entries["noise"]
         return {**entries, "noise": (replace(note, unit=self.unit), values)}
 
     def sensor(self, seed: int = 0) -> ImpactSensor:
-        """Return the estimator as a sensor for `printhammer.learn`, where one way to sample was studied.
+        """Return the estimator as a sensor for `printhammer.learn`, if a single setting was studied.
 
-        Its noise is the standard deviation on the nominal hammer. What units differ by beside, which is the
-        same for every dot of a unit, is its offset.
+        The noise of the sensor is the standard deviation on the nominal hammer. The additional spread over
+        units, which is constant for all dots of a unit, is the offset.
         """
         if self.bias.size != 1:
             raise InputError(
@@ -107,9 +107,9 @@ class ImpactTime(Result, rows=_CELLS):
         noise, units = float(self.deviation[0, 0, 0]), float(self.unit_deviation[0, 0, 0])
         if not np.isfinite(noise + units):
             raise InputError("no impact was seen in the samples", expected="less noise for a sensor")
-        # The mean over units is known at the design, and is taken off.
+        # The mean error over units is known from the study and can be subtracted.
         offset = float(np.sqrt(max(units**2 - noise**2, 0.0)))
-        # A flagged estimate is not used.
+        # Flagged estimates count as missed.
         missed = min(float(self.unit_missed[0, 0, 0] + self.unit_flagged[0, 0, 0]), _MOST_MISSED)
         return ImpactSensor(noise=noise, offset=offset, missed=missed, seed=seed)
 
@@ -137,28 +137,28 @@ def impact_time(
     seed: SupportsIndex = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> ImpactTime:
-    """Find the error of times of impact that are estimated from samples of the coil of a hammer.
+    """Compute the errors of impact times that are estimated from samples of a hammer's coil.
 
-    The estimator is `printhammer.control.impact_estimator.ImpactEstimator`: it sees the samples of one dot
-    and knows the nominal hammer and the pulse.
+    The estimator is `printhammer.control.impact_estimator.ImpactEstimator`: it uses the samples of one dot,
+    the nominal hammer and the pulse.
 
     Parameters
     ----------
     hammer : Hammer
-        A hammer with a pack and a driver of its coil.
+        The nominal hammer, with a pack and a driver of its coil.
     signal : str, optional
-        "current", which shows an impact while it flows, or "voltage", which does while the coil of a
+        "current", which shows an impact while it flows, or "voltage", which does so while the coil of a
         permanent magnet is open.
     noise : sequence of float or str, optional
-        Standard deviations of a sample, A or V; by default three of 0.1, 0.3 and 1 % of the largest current
-        in the hammer's own pulse, or of 10 V.
+        Standard deviations of a sample, A or V; by default 0.1, 0.3 and 1 % of the largest current of the
+        hammer's own pulse, or of 10 V.
     sampling_rate : sequence of float or str, optional
-        Samples per second, Hz.
+        Sampling rates, Hz.
     bits : sequence of int, optional
-        Of the converter.
+        Resolutions of the converter, bits.
     full_scale : float or str, optional
-        Largest value that it shows, A or V; by default half as much again as the nominal hammer shows around
-        its impact.
+        Upper end of the converter's range, A or V; by default 1.5 times the largest value of the nominal
+        signal around the impact.
     delay : float or str, optional
         Delay of the probe, s.
     bandwidth : float or str, optional
@@ -166,15 +166,15 @@ def impact_time(
     known : bool, optional
         Whether the estimator knows delay and bandwidth of the probe.
     dots : int, optional
-        Dots of the nominal hammer, and of all units, in each way to sample.
+        Number of dots of the nominal hammer, and of all units together, per setting.
     units : int, optional
-        Hammers drawn from the variability.
+        Number of hammers drawn from the variability.
     variability : Variability, optional
-        By default `Variability.of(hammer)`.
+        Variability of the units; by default `Variability.of(hammer)`.
     seed : int, optional
-        Of the units and of the noise.
+        Seed for the units and for the noise.
     progress : callable, optional
-        Called with ways to sample done and of all.
+        Called with the number of finished settings and of all.
     """
     volts = signal == "voltage"
     levels = np.unique([read_number(each, UNITS.get(signal, "A"), "noise") for each in noise])
@@ -255,7 +255,7 @@ def _largest_current(hammer: Hammer) -> float:
 
 
 def _record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
-    """Compute the probe signal, A or V, of one dot of a unit, and its time of impact, s."""
+    """Simulate the probe signal, A or V, of one dot of a unit, and its impact time, s."""
     each = PHASES if probe.delay or probe.bandwidth is not None else 1
     times = np.asarray(estimator.step / each * np.arange(each * estimator.count), np.float64)
     motion = simulate(
@@ -272,7 +272,7 @@ def _errors(
 ) -> tuple[FloatArray, BoolArray]:
     """Return the errors of estimated impact times, s, and a mask of the estimates that are not flagged.
 
-    The records take turns, one dot each.
+    The dots cycle through the records.
     """
     errors, believed = [], []
     for number in range(dots):

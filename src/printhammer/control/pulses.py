@@ -1,6 +1,7 @@
-"""The current of a pulse: that of a driver comes out of the coil, so that the hammer is fired once.
+"""Pulses of other widths, and the peak and decay of their currents.
 
-Pulses of a hammer with other widths.
+The current of a voltage-driven coil depends on the motion, so the hammer is simulated; other currents are
+known in advance.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from printhammer.run.simulate import simulate
 from printhammer.support.arrays import FloatArray
 
 _SAMPLES: Final = 4001
-_SPAN: Final = 2.0  # Length of a run at first, in parts of the width
+_SPAN: Final = 2.0  # Length of the first simulation, in pulse widths
 _DOUBLINGS: Final = 6
 
 
 def peak_current(hammer: Hammer, pulse: Waveform) -> float:
-    """Return the largest current of a pulse that is fired from rest, A."""
+    """Return the largest current of a pulse fired from rest, A."""
     if pulse.quantity != "voltage":
         return pulse.peak
     return float(_course(hammer, pulse, _SPAN)[1].max())
 
 
 def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time, s, from the width of a driver's pulse to a given fraction of its peak current."""
+    """Return the time, s, from the end of a driver's pulse until its current is `share` of its peak."""
     own: Any = pulse
     for doubling in range(_DOUBLINGS):
         times, current = _course(hammer, pulse, _SPAN * 2.0**doubling)
@@ -49,7 +50,7 @@ def fading_current(hammer: Hammer, pulse: Waveform, share: float) -> float:
 
 
 def _course(hammer: Hammer, pulse: Waveform, span: float) -> tuple[FloatArray, FloatArray]:
-    """Return times, s, and absolute currents, A, for a span in parts of the width."""
+    """Simulate a pulse from rest; return times, s, and absolute currents, A, for `span` pulse widths."""
     own: Any = pulse
     end = span * own.width
     times = np.linspace(0.0, end, _SAMPLES)
@@ -58,7 +59,7 @@ def _course(hammer: Hammer, pulse: Waveform, span: float) -> tuple[FloatArray, F
 
 
 def of_width(pulse: Waveform, width: float) -> Waveform:
-    """Return a pulse like another one, but of another width, s."""
+    """Return a copy of a pulse with another width, s."""
     kind: Any = type(pulse)
     return kind(**{**dict(pulse), "width": width})  # type: ignore[no-any-return]
 
@@ -71,10 +72,10 @@ def widest(
     halvings: int,
     peak: Callable[[Waveform], float] = lambda pulse: pulse.peak,
 ) -> float:
-    """Return the largest width, s, between two at which the current of a pulse keeps to a bound, A.
+    """Find by bisection the largest width, s, at which the peak current stays within a bound, A.
 
-    The bound is taken to hold at `low`, and it is `low` where it holds nowhere above. `peak` tells the
-    largest current of a pulse, A.
+    The search covers the widths from `low` to `high`. The bound is assumed to hold at `low`, which is
+    returned if it holds nowhere above. `peak` maps a pulse to its largest current, A.
     """
     if peak(of_width(pulse, high)) <= bound:
         return high
@@ -85,7 +86,7 @@ def widest(
 
 
 def steepest_rise(waveform: Waveform) -> float:
-    """Return the steepest slope of a waveform while its value moves away from zero, A/s; may be infinite."""
+    """Return the steepest slope of a waveform while it moves away from zero, A/s; infinite for a jump."""
     edges = waveform.segments()[:, 0]
     value = waveform.value(np.minimum(edges, np.nextafter(waveform.support, 0.0)))
     before = waveform.value(np.nextafter(edges, -np.inf))

@@ -1,4 +1,4 @@
-"""Times of impact in recorded files of the current in a coil, or of the voltage across it."""
+"""Impact times from recorded coil currents or coil voltages."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import Readings, read_table
 
 _BITS: Final = 24
-"""Bits of a converter without rounding; a record has its own in its noise."""
+"""Resolution of a converter without noticeable rounding; a record's rounding is part of its noise."""
 
 _QUIET: Final = 1e-4
-"""Least noise of a sample, as a fraction of the largest."""
+"""Smallest noise of a sample, as a fraction of the largest value."""
 
 _UNEVEN: Final = 0.01
-"""Largest difference of two time steps of a record, as a fraction of their median."""
+"""Largest spread of the time steps of a record, as a fraction of their median."""
 
 
 class RecordedImpacts(Result, rows="record"):
-    """Times of impact in records, one single shot each."""
+    """Impact times in records of one single shot each."""
 
-    hammer: Hammer = part("the nominal hammer")
-    signal: str = part("what was recorded, current or voltage")
-    flight_time: float = scalar("s", "from firing to impact on the nominal hammer")
+    hammer: Hammer = part("nominal hammer")
+    signal: str = part("recorded signal, current or voltage")
+    flight_time: float = scalar("s", "flight time of the nominal hammer")
     record: tuple[str, ...] = coordinate("", "file of the record", "record")
-    time: FloatArray = column("s", "from firing to impact", "record", more="NaN where none shows")
-    clearness: FloatArray = column("1", "size of what the impact does, over the noise of a sample", "record")
+    time: FloatArray = column("s", "time from firing to impact", "record", more="NaN if no impact shows")
+    clearness: FloatArray = column("1", "size of the impact's signature over the noise of a sample", "record")
     flag: tuple[str, ...] = column(
-        "", "what speaks against the estimate", "record", more="empty where nothing does"
+        "", "reason to doubt the estimate", "record", more="empty without a reason"
     )
 
     @property
@@ -49,7 +49,7 @@ class RecordedImpacts(Result, rows="record"):
         return f"times of impact of {self.hammer.name} in records of the {self.signal} of its coil"
 
     def summary(self) -> Summary:
-        """Return the times, a row for each record."""
+        """Tabulate the impact times, one row per record."""
         columns = [
             Cells("record", list(self.record), left=True),
             self.cells("time"),
@@ -67,28 +67,28 @@ def recorded_impacts(
     delay: float | str = 0.0,
     bandwidth: float | str | None = None,
 ) -> RecordedImpacts:
-    """Estimate the times of impact in records of single shots from rest, fired at time 0.
+    """Estimate the impact times in records of single shots from rest, fired at time 0.
 
-    The estimator is `printhammer.control.impact_estimator.ImpactEstimator`, the noise of a sample that of the
-    record.
+    The estimator is `printhammer.control.impact_estimator.ImpactEstimator`; the noise of a sample is
+    estimated from the record.
 
     Parameters
     ----------
     hammer : Hammer
         The nominal hammer, with a pack and a driver of its coil.
     paths : sequence of path
-        Tables with the columns ``time`` and ``current``, or ``voltage``, in even time steps.
+        Tables with the columns ``time`` and ``current``, or ``voltage``, in equal time steps.
     signal : str, optional
         "current" or "voltage".
     delay : float or str, optional
         Delay of the probe, s.
     bandwidth : float or str, optional
-        Bandwidth of the probe, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, else unlimited.
+        Bandwidth of the probe, Hz; by default that of a comment ``# bandwidth: 200 kHz``, else unlimited.
 
     Raises
     ------
     InputError
-        A record cannot be used, is too short, or shows nothing of an impact.
+        A record cannot be read, is too short, or shows no sign of an impact.
     """
     if signal not in UNITS:
         raise InputError.of("signal", signal, " or ".join(UNITS))
@@ -128,7 +128,7 @@ def recorded_impacts(
 def _estimator(
     hammer: Hammer, table: Readings, signal: Signal, delay: float, bandwidth: float | None
 ) -> ImpactEstimator:
-    """Return an estimator for the steps and the noise of a record."""
+    """Create an estimator for the time step and the noise of a record."""
     steps = np.diff(table.values["time"])
     step = float(np.median(steps))
     if float(np.ptp(steps)) > _UNEVEN * step:

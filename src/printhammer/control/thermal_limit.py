@@ -1,8 +1,8 @@
-"""The largest temperature of a coil, from the rates that its maker allows at several ambient temperatures.
+"""The temperature limit of a coil winding, from the maker's dot rates at several ambient temperatures.
 
-At one rail the largest rate is (L - A) / K, with the limit L of the winding, the ambient temperature A and
-the warming K of a dot a second (`printhammer.control.duty`). L is common to all rails and K is one for
-each; both are found by least squares of the logarithms of the rates.
+On one rail the largest rate is (L - A) / K, with the temperature limit L of the winding, the ambient
+temperature A and the warming K per dot rate (`printhammer.control.duty`). L is common to all rails, K is one
+constant per rail; both are fitted by least squares to the logarithms of the rates.
 """
 
 from __future__ import annotations
@@ -30,29 +30,29 @@ from printhammer.support.roots import bisect
 COLUMNS: Final = {"voltage": "V", "ambient": "degC", "rate": "Hz"}
 """Columns of a file of rates, and their SI units."""
 
-_HIGHEST: Final = 1e4  # Above the hottest ambient temperature, K
+_HIGHEST: Final = 1e4  # Upper end of the search, K above the hottest ambient temperature; arbitrary
 
 
 class ThermalLimit(Result):
-    """One largest temperature of the winding, from rates at several ambient temperatures."""
+    """Temperature limit of a winding, fitted to rates at several ambient temperatures."""
 
-    limit: float = scalar("degC", "largest temperature of the winding")
+    limit: float = scalar("degC", "temperature limit of the winding")
     error: float = scalar(
-        "K", "its standard error", more="from what the rates are off; NaN where none is more than needed"
+        "K", "standard error of the limit", more="from the residuals; NaN without a spare degree of freedom"
     )
     voltage: FloatArray = column("V", "rail", "row")
     ambient: FloatArray = column("degC", "ambient temperature", "row")
-    rate: FloatArray = column("Hz", "largest dots per second, as stated", "row")
-    fitted: FloatArray = column("Hz", "the same with the one limit", "row")
-    warming: FloatArray = column("K s", "what one dot a second warms the winding at this rail", "row")
+    rate: FloatArray = column("Hz", "largest dot rate, as stated", "row")
+    fitted: FloatArray = column("Hz", "largest dot rate, from the fit", "row")
+    warming: FloatArray = column("K s", "warming of the winding per dot rate on this rail", "row")
 
     @property
     def title(self) -> str:
-        """What was found."""
+        """Title in one line."""
         return f"largest temperature of a coil, {self.limit:.4g} degC"
 
     def summary(self) -> Summary:
-        """Return the limit, and the rates beside those that follow from it."""
+        """Tabulate the stated and fitted rates, and state the limit."""
         error = "" if np.isnan(self.error) else f" ± {self.error:.2g}"
         columns = [
             Cells("rail", [each or None for each in self.voltage.tolist()], "V", "g"),
@@ -70,20 +70,20 @@ def thermal_limit(
     rate: Sequence[float | str],
     voltage: Sequence[float | str] | None = None,
 ) -> ThermalLimit:
-    """Find the largest temperature of a coil from the rates that it stands.
+    """Fit the temperature limit of a coil to its largest dot rates.
 
     Parameters
     ----------
     ambient, rate : sequence of float or str
-        Ambient temperatures, degC, and the largest dots per second there, Hz.
+        Ambient temperatures, degC, and the largest dot rates at them, Hz.
     voltage : sequence of float or str, optional
-        Rails, V, at which they hold; by default all at the same.
+        Rail voltages, V, of the rates; by default one common rail.
 
     Raises
     ------
     InputError
-        The sequences are not of one length, no rail has rates at two ambient temperatures, or rates do not
-        fall as it gets warmer, or hardly.
+        The sequences differ in length, no rail has rates at two ambient temperatures, or the rates do not
+        fall appreciably with the ambient temperature.
     """
     cold = np.array([read_temperature(each, "ambient") for each in ambient])
     rates = np.array([read_positive(each, "Hz", "rate") for each in rate])
@@ -110,7 +110,7 @@ def thermal_limit(
     def slope(limit: float) -> float:
         return float(off(limit) @ centred(1.0 / (limit - cold)))
 
-    # The rates fall with the temperature faster, the nearer the limit: the slope has one sign on each side.
+    # The slope is positive below the limit and negative above it, so bisection finds the limit.
     hottest = float(cold.max())
     low, high = hottest + 1e-6 * (hottest - COLDEST), hottest + _HIGHEST
     if not slope(low) > 0.0 > slope(high):

@@ -1,7 +1,7 @@
-"""The closed loop: hammers, a sensor, and a controller that decides before each touch how to go on.
+"""Simulation of the closed loop: hammers, a position sensor, and a controller that decides before each touch.
 
-All runs are carried from decision to decision together. At each, the controller sees what its sensor has
-shown so far, and nothing else of the hammer that is driven. What comes out is an ordinary drive.
+All runs are advanced from decision to decision together. At each decision the controller knows the sensor
+readings so far, and nothing else of the driven hammer. The result is an ordinary drive.
 """
 
 from __future__ import annotations
@@ -23,46 +23,46 @@ from printhammer.results import Declared, part
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, MODE_NAMES, Ensemble
 from printhammer.support.arrays import BoolArray, FloatArray
 
-_SOON: Final = 1e-6  # Least time by which a run is carried, s
-_LATER: Final = 5e-6  # By how much a new pack is put off while the armature is inside it or the old one, s
+_SOON: Final = 1e-6  # Shortest advance of a run, s
+_LATER: Final = 5e-6  # Step by which a change of pack waits for the armature to be outside both, s; arbitrary
 _BRANCHES: Final = tuple(MODE_NAMES.index(name) for name in ("loading", "unloading", "reloading"))
 
 
 class Leg(NamedTuple):
-    """What runs are driven with, and until when, s, (runs,)."""
+    """A stage of the simulation: one hammer and one end time, s, per run."""
 
     hammers: list[Hammer]
     ends: FloatArray
 
 
 class FeedbackStrategy(Declared):
-    """Feedback as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`."""
+    """Feedback as a drive strategy, see `printhammer.printing.dots.strategy.Strategy`."""
 
     name: ClassVar[str] = "feedback"
-    controller: Controller = part("made for the nominal hammer")
-    sensor: PositionSensor = part("what it sees of the hammer that is driven", default=PositionSensor())
-    tolerance: float = part("error allowed in one step of the closed loop", default=DISPLAY_TOLERANCE)
-    threads: int | None = part("None for as many as there are cores; nothing depends on it", default=None)
+    controller: Controller = part("controller designed for the nominal hammer")
+    sensor: PositionSensor = part("sensor on the driven hammer", default=PositionSensor())
+    tolerance: float = part("error tolerance per integration step of the loop", default=DISPLAY_TOLERANCE)
+    threads: int | None = part("number of threads; None for one per core; no effect on results", default=None)
     places: tuple[Hammer, ...] | None = part(
-        "the hammer that is driven as it is at each slot; None where it is the same at all", default=None
+        "the driven hammer at each slot; None if it is the same at every slot", default=None
     )
 
     def along(self, places: tuple[Hammer, ...]) -> FeedbackStrategy:
-        """Return the same for a hammer that is another one at each slot, see `places`."""
+        """Return a copy that drives a different hammer at each slot, see `places`."""
         return replace(self, places=places)
 
     def __call__(
         self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float
     ) -> list[PulseSequence]:
-        """Run the closed loop on a hammer, and return the drive that it gave each pattern."""
+        """Simulate the closed loop on a hammer; return the drive of each pattern."""
         loops = self.loops(hammer, patterns, rate) if patterns else []
         return [loop.drive(self.controller.driver.edge) for loop in loops]
 
     def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
-        """Run the closed loop on a hammer for each pattern, from rest.
+        """Simulate the closed loop on a hammer for each pattern, from rest.
 
-        The controller does not know the hammer that is driven, and sees it through the sensor. Patterns are
-        numbers of the slots at which dots are wanted, `rate` slots per second, Hz.
+        The controller does not know the driven hammer and observes it only through the sensor. Patterns are
+        indices of the slots with a dot; `rate` is the slot rate, Hz.
         """
         controller = self.controller
         rest = np.array([rest_state(hammer), 0.0, -1.0, 0.0])
@@ -73,7 +73,7 @@ class FeedbackStrategy(Declared):
             controller.launch(loop, 0)
             loops.append(loop)
         policy = controller.policy(1.0 / rate)
-        # In the order of the slots, so that runs beside each other are as long as each other.
+        # In the order of the slots, so that the runs of one ensemble are equally long.
         for slot in range(max(slots[-1] for slots in patterns) + 1):
             now = [(loop, loop.slots.index(slot)) for loop in loops if slot in set(loop.slots)]
             moving = [(loop, dot) for loop, dot in now if loop.alive]
@@ -92,18 +92,18 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Return hammers and until when they are driven; a dot's own comes with its firing."""
+        """Return the stages up to `ends`; the pack of a dot's slot takes over at its firing."""
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]
         after = [self.places[loop.slots[dot]] for loop, dot in now]
-        # At rest it is still to be fired.
+        # A dot after a rest has not been fired yet.
         fired = [loop.pulses[dot].fired if dot < len(loop.pulses) else np.inf for loop, dot in now]
         turns = np.minimum(fired, ends)
         return [Leg(before, turns), Leg(after, ends)]
 
     def _see_contacts(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Carry some runs until their latest contacts are over, and learn from these."""
+        """Advance runs until their latest contacts are over, and update the estimates from these."""
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
@@ -112,7 +112,7 @@ class FeedbackStrategy(Declared):
         self.controller.learn(loops, contacts)
 
     def _see_flights(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Carry some runs to their next decisions, and estimate the coming touches."""
+        """Advance runs to their next decisions, and estimate the coming touches."""
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         touches = np.array([loop.touch - LEADS[loop.kind] for loop in loops])
@@ -123,10 +123,10 @@ class FeedbackStrategy(Declared):
         self.controller.estimate(loops, flights)
 
     def _carry(self, legs: list[Leg], loops: list[Loop], since: FloatArray) -> tuple[Samples, Samples]:
-        """Carry runs to an end; return what is shown of contacts and, since a time, of flights."""
+        """Advance runs through stages; return the samples of contacts and, from `since` on, of flights."""
         controller, sensor, ends = self.controller, self.sensor, legs[-1].ends
         starts = np.array([loop.time for loop in loops])
-        # What is seen of a contact that has not been: nothing.
+        # An empty time span for a run without a contact.
         spans = np.array(
             [(loop.touched.start, loop.touched.end) if loop.touched else (1.0, 0.0) for loop in loops]
         )
@@ -139,11 +139,11 @@ class FeedbackStrategy(Declared):
         used &= times > starts[:, np.newaxis]
         x = np.full(numbers.shape, np.nan)
         for leg, following in zip(legs, [*legs[1:], None], strict=True):
-            # What is shown at the end of the last leg may lie beyond it by rounding.
+            # Samples at the end of the last stage may lie beyond it by rounding.
             until = np.full(len(loops), np.inf) if following is None else leg.ends
             self._advance(leg, loops, until, times, used, x)
             while following is not None:
-                # A contact meets one pack: the next one waits until the armature is outside both.
+                # A contact meets one pack: the change waits until the armature is outside both packs.
                 waits = [
                     loop.alive
                     and loop.time < end
@@ -172,7 +172,7 @@ class FeedbackStrategy(Declared):
         used: BoolArray,
         x: FloatArray,
     ) -> None:
-        """Carry runs to the end of a leg, where they are not yet; put in x at samples up to `until`."""
+        """Advance runs to the end of a stage where necessary; fill in x at the samples up to `until`."""
         hammers, ends = leg
         inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
         moves = np.array([loop.time < end for loop, end in zip(loops, ends, strict=True)])
@@ -181,7 +181,7 @@ class FeedbackStrategy(Declared):
                 continue
             own = [loops[k] for k in group]
             here = [used[k] & (times[k] > loops[k].time) & (times[k] <= until[k]) for k in group]
-            # A sample may be one of the contact and one of the flight.
+            # A sample may belong to both the contact and the flight.
             strobes = [
                 np.append(np.unique(times[k][mine]), ends[k]) for k, mine in zip(group, here, strict=True)
             ]

@@ -1,9 +1,10 @@
-"""Feedback: a drive that sees the hammer, beside an open loop and whatever else there is.
+"""Feedback control compared with the open loop and other strategies.
 
 F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), ends with the wish that "driving
-current waveforms ought to respond to the phase of the hammer motion and the pattern to be printed". Here they
-do. A controller that knows the nominal hammer, and sees the real one late and with noise, prints all patterns
-of eight slots; so does the open loop, and both fire two pulses at all distances.
+current waveforms ought to respond to the phase of the hammer motion and the pattern to be printed". This
+module tests the idea: a controller that knows the nominal hammer, and observes the real one with delay and
+noise, prints all patterns of eight slots, as does the open loop; then both fire pairs of pulses at a range of
+distances.
 """
 
 from __future__ import annotations
@@ -47,62 +48,62 @@ if TYPE_CHECKING:
 
     from printhammer.results.result import Entries
 
-BURST: Final = "11101101"  # Pattern of the run that is shown
-MOST_GAPS: Final = 500  # Number of gaps above which a double-pulse test is refused
-# First and last gap of the double-pulse test, in flight times of the single pulse, and their number
+BURST: Final = "11101101"  # Pattern of the recorded run; arbitrary
+MOST_GAPS: Final = 500  # Largest number of gaps in a double-pulse test
+# Default first and last gap of the double-pulse test, in single-pulse flight times, and their number
 _GAPS: Final = (1.5, 6.0, 46)
 
 
 class ObservedRun(Declared):
-    """One run of the closed loop, and what the controller saw of it."""
+    """One run of the closed loop with the samples that the controller used."""
 
-    pattern: str = part("the slots, 1 where a dot is wanted")
-    motion: Motion = part("the run", repr=False)
-    times: FloatArray = column("s", "times of the samples that were looked at", "sample")
-    shown: FloatArray = column("m", "what the sensor showed", "sample")
-    due: FloatArray = column("s", "times at which touches were wanted", "dot")
+    pattern: str = part("the slots, 1 for a dot")
+    motion: Motion = part("motion of the run", repr=False)
+    times: FloatArray = column("s", "times of the samples used", "sample")
+    shown: FloatArray = column("m", "sensor readings", "sample")
+    due: FloatArray = column("s", "requested touch times", "dot")
 
 
 _DOTS: Final = "strategy pattern dot"
 
 
 class Feedback(Result, rows=_DOTS):
-    """Strategies side by side, feedback the last of them."""
+    """Comparison of drive strategies; feedback is the last one."""
 
-    hammer: Hammer = part("the nominal hammer, for which the controller is made")
-    driven: Hammer = part("the hammer that is driven")
-    driver: Driver = part("driver of the coil, with feedback")
-    sensor: PositionSensor = part("what the controller sees")
-    limits: Limits = part("how far dots may be off")
-    single: Nominal = part("the single-pulse dot of the nominal hammer, by which all are judged")
-    rate: float = scalar("Hz", "slots per second")
-    strategies: tuple[str, ...] = coordinate("", "name of the way to drive", "strategy", name="strategy")
+    hammer: Hammer = part("nominal hammer, for which the controller is designed")
+    driven: Hammer = part("driven hammer")
+    driver: Driver = part("driver of the coil for feedback")
+    sensor: PositionSensor = part("sensor of the controller")
+    limits: Limits = part("limits on the dots")
+    single: Nominal = part("single-pulse dot of the nominal hammer, which judges all dots")
+    rate: float = scalar("Hz", "slot rate")
+    strategies: tuple[str, ...] = coordinate("", "name of the drive strategy", "strategy", name="strategy")
     passed: BoolArray = column("1", "whether all dots are within limits", "strategy pattern", dtype=np.int8)
     force: FloatArray = column(
         "1",
-        "force less that of the single pulse, in parts of it",
+        "relative deviation of the force from the single pulse",
         _DOTS,
-        more="nan where no dot is wanted or it is lost",
+        more="NaN without a dot, and for a lost dot",
     )
     arrival: FloatArray = column(
-        "s", "arrival less slot time and single-pulse flight time", _DOTS, more="nan likewise"
+        "s", "arrival minus slot time and single-pulse flight time", _DOTS, more="NaN likewise"
     )
     lost: IntArray = column("1", "lost dots", "strategy", dtype=np.int32)
     extra_contacts: IntArray = column("1", "extra contacts", "strategy", dtype=np.int32)
     peak_current: FloatArray = column("A", "largest absolute value of the current", "strategy")
     gaps: FloatArray = coordinate("s", "time between two slots", "gap", name="gap")
-    gap_force: FloatArray = column("1", "likewise of the second of two dots", "strategy gap")
-    gap_arrival: FloatArray = column("s", "likewise of the second of two dots", "strategy gap")
-    run: ObservedRun = part("one run with feedback")
-    tolerance: float = part("error allowed in one step")
+    gap_force: FloatArray = column("1", "relative force deviation of the second of two dots", "strategy gap")
+    gap_arrival: FloatArray = column("s", "arrival deviation of the second of two dots", "strategy gap")
+    run: ObservedRun = part("recorded run with feedback")
+    tolerance: float = part("error tolerance per integration step")
 
     @property
     def title(self) -> str:
-        """What is driven."""
+        """Title in one line."""
         return f"feedback on {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return the patterns within limits and the deviations of dots, a row for each way to drive."""
+        """Tabulate the patterns within limits and the deviations of the dots, one row per strategy."""
         count = self.passed.shape[1]
         known = [force[np.isfinite(force)] for force in self.force]
         late = [times[np.isfinite(times)] for times in self.arrival]
@@ -122,7 +123,7 @@ class Feedback(Result, rows=_DOTS):
         return Summary([Grid(columns)])
 
     def entries(self) -> Entries:
-        """Return the columns, and what the sensor showed in the run."""
+        """Return the columns, and the sensor readings of the recorded run."""
         samples = {
             "sample_time": (Column("s", "time of a sample in the run shown", ("sample",)), self.run.times),
             "shown": (Column("m", "what the sensor showed", ("sample",)), self.run.shown),
@@ -131,7 +132,7 @@ class Feedback(Result, rows=_DOTS):
         return {**super().entries(), **named}
 
     def notes(self) -> dict[str, Any]:
-        """Return driver, sensor, limits, and what the run shows."""
+        """Return driver, sensor, limits, and the pattern of the recorded run."""
         return {
             "driven_fingerprint": self.driven.fingerprint,
             "largest_current": self.driver.current,
@@ -145,7 +146,7 @@ class Feedback(Result, rows=_DOTS):
         }
 
     def plot_run(self, **options: Any) -> Figure:
-        """Draw the run with what the controller saw; returns a matplotlib figure."""
+        """Plot the recorded run with the samples that the controller used; return a matplotlib figure."""
         return self.plot(picture="run", **options)
 
 
@@ -164,34 +165,34 @@ def feedback(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> Feedback:
-    """Drive a hammer with feedback, and compare it with the open loop.
+    """Drive a hammer with feedback, and compare the dots with those of the open loop.
 
     Parameters
     ----------
     hammer : Hammer
         The nominal hammer, with a pack, a backstop and a waveform that is a current.
     rate : float or str
-        Slots per second, Hz, or text with a unit.
+        Slot rate, Hz, or text with a unit.
     driven : Hammer, optional
-        The hammer that is driven; by default the nominal one.
+        The driven hammer; by default the nominal one.
     sensor : PositionSensor, optional
-        What the controller sees; by default 1 % noise and 20 us delay.
+        Sensor of the controller; by default with 1 % noise and 20 us delay.
     current : float or str, optional
-        Largest current of the driver to either side, A.
+        Current limit of the driver, of either sign, A.
     edge : float or str, optional
-        Time constant of the driver, s; by default that with which the hammer's own waveform decays.
+        Time constant of the driver, s; by default the decay time constant of the hammer's own waveform.
     limits
         As for `printhammer.safe_rate`.
     beside : sequence of Strategy, optional
-        Further ways to drive, for instance a compensation table.
+        Further strategies to compare, for instance a compensation table.
     gaps : array, optional
-        Times between the two slots of the double-pulse test, s; by default 46 from one and a half to six
-        times the flight time of the single pulse.
+        Times between the two slots of the double-pulse test, s; by default 46 values from 1.5 to 6 flight
+        times of the single pulse.
 
     Returns
     -------
     Feedback
-        A run that could not go on is no exception: its dots are lost.
+        The comparison; a failed simulation raises no exception, and its dots count as lost.
     """
     slot_rate = read_positive(rate, "Hz", "rate")
     time_constant = None if edge is None else read_positive(edge, "s", "edge")

@@ -1,8 +1,9 @@
-"""The controller: it knows the nominal hammer, sees the real one through its sensor, and switches the coil.
+"""The feedback controller: it knows the nominal hammer, observes the driven one, and switches the coil.
 
-It fires on energy and phase, releases the armature before a first impact and measures out the rest of its
-energy with a push into the pack, catches it on the way back and throws it again where the next dot is due
-soon, and brakes it before the backstop where there is time to come to rest.
+Before each touch it chooses the pulses that follow, from the estimated time and speed of the touch. It
+releases the armature before a first impact and adds the missing energy with a push into the pack; it catches
+the returning armature and throws it again if the next dot is due soon; and it brakes the armature before the
+backstop if there is time to come to rest.
 """
 
 from __future__ import annotations
@@ -37,36 +38,35 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
-"""Time before a touch at which the controller decides, s, by its kind: a push may have to end at the touch,
-and does not begin before it."""
+"""Time between decision and touch, s, by kind of touch: a push may have to end at the touch, and does not
+begin before it."""
 
-WINDOW: Final = 120e-6  # Time over which samples are looked at, s
-# Standard deviations that are expected at a touch: of the displacement, in parts of the way to the pack, and
-# of the speed, m/s
+WINDOW: Final = 120e-6  # Length of the time window of samples, s
+# Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s
 _PLACE_ERROR: Final = 0.03
 _SPEED_ERROR: Final = 0.03
-# Likewise after the first launch, beside what the scale of the currents makes of it
+# The same after the first launch, in addition to the effect of the current scale
 _LAUNCH_ERRORS: Final = (0.005, 0.003)
-# Distance before the touch from which a contact is computed, in parts of the way to the pack
+# Distance before the touch at which the simulation of a contact begins, as a fraction of the stroke
 _BEFORE: Final = 0.15
-# Time after a touch up to which its samples are looked at, in flight times of the single pulse
+# Time after a touch for which its samples are used, in single-pulse flight times
 CONTACT: Final = 1.1
-# Change of the time of a touch beyond which an estimate is not believed, in flight times
+# Change of a touch time beyond which an estimate is rejected, in single-pulse flight times
 _ASTRAY: Final = 0.4
-# Current, in parts of the largest one, that presses the armature against the backstop after a landing
+# Current, as a fraction of the largest, that presses the armature against the backstop after a landing
 _CLAMP: Final = 1.0
-_CLAMPED, _LONGEST = 0.6, 1.2  # How long it does, and at most where there is time, in flight times
-_FADED: Final = 3.0  # Time that is left for a current to fade, in time constants of the driver
-_CLEAR: Final = 0.22  # Part of the flight of a launch after which the armature is off the backstop
-_PATIENCE: Final = 40e-6  # Time between the end of a contact and a throw that is decided anew, s
-_POLICIES: Final = 8  # Number of policies that are kept
+_CLAMPED, _LONGEST = 0.6, 1.2  # Duration of that current, and its maximum, in single-pulse flight times
+_FADED: Final = 3.0  # Time for a current to decay, in time constants of the driver
+_CLEAR: Final = 0.22  # Fraction of a launch's flight time after which the armature is off the backstop
+_PATIENCE: Final = 40e-6  # Time between the end of a contact and a throw that is decided again, s
+_POLICIES: Final = 8  # Size of the policy cache
 
 
 class Ahead(NamedTuple):
-    """Where a way leads.
+    """Consequences of a way.
 
-    Times after a touch, s, of the throw, of leaving the pack and of the next touch; width of the push, s;
-    kind and speed, m/s, of that touch.
+    Times after a touch, s, of the throw, of departure from the pack and of the next touch; width of the push,
+    s; kind and speed, m/s, of the next touch.
     """
 
     fire: float
@@ -78,15 +78,15 @@ class Ahead(NamedTuple):
 
 
 class Controller:
-    """A controller made for one hammer, the nominal one, and the driver of its coil.
+    """A controller designed for a nominal hammer and the driver of its coil.
 
-    The hammer has a pack and a backstop. `limits` say how far a dot may be off; `threads` are by default as
-    many as there are cores; `progress` is called with the steps of `fronts` done and of all.
+    The hammer needs a pack and a backstop. `limits` normalise the deviations of dots; `threads` defaults to
+    one per core; `progress` is called with the number of finished steps and of all steps of `fronts`.
 
     Raises
     ------
     InputError
-        The hammer has no pack, no backstop, no waveform or no rest state, or the driver is too weak for it.
+        The hammer has no pack, backstop, waveform or rest state, or the driver is too weak for it.
     """
 
     def __init__(
@@ -111,16 +111,16 @@ class Controller:
         self.start = launch(plant, forces)
         self.fronts = fronts(plant, forces, self.start, progress)
         self._contacts = Contacts(plant)
-        # Of a period, s
+        # Keyed by the slot period, s
         self.policy = lru_cache(_POLICIES)(lambda period: Policy(self.fronts, period, self.limits))
 
     @cached_property
     def force(self) -> FreeForce:
-        """Force on the flying armature."""
+        """Force of magnet and spring on the flying armature."""
         return FreeForce(self.hammer, self.hammer.origin, self.plant.front, self.driver.current)
 
     def launch(self, loop: Loop, dot: int) -> None:
-        """Fire from rest, so that a dot comes when it is due."""
+        """Fire from rest, timed so that the dot touches when it is due."""
         start = self.start
         learned = loop.learned
         late = (learned.front * self.stroke - start.place_slope * learned.scale) / start.speed
@@ -133,14 +133,14 @@ class Controller:
         loop.since = fired + _CLEAR * start.flight
 
     def _fire(self, loop: Loop, time: float, width: float) -> None:
-        """Push for some width, s, from a time on, s."""
+        """Add a push of `width`, s, that begins at `time`, s."""
         pulse = Pulse(time)
         pulse.switch(time, self.driver.current)
         pulse.switch(time + width, 0.0)
         loop.pulses.append(pulse)
 
     def learn(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Learn where the front of the pack is from what the sensor showed of contacts."""
+        """Update the estimates of the pack's front from the samples of contacts."""
         rows = [k for k, loop in enumerate(loops) if loop.alive and loop.touched is not None]
         for loop in loops:
             loop.learned.drift()
@@ -148,7 +148,7 @@ class Controller:
             self._contacts.learn([loops[k] for k in rows], samples.take(rows))
 
     def estimate(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Estimate the coming touches from what the sensor shows of flights."""
+        """Estimate the coming touches from the samples of flights."""
         expected = Expected(
             np.array([loop.touch for loop in loops]),
             np.array([loop.speed for loop in loops]),
@@ -170,7 +170,7 @@ class Controller:
         for k, loop in enumerate(loops):
             if not loop.alive:
                 continue
-            # What is far from all that was expected is no estimate of this touch: the plan stands.
+            # An estimate far from the expectation is rejected, and the plan stands.
             if abs(flight.touch[k] - loop.touch) < _ASTRAY * long and flight.speed[k] > 0.0:
                 loop.touch, loop.speed = float(flight.touch[k]), float(flight.speed[k])
                 loop.learned.take_scale(float(flight.scale[k]), float(flight.covariance[k, 2, 2]))
@@ -182,19 +182,19 @@ class Controller:
             loop.seen.append((samples.times[k][used], samples.shown[k][used]))
 
     def _expected(self, loop: Loop) -> FloatArray:
-        """Return the covariance of displacement, speed and scale that are expected at a touch."""
-        # Later launches begin with what a landing has left of the motion before.
+        """Return the expected covariance of displacement, speed and current scale at a touch."""
+        # Later launches begin with the residual motion of a landing.
         if loop.launched and len(loop.pulses) == 1:
             start = self.start
             slope = np.array([start.place_slope, start.speed_slope, 1.0])
             place, speed = _LAUNCH_ERRORS
             errors = np.array([place * self.stroke, speed, 0.0])
-            # The first one differs by what the scale of the currents makes of it.
+            # The first launch differs by the effect of the current scale.
             return np.outer(slope, slope) * loop.learned.scale_error**2 + np.diag(errors**2)
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Decide how some runs go on after a touch that is about to come; each with the number of its dot."""
+        """Decide how runs continue after their coming touches, each with the index of its dot."""
         kind = np.array([loop.kind for loop, _dot in now])
         speed = np.array([loop.speed for loop, _dot in now])
         touch = np.array([loop.touch for loop, _dot in now])
@@ -214,7 +214,7 @@ class Controller:
         for k, (loop, dot) in enumerate(now):
             pulse = loop.pulses[-1]
             if loop.kind != FREE:
-                # The push has no end yet.
+                # The push that is on has no end yet.
                 del pulse.at[1:], pulse.levels[1:]
             if rests[k] or not np.isfinite(cost[k]):
                 self._land(loop, dot, *(float(values[k]) for values in landed))
@@ -228,13 +228,13 @@ class Controller:
             self._push(loop, pulse, float(release[k]), back)
             pulse.switch(loop.touch + ahead[k].fire, 0.0)
             self._throw(loop, loop.touch, ahead[k])
-            # What the contact shows of the front comes in time for a throw that is late.
+            # For a late throw, the contact reveals the front in time to decide again.
             over = printed.touch + CONTACT * self.single.flight_time + _PATIENCE
             unsure = learned.front_error > KNOWN and loop.pulses[-1].fired > over
             loop.printed = printed if unsure else None
 
     def decide_again(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Decide anew how some runs are thrown, each with the number of the dot that is coming."""
+        """Decide again how runs are thrown, after their contacts, each with the index of the coming dot."""
         before = [loop.printed for loop, _dot in now if loop.printed is not None]
         kind, touch, speed, thought, force, slope, back = (
             np.array([getattr(printed, name) for printed in before])
@@ -264,7 +264,7 @@ class Controller:
             self._throw(loop, float(touch[k]), ahead[k])
 
     def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
-        """Return what some ways lead to."""
+        """Return the consequences of the chosen ways."""
         table, rows = self.fronts.table, np.arange(len(way))
         columns = (
             table.fire[way],
@@ -277,7 +277,7 @@ class Controller:
         return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def _throw(self, loop: Loop, touch: float, ahead: Ahead) -> None:
-        """Throw the armature where the last pulse ends."""
+        """Throw the armature at the end of the last pulse."""
         self._fire(loop, loop.pulses[-1].at[-1], ahead.width)
         clear = max(ahead.leaves, ahead.fire) if ahead.width != ALWAYS else ahead.leaves
         loop.since = touch + clear
@@ -285,18 +285,18 @@ class Controller:
         loop.touch, loop.speed = touch + ahead.touch, ahead.speed
 
     def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
-        """Push into the pack from the touch to the release, if at all, then pull back."""
+        """Push into the pack from the touch to the release, if required, then apply the return current."""
         if loop.kind == FREE and release > 0.0:
             pulse.switch(max(loop.touch, loop.time), self.driver.current)
         pulse.switch(max(loop.touch + release, loop.time), back)
 
     def _land(self, loop: Loop, dot: int, release: float, brake: float, width: float) -> None:
-        """Print, and brake on the way back."""
+        """Print a dot and brake the armature on its return."""
         pulse = loop.pulses[-1]
         self._push(loop, pulse, 0.0 if np.isnan(release) else release, 0.0)
         if not np.isnan(brake):
             pulse.switch(loop.touch + brake, self.driver.current)
-            # Whatever is left of the motion is pressed out of it against the backstop.
+            # The residual motion is damped by pressing the armature against the backstop.
             pulse.switch(loop.touch + brake + width, -_CLAMP * self.driver.current)
             single = self.single.flight_time
             fading = _FADED * self.driver.edge
@@ -307,7 +307,7 @@ class Controller:
             pulse.switch(loop.touch + end, 0.0)
 
     def _landings(self, kind: Any, speed: FloatArray, front: FloatArray) -> list[FloatArray]:
-        """Return release, begin and width of the brake pulse for some touches."""
+        """Interpolate release, start and width of the brake pulse for touches."""
         below, share = between(self.fronts.table, kind, speed)
         nearer, farther = between_fronts(front)
         settings = []
@@ -322,17 +322,17 @@ class Controller:
 
     @property
     def _rest(self) -> float:
-        """Least time between two dots between which the armature comes to rest, s."""
+        """Shortest time between two dots in which the armature comes to rest, s."""
         return self.fronts.landing.settled + self.start.flight
 
     def _before_rest(self, loop: Loop, dot: int) -> int:
-        """Return the number of dots between a dot and a rest."""
+        """Return the number of dots between a dot and the next rest."""
         rests = np.flatnonzero(np.diff(loop.due[dot:]) >= self._rest)
         return int(rests[0]) if rests.size else max(len(loop.due) - dot - 1, 0)
 
 
 def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
-    """Return times, s, and heights, A, of all changes of the command to the coil, (M, S), filled with 0."""
+    """Return times, s, and heights, A, of all steps of the current command, (M, S), zero-padded."""
     rows = []
     for loop in loops:
         steps = [
@@ -349,7 +349,7 @@ def _steps(loops: Sequence[Loop]) -> tuple[FloatArray, FloatArray]:
 
 
 def _current(at: FloatArray, height: FloatArray, edge: float, t: FloatArray) -> FloatArray:
-    """Return the current, A, at times t, (M, K), after steps of the command, (M, S)."""
+    """Return the current, A, at times t, (M, K), after steps of the command, (M, S), by first-order lag."""
     total = np.zeros_like(t)
     for k in range(at.shape[1]):
         since = np.maximum(t - at[:, k, np.newaxis], 0.0)

@@ -1,12 +1,12 @@
-"""The map from one touch of the pack to the next: where each way to switch the coil leads (a Poincaré map).
+"""The Poincaré map from one touch of the pack to the next, for every way to switch the coil.
 
-At the touch the armature has a speed, and the coil is either on already (the armature is *pushed*) or off (it
-flies *freely*: it was released before impact). The coil is then held at the push current until `release`, at
-the return current until `fire`, and at the push current again: up to the next touch and beyond, or for some
-width after which the armature flies freely. Which force this prints, and when and how fast the next touch
-comes, has nothing to do with the rate of printing: one map holds for all rates.
+At the touch the armature has a speed, and the coil is either on (a *pushed* touch) or off (a *free* touch:
+the armature was released before impact). A way then holds the coil at the push current until `release`, at
+the return current until `fire`, and at the push current again: either beyond the next touch, or for a width
+after which the armature flies freely. The printed force and the time and speed of the next touch do not
+depend on the slot rate, so one map serves all rates.
 
-Linear interpolation in the tables of the controller, many places at once.
+The tables are interpolated linearly, vectorised over touches.
 """
 
 from __future__ import annotations
@@ -22,52 +22,52 @@ if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray, IntArray
     from printhammer.support.threads import Progress
 
-AHEAD: Final = 1e-6  # Time before the touch at which the runs of a map begin, s
+AHEAD: Final = 1e-6  # Time before the touch at which the simulations of a map begin, s
 PUSHED, FREE = 0, 1
-"""Kinds of touches."""
+"""Kinds of touch: with the coil on, or in free flight."""
 
-ALWAYS: Final = 2e-3  # Width of a push that is still on at the next touch, s
-# Speeds of the touches, in parts of that of the single pulse
+ALWAYS: Final = 2e-3  # Width that stands for a push that is still on at the next touch, s
+# Speeds of the touches, as fractions of the single pulse's impact speed
 _PUSHED_SPEEDS: Final = np.linspace(0.3, 1.1, 17)
 _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
-_RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, in parts of the largest one
+_RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, as fractions of the largest current
 
 FORCES: Final = (0.95, 1.0, 1.05)
-"""Forces for which ways are computed, in parts of that of the single pulse; only the return currents vary
-more slowly over the ways."""
+"""Forces for which ways are computed, relative to the single pulse. In the order of the ways, only the return
+current varies more slowly."""
 
-# Widths of the pushes that end before the touch, in parts of that of the launch
+# Widths of the pushes that end before the touch, as fractions of the launch width
 _WIDTHS: Final = (0.85, 1.0, 1.2)
-# Times of releases, and of throws before and after the bounce, in flight times of the single pulse
+# Times of releases, and of throws before and after the bounce, in single-pulse flight times
 _RELEASES: Final = np.linspace(0.0, 0.85, 29)
 _EARLY: Final = np.linspace(0.14, 1.07, 38)
 _LATE: Final = np.linspace(1.1, 2.9, 48)
-_WATCHED, _WAIT = 3.0, 1.7  # Length of the runs for forces, and of the others after the throw, likewise
-# Time after which next to nothing is left of a change of the current, in time constants of the driver
+_WATCHED, _WAIT = 3.0, 1.7  # Length of the force simulations, and of the others after the throw, likewise
+# Time after which a change of the current has decayed, in time constants of the driver
 _FADED: Final = 2.5
-_LARGEST_FORCE: Final = 1.15  # Force above which a way leads nowhere, in parts of that of the single pulse
+_LARGEST_FORCE: Final = 1.15  # Force above which a way is inadmissible, relative to the single pulse
 
 
 @dataclass(frozen=True)
 class ForceMap:
-    """Peak force by touch (T,), return current (B,) and release (R,)."""
+    """Peak force as a function of touch (T,), return current (B,) and release (R,)."""
 
     kind: IntArray  # `PUSHED` or `FREE`, (T,)
-    speed: FloatArray  # Of the touch, m/s; evenly spaced within a kind, (T,)
+    speed: FloatArray  # Speed of the touch, m/s; evenly spaced within a kind, (T,)
     back: FloatArray  # Return currents, A, (B,)
     release: FloatArray  # Time after the touch at which the push ends, s, (R,)
-    force: FloatArray  # In parts of the single-pulse force, (T, B, R)
+    force: FloatArray  # Relative to the single pulse, (T, B, R)
     front: float  # Front of the pack, m
 
     @property
     def off(self) -> int:
-        """Number of the return current that is none."""
+        """Index of the return current closest to zero."""
         return int(np.argmin(np.abs(self.back)))
 
     def release_for(self, force: float) -> FloatArray:
-        """Return the release that gives a force, shape (T, B), s; NaN where the push is too weak for it.
+        """Return the release that gives a force, shape (T, B), s; NaN if the push is too weak.
 
-        Where even no push is too much, it is 0.
+        The release is 0 if the touch exceeds the force without a push.
         """
         releases = np.full(self.force.shape[:2], np.nan)
         for place in np.ndindex(releases.shape):
@@ -77,7 +77,7 @@ class ForceMap:
         return releases
 
     def force_at(self, row: int, release: float, back: float) -> float:
-        """Return the force of a touch, in parts of the single-pulse force."""
+        """Interpolate the force of a touch, relative to the single pulse."""
         number = int(np.argmin(np.abs(self.back - back)))
         return float(np.interp(release, self.release, self.force[row, number]))
 
@@ -89,28 +89,28 @@ class ForceMap:
 
 @dataclass(frozen=True)
 class ImpactMap:
-    """Where the ways to switch the coil (A,) lead from the touches of a force map (T,)."""
+    """Outcome of each way to switch the coil (A,) from each touch of a force map (T,)."""
 
     back: FloatArray  # Return current, A, (A,)
     fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)
-    width: FloatArray  # Of that push, s; `ALWAYS` for one up to the next touch, (A,)
+    width: FloatArray  # Width of that push, s; `ALWAYS` if it lasts to the next touch, (A,)
     release: FloatArray  # Time after the touch at which the push ends, s, (T, A)
-    # Peak force in parts of the single-pulse force; NaN where this way leads nowhere, (T, A)
+    # Peak force relative to the single pulse; NaN for an inadmissible way, (T, A)
     force: FloatArray
-    # Time of the next touch after this one, s, and its speed, m/s; NaN likewise, (T, A)
+    # Time from this touch to the next, s, and speed of the next touch, m/s; NaN likewise, (T, A)
     next_touch: FloatArray
     next_speed: FloatArray
     next_kind: IntArray  # `PUSHED` or `FREE`, (A,)
     leaves: FloatArray  # Time after the touch at which the armature leaves the pack, s, (T, A)
-    # Of the touches, as in the force map, (T,)
+    # Kind and speed of the touches, as in the force map, (T,)
     kind: IntArray
     speed: FloatArray
     forces: ForceMap  # Peak force by release
-    driver: Driver  # Of the coil
+    driver: Driver  # Driver of the coil
 
 
 def force_map(plant: Plant) -> ForceMap:
-    """Compute the peak force for all touches, return currents and releases."""
+    """Simulate the peak force for all touches, return currents and releases."""
     single, driver = plant.single, plant.driver
     kinds = np.repeat([PUSHED, FREE], [len(_PUSHED_SPEEDS), len(_FREE_SPEEDS)])
     speeds = np.concatenate([_PUSHED_SPEEDS, _FREE_SPEEDS]) * single.impact_speed
@@ -128,7 +128,7 @@ def force_map(plant: Plant) -> ForceMap:
 
 
 def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float, float]]) -> FloatArray:
-    """Return the forces of touches by row, release, s, and return current, A; NaN for a run that failed."""
+    """Simulate the forces of touches by row, release, s, and return current, A; NaN for a failed run."""
     long = _WATCHED * plant.single.flight_time
     drives = [
         plant.driver.drive([first_pulse(int(forces.kind[row]), release, back, long, plant.driver)])
@@ -141,7 +141,7 @@ def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float,
 def impact_map(
     plant: Plant, forces: ForceMap, launched: float, progress: Progress | None = None
 ) -> ImpactMap:
-    """Compute where all ways to switch the coil lead; `launched` is the width of the push from rest, s."""
+    """Simulate all ways to switch the coil from all touches; `launched` is the launch width, s."""
     single, driver = plant.single, plant.driver
     scale = single.flight_time
     fires = np.concatenate([_EARLY, _LATE]) * scale
@@ -168,7 +168,7 @@ def impact_map(
     flight = dots.flight_time[:, 1]
     pushed = width[ways] == ALWAYS
     with np.errstate(invalid="ignore"):
-        # Free means that next to nothing is left of the current at the touch, pushed that all of it is there.
+        # A free touch requires that the current has decayed, a pushed one that it has risen.
         settled = np.where(pushed, flight, flight - width[ways]) > _FADED * driver.edge
         good = ok & dots.struck[:, 0] & dots.struck[:, 1] & (dots.extra_contacts[:, 0] == 0) & settled
         good &= dots.peak_force[:, 0] < _LARGEST_FORCE * single.force
@@ -196,7 +196,7 @@ def impact_map(
 
 
 def first_pulse(kind: int, release: float, back: float, fire: float, driver: Driver) -> Switched:
-    """Return what the coil does from just before the touch up to the next push."""
+    """Return the current from just before the touch up to the next push."""
     at, levels = [0.0], [driver.current if kind == PUSHED else 0.0]
     if release > 0.0:
         at.append(AHEAD)
@@ -206,23 +206,23 @@ def first_pulse(kind: int, release: float, back: float, fire: float, driver: Dri
 
 
 def place_of(values: FloatArray, nodes: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the node below each value, and the share of the one above; nodes are evenly spaced."""
+    """Locate values between evenly spaced nodes: index of the node below, weight of the node above."""
     place = (values - nodes[0]) / (nodes[1] - nodes[0])
     below = np.clip(place.astype(np.int64), 0, len(nodes) - 2)
     return below, place - below
 
 
 def blend(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
-    """Return values between two, nearer the second one the larger its share."""
+    """Interpolate linearly between two values, with weight `share` on the second."""
     return np.asarray((1.0 - share) * low + share * high)
 
 
 def bilinear(table: FloatArray, i: IntArray, p: FloatArray, j: IntArray, q: FloatArray) -> FloatArray:
-    """Return values of a table between rows i and i + 1, share p, and columns j and j + 1, share q."""
+    """Interpolate a table between rows i, i + 1 (weight p) and columns j, j + 1 (weight q)."""
     low, high = blend(table[i, j], table[i, j + 1], q), blend(table[i + 1, j], table[i + 1, j + 1], q)
     return blend(low, high, p)
 
 
 def blend_known(low: FloatArray, high: FloatArray, share: FloatArray) -> FloatArray:
-    """Return values between two; where one is NaN, the other."""
+    """Interpolate linearly between two values; if one is NaN, return the other."""
     return blend(np.where(np.isnan(low), high, low), np.where(np.isnan(high), low, high), share)

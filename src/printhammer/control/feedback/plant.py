@@ -1,6 +1,6 @@
-"""The plant, as control engineering calls it: the nominal hammer, its driver, and what drives do to it.
+"""The plant: the nominal hammer with the driver of its coil, and simulations of drives.
 
-The driver of the coil that feedback needs: one that switches it between currents of either sign.
+The driver switches the coil between currents of either sign.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from printhammer.support.threads import Progress
 
 @dataclass(frozen=True)
 class Plant:
-    """A hammer, the driver of its coil, its single-pulse dot, and the number of threads for its runs."""
+    """A hammer, the driver of its coil, its single-pulse dot, and the number of threads for simulations."""
 
     hammer: Hammer
     driver: Driver
@@ -43,11 +43,11 @@ class Plant:
 
     @cached_property
     def stroke(self) -> float:
-        """Way from backstop to pack, m."""
+        """Stroke: distance from backstop to pack, m."""
         return self.front - self.hammer.origin
 
     def moved(self, offset: float) -> Plant:
-        """Return the same with its pack farther away, by a part of the stroke."""
+        """Return a copy with the pack farther away, by `offset` as a fraction of the stroke."""
         travel = Perturbation(travel=offset * self.stroke)
         return replace(self, hammer=perturbed(self.hammer, travel)) if offset else self
 
@@ -59,9 +59,9 @@ class Plant:
         strobes: Any = None,
         progress: Progress | None = None,
     ) -> tuple[BoolArray, DotTable, Strobes]:
-        """Run drives from rest, or from states (drives, 2), m and m/s, up to an end, s.
+        """Simulate drives from rest, or from states (drives, 2), m and m/s, up to an end, s.
 
-        Returns whether each run came to its end, what its firings did, and states at the instants asked for.
+        Returns whether each simulation reached its end, the dots of the firings, and the states at `strobes`.
         """
         begun = None if states is None else np.array(states)
         result = Ensemble(self.hammer, list(drives), end, states=begun, tolerance=DISPLAY_TOLERANCE).run(
@@ -70,36 +70,36 @@ class Plant:
         return result.ok, cast("DotTable", result.dots), cast("Strobes", result.strobes)
 
 
-LARGEST_CURRENT: Final = 2.0  # Largest current by default, A
-FASTEST: Final = 1e-6  # Least time constant of a driver, s; a shorter one of a hammer counts as this
-STANDARD: Final = 20e-6  # Time constant where the waveform of a hammer has no decay, s
+LARGEST_CURRENT: Final = 2.0  # Default current limit, A
+FASTEST: Final = 1e-6  # Smallest time constant of a driver, s; arbitrary
+STANDARD: Final = 20e-6  # Time constant if the waveform of a hammer has no decay, s; arbitrary
 
 
 class Driver(Declared):
     """A driver that switches the coil between currents."""
 
-    current: float = scalar("A", "largest current to either side")
-    edge: float = scalar("s", "time constant with which the current goes to its new value")
+    current: float = scalar("A", "current limit, of either sign")
+    edge: float = scalar("s", "time constant of the current")
 
     def __post_init__(self) -> None:
         read_positive(self.current, "A", "current of the driver")
         read_positive(self.edge, "s", "edge of the driver")
 
     def switched(self, at: Sequence[float], levels: Sequence[float], initial: float = 0.0) -> Switched:
-        """Return the current that goes to some levels, A, at some times, s."""
+        """Return the current that changes to `levels`, A, at the times `at`, s."""
         return Switched(at=tuple(at), levels=tuple(levels), edge=self.edge, initial=initial)
 
     def push(self, width: float) -> Switched:
-        """Return a push of some width, s, with the largest current."""
+        """Return a push of a width, s, with the largest current."""
         return self.switched((0.0, width), (self.current, 0.0))
 
     def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:
-        """Return pulses of this driver, fired at some times, s."""
+        """Return the drive that fires pulses at given times, s."""
         return BoundedSequence(pulses, at, self.current)
 
 
 class BoundedSequence(PulseSequence):
-    """Pulses of a driver; its bound, A, is taken for the largest of them, so that this need not be sought."""
+    """Pulses of a driver, with its current limit, A, as the largest value so that none is computed."""
 
     bounded = True
 
@@ -109,15 +109,15 @@ class BoundedSequence(PulseSequence):
 
     @property
     def largest_pulse(self) -> float:
-        """The bound, A."""
+        """The current limit, A."""
         return self._bound
 
 
 def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | None = None) -> Driver:
-    """Return a driver for a hammer that is driven by a current, with a largest current, A.
+    """Return a driver for a current-driven hammer, with a current limit, A.
 
-    Its time constant `edge`, s, is by default that with which the current of the hammer's own waveform
-    decays. Its own rise is slower: that takes a supply of a higher voltage.
+    The time constant `edge`, s, is by default the decay time constant of the hammer's own waveform. Its rise
+    is slower; a rise as fast as the decay needs a higher supply voltage.
     """
     pulse = pulse_of(hammer)
     if pulse.quantity != "current":

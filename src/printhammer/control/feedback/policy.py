@@ -1,17 +1,16 @@
-"""Which way to go on: the one that costs least, now and later, by dynamic programming.
+"""The control policy: the way of least present and future cost, by dynamic programming.
 
-A dot costs a² + b², a and b its deviations of force and arrival in parts of the limits, each raised so that
-what nears a limit costs much more than what does not. Pulling the armature back costs a little, and so does a
-way whose next touch depends much on the speed of this one, which is known only so well. The cost of all that
-follows, discounted, is a function of how a touch comes (kind, lateness, speed) and of the number of dots
-before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957): first of the
-last dot before a rest, then of the one before, and so on.
+The cost of a dot is a² (1 + k a⁴) + b² (1 + k b⁴), with a and b its deviations of force and arrival as
+fractions of the limits, so that deviations near a limit cost much more than small ones. Return current has a
+small cost, and so has a way whose next touch depends strongly on the speed of this one, which is uncertain.
+The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number of dots before
+the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). It is computed by
+backward induction from the last dot before a rest.
 
-Maps for packs at several distances, between which those for the distance that is learned are interpolated.
-
-This is gain scheduling, with the distance as its variable. In the pack and on the way out of it only the
-distance from its front counts, but magnet and spring depend on the place, and so does the time of a flight
-that ends at the backstop.
+The maps are computed for packs at several distances and interpolated to the estimated distance, which is gain
+scheduling with the distance as scheduling variable. The contact itself depends only on the distance from the
+front, but magnet and spring forces depend on the displacement, and so does the time of a flight that ends at
+the backstop.
 """
 
 from __future__ import annotations
@@ -41,44 +40,43 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
 OFFSETS: Final = (-0.07, 0.0, 0.07)
-"""By how much the fronts of the maps lie farther from the armature, in parts of the way to the pack; evenly
-spaced."""
+"""Offsets of the front in the maps, away from the armature, as fractions of the stroke; evenly spaced."""
 
 STEPS: Final = 100
-"""Steps of the work for one distance."""
+"""Progress steps per distance."""
 
 _MAPPING: Final = 70
-"""Of these, until the map of the touches is there."""
+"""Progress steps per distance up to the completion of the impact map."""
 
-MIDDLE: Final = 1  # Number of the nominal one
+MIDDLE: Final = 1  # Index of the nominal distance
 
 
 @dataclass(frozen=True)
 class Fronts:
-    """Maps for packs at several distances."""
+    """Impact maps and landings for packs at several distances."""
 
-    # From touch to touch, one for each of `OFFSETS`, with the same touches and the same ways
+    # One impact map for each of `OFFSETS`, with the same touches and the same ways
     maps: tuple[ImpactMap, ...]
-    landings: tuple[Landing, ...]  # Ways to land, likewise
-    # By how much the force grows with the distance of the front where the coil is switched as for the
-    # nominal one: in parts of the single-pulse force for one way from backstop to pack, (T, A)
+    landings: tuple[Landing, ...]  # One set of landings for each of `OFFSETS`
+    # Derivative of the force with respect to the distance of the front, with unchanged switching: in
+    # single-pulse forces per stroke, (T, A)
     front_force: FloatArray
 
     @property
     def table(self) -> ImpactMap:
-        """That of the nominal hammer."""
+        """The impact map of the nominal hammer."""
         return self.maps[MIDDLE]
 
     @property
     def landing(self) -> Landing:
-        """That of the nominal hammer."""
+        """The landings of the nominal hammer."""
         return self.landings[MIDDLE]
 
 
 def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | None = None) -> Fronts:
-    """Compute the maps for all distances, with the forces of the nominal hammer and its start from rest.
+    """Compute impact maps and landings for all distances of the pack.
 
-    `progress` is called with what is done in `STEPS` for each of the distances.
+    `progress` is called with the number of finished steps, `STEPS` per distance, and of all.
     """
     maps: list[ImpactMap] = []
     landings: list[Landing] = []
@@ -96,16 +94,16 @@ def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | N
 
 
 def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
-    """Return by how much the force grows with the distance of the front, see `Fronts`.
+    """Compute the derivative of the force with respect to the distance of the front, see `Fronts`.
 
-    `farther` has the farthest front; the map is that of the nominal hammer.
+    `farther` has the farthest front; `table` is the map of the nominal hammer.
     """
     keys: dict[tuple[int, float, float], int] = {}
     which = np.full(table.release.shape, -1)
     for row, way in zip(*np.nonzero(np.isfinite(table.release)), strict=True):
         key = int(row), float(table.release[row, way]), float(table.back[way])
         which[row, way] = keys.setdefault(key, len(keys))
-    # From where the nominal hammer touches its pack.
+    # From the states in which the nominal hammer touches its pack.
     forces = released_forces(farther, table.forces, list(keys))
     nominal = np.array([table.forces.force_at(*key) for key in keys])
     slopes = np.append(np.nan_to_num((forces - nominal) / OFFSETS[-1]), 0.0)
@@ -113,33 +111,32 @@ def front_force(farther: Plant, table: ImpactMap) -> FloatArray:
 
 
 def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the number of the map below some fronts (M,), and the share of the one above.
+    """Locate fronts (M,) between the maps: index of the map below, weight of the map above.
 
-    Fronts are given by how much they lie farther away, in parts of the way to the pack; those beyond the last
-    map count as there.
+    A front is the distance beyond nominal as a fraction of the stroke; values outside the maps are clipped.
     """
     return place_of(np.clip(front, OFFSETS[0], OFFSETS[-1]), np.array(OFFSETS))
 
 
-NEVER: Final = 50.0  # Cost of what leads nowhere
-# Standard deviation of the front, in parts of the way to the pack, above which it counts as not known
+NEVER: Final = 50.0  # Cost of an inadmissible way
+# Standard deviation of the front, as a fraction of the stroke, above which its uncertainty is penalised
 KNOWN: Final = 0.01
-_DISCOUNT: Final = 0.9  # Discount of the costs of each further dot
-_ROUNDS: Final = 8  # Number of dots before a rest from which on more make no difference
-_LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, in parts of the limit
-_SPEED_DOUBT: Final = 0.04  # Standard deviation of the speed of a touch, m/s
-# Slope of the next touch over the speed where there is no other touch to take it from, s / (m/s)
+_DISCOUNT: Final = 0.9  # Discount factor per dot
+_ROUNDS: Final = 8  # Number of dots before a rest after which the cost-to-go is taken as converged
+_LATENESS: Final = np.linspace(-0.9, 0.9, 13)  # Nodes of the lateness, as fractions of the limit
+_SPEED_DOUBT: Final = 0.04  # Standard deviation of the estimated speed of a touch, m/s
+# Derivative of the next touch with respect to speed, without a neighbour to difference, s / (m/s)
 _STEEPEST: Final = 2e-3
-_NEAR: Final = 2  # Number of speeds to either side over which a way counts as steep
-_FAST: Final = 0.3  # Speed that is left after a landing, m/s, of cost 1
-_STEEP: Final = 8.0  # By how much more a deviation on its limit costs than its square
-_EFFORT: Final = 0.1  # Cost of the largest current over a whole period
+_NEAR: Final = 2  # Number of speed nodes to either side over which the steepest slope is taken
+_FAST: Final = 0.3  # Residual speed after a landing that costs 1, m/s
+_STEEP: Final = 8.0  # Weight of the sixth power of a deviation relative to its square
+_EFFORT: Final = 0.1  # Cost of the largest return current over a whole period
 
 
 class Committed(NamedTuple):
-    """What has been done after some touches (M,) and cannot be undone.
+    """Actions after touches (M,) that have been taken and cannot be changed.
 
-    Return current, A; force that was printed, in parts of the single-pulse force; time after the touch, s.
+    Return current, A; printed force relative to the single pulse; time since the touch, s.
     """
 
     back: FloatArray
@@ -148,7 +145,7 @@ class Committed(NamedTuple):
 
 
 class Policy:
-    """Costs of the ways to go on at one rate, whose period is in s; deviations are measured by limits."""
+    """Cost-to-go of all ways at one rate, for a period in s; limits normalise the deviations."""
 
     def __init__(self, fronts: Fronts, period: float, limits: Limits) -> None:
         self.fronts = fronts
@@ -164,18 +161,18 @@ class Policy:
         self._costs = [self._resting()]
 
     def dot_cost(self, force: FloatArray, late: FloatArray) -> FloatArray:
-        """Return the cost of a dot: force in parts of the single-pulse force, lateness in s."""
+        """Return the cost of a dot: force relative to the single pulse, lateness in s."""
         a, b = (force - 1.0) / self.limits.force, late / self.limits.arrival
         return np.asarray(a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4))
 
     def effort(self, release: FloatArray) -> FloatArray:
-        """Return what it costs to pull back, where it is not needed: a hard landing wears the backstop."""
+        """Return the cost of the return current, which wears the backstop by a harder landing."""
         table = self.table
         cost = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
         return np.asarray(cost / self.period)
 
     def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
-        """Return the cost of a touch and all that follows it."""
+        """Interpolate the cost-to-go of touches, the dot of the touch included."""
         kinds, lates, speeds = np.broadcast_arrays(kind, late, speed)
         total = np.full(kinds.shape, NEVER)
         end = self._late[-1]
@@ -188,7 +185,7 @@ class Policy:
             off = lates[inside]
             places = place_of(speeds[inside], nodes), place_of(np.clip(off, -end, end), self._late)
             total[inside] = bilinear(costs[rows], *places[0], *places[1])
-            # Too late is worse the later it is, so that lost time is made up for.
+            # The cost grows beyond the last node, so that lost time is recovered.
             total[inside] += NEVER * np.maximum(np.abs(off) - end, 0.0) / self.limits.arrival
         return total
 
@@ -203,12 +200,12 @@ class Policy:
         front_error: FloatArray,
         done: Committed | None = None,
     ) -> tuple[IntArray, FloatArray, Choice]:
-        """Return number and cost of the best way for some touches (M,), and where each leads.
+        """Choose the best way for touches (M,); return its index, its cost, and the outcomes of all ways.
 
-        The touches come by `kind`, `late`, s, and `speed`, m/s. The next dot is to come after `wait`, s, and
-        `after` dots follow between that one and a rest. The front of the pack lies farther away by `front`,
-        known to `front_error`, in parts of the way from backstop to pack. Where the throw alone is to be
-        decided, `done` says what has been done by then.
+        The touches have a `kind`, a lateness `late`, s, and a `speed`, m/s. The next dot is due after `wait`,
+        s, and `after` dots follow between the next dot and a rest. The pack is `front` farther away than
+        nominal, with standard deviation `front_error`, as fractions of the stroke. If only the throw remains
+        to be decided, `done` states the actions already taken.
         """
         choice = Choice(self.fronts, kind, speed, front)
         if done is not None:
@@ -231,16 +228,16 @@ class Policy:
             open_ways = self.table.back == done.back[:, np.newaxis]
             open_ways &= self.table.fire > done.time[:, np.newaxis]
             cost = np.where(open_ways, cost, np.inf)
-        # A way that leads nowhere after what was done may still have a known force.
+        # A way that is inadmissible after the actions taken may still have a known force.
         cost = np.where(np.isnan(cost) | np.isnan(choice.next_touch), np.inf, cost)
         way = np.argmin(cost, axis=1)
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
 
     def _doubts(self) -> FloatArray:
-        """Return what it costs that the speed of a touch is known only so well, for all ways, (T, A).
+        """Return the cost of the uncertainty of a touch's speed, for all ways, (T, A).
 
-        A way counts as steep as it is anywhere near: beside a jump, where it has one bounce more or less, the
-        table between the speeds says little.
+        The steepest slope in the neighbourhood counts: near a discontinuity, where the number of bounces
+        changes, the table between two speeds is meaningless.
         """
         table = self.table
         doubts = np.zeros(table.next_touch.shape)
@@ -250,13 +247,13 @@ class Policy:
             steps = np.nan_to_num(np.abs(np.diff(touch, axis=0)) / np.diff(speeds)[:, np.newaxis])
             steepest = maximum_filter1d(steps, 2 * _NEAR, axis=0, mode="constant")
             around = np.vstack([steepest, steepest[-1:]])
-            # At the end of what is possible there is no slope to either side.
+            # At the end of the admissible range a slope may be missing on both sides.
             slope = np.nan_to_num(np.maximum(slope, around), nan=_STEEPEST)
             doubts[rows] = np.square(slope * _SPEED_DOUBT / self.limits.arrival)
         return doubts
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
-        """Return what it costs some touches that the front of the pack is known only so well, (M, A)."""
+        """Return the cost of the uncertainty of the pack's front, (M, A)."""
         weaker = error[:, np.newaxis] * choice.by_speed(self.fronts.front_force)[rows]
         force = choice.force[rows]
         zero = np.zeros(1)
@@ -267,7 +264,7 @@ class Policy:
         return both - self.dot_cost(force, zero) + np.square(late)
 
     def costs(self, number: int) -> FloatArray:
-        """Return the cost of a touch and all that follows, (T, lateness), some dots before a rest."""
+        """Return the cost-to-go, (T, lateness), with `number` dots before a rest."""
         while len(self._costs) <= min(number, _ROUNDS):
             self._costs.append(self._one_more(self._costs[-1]))
         return self._costs[min(number, _ROUNDS)]
@@ -295,7 +292,7 @@ class Policy:
 
 
 class Choice:
-    """Where all ways lead from touches (M,) whose speed and front lie between those of the maps."""
+    """Outcomes of all ways from touches (M,), interpolated in speed and in the distance of the front."""
 
     def __init__(self, fronts: Fronts, kind: IntArray, speed: FloatArray, front: FloatArray) -> None:
         self._fronts = fronts
@@ -306,9 +303,9 @@ class Choice:
         self.next_speed = self.of("next_speed")
 
     def settle(self, force: FloatArray) -> None:
-        """Replace where the ways lead by where they do after dots (M,) of some force, in parts.
+        """Replace the outcomes by those after dots (M,) with known forces, relative to the single pulse.
 
-        What belongs to the middle one of the forces of the maps is shifted; the others lead nowhere.
+        Outcomes of the middle force of the maps are shifted linearly; the other forces become inadmissible.
         """
         middle = len(FORCES) // 2
         shape = len(self.below), len(np.unique(self._fronts.table.back)), len(FORCES), -1
@@ -318,7 +315,7 @@ class Choice:
         for name in ("next_touch", "next_speed"):
             values = getattr(self, name).reshape(shape)
             change = values[:, :, -1] - values[:, :, 0]
-            # Where no push is needed the forces are the same, and so is all that follows.
+            # If no push is needed, all forces of the map are equal, and so are the outcomes.
             shift = np.divide(change, apart, out=np.zeros_like(change), where=apart != 0.0) * away
             settled = np.full_like(values, np.nan)
             settled[:, :, middle] = values[:, :, middle] + np.nan_to_num(shift)
@@ -347,7 +344,7 @@ class Choice:
 
 
 def between(table: ImpactMap, kind: IntArray, speed: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the row of the map below some touches (M,), and the share of the one above."""
+    """Locate touches (M,) between the rows of the map: index of the row below, weight of the row above."""
     below, share = np.zeros(len(kind), np.int64), np.zeros(len(kind))
     for number in range(int(table.kind.max()) + 1):
         rows = np.flatnonzero(table.kind == number)

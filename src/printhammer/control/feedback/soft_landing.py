@@ -1,10 +1,10 @@
-"""Soft landing after a dot: the push that prints it, and the brake pulse by which the armature comes to rest.
+"""Soft landing after a dot, and the launch from rest.
 
-On its way back the armature is slowed down by the bucking current, as in the quenched response of Fig. 6 of
+Landing: the bucking current slows the armature on its return, as in the quenched response of Fig. 6 of
 F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), so that it meets the backstop with
 little speed and stays there, held by the magnet.
 
-From rest to the first touch: a push, and its release before impact, so that the armature flies freely.
+Launch: a push from rest that is released before impact, so that the armature flies freely.
 """
 
 from __future__ import annotations
@@ -21,36 +21,36 @@ from printhammer.errors import InputError
 from printhammer.hammer.equilibrium import rest_state
 from printhammer.support.arrays import FloatArray, IntArray
 
-# Beginnings and widths of the brake pulses of the first grid, in flight times of the single pulse
+# Start times and widths of the brake pulses in the first grid, in single-pulse flight times
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)
-# Finer grids about the best, and their half widths, likewise: each covers a step of the one before
+# Finer grids about the best pulse, and their half-widths, likewise: each covers a step of the previous grid
 _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
-# Time in which a distance from rest would be covered, by which it counts as a speed, likewise
+# Time that converts a distance from rest to an equivalent speed, likewise
 _FALL: Final = 1.0 / 3.0
-# Times after the touch at which the armature is to be at rest, likewise
+# Times after the touch at which the residual motion is evaluated, likewise
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
-_SETTLED: Final = 0.65  # Time after the brake pulse from which on it counts as at rest, likewise
+_SETTLED: Final = 0.65  # Time after the brake pulse from which on the armature counts as at rest, likewise
 
 
 @dataclass(frozen=True)
 class Landing:
-    """The best way to land, for each of the touches of a map (T,); NaN where the force cannot be had."""
+    """Best brake pulse for each touch of a map (T,); NaN if the force is not reached."""
 
     release: FloatArray  # Time after the touch at which the push ends, s, (T,)
-    force: FloatArray  # Force in parts of the single-pulse force, (T,)
-    # Time after the touch at which the brake pulse begins, and its width, s, (T,)
+    force: FloatArray  # Force relative to the single pulse, (T,)
+    # Start of the brake pulse after the touch, and its width, s, (T,)
     brake: FloatArray
     width: FloatArray
-    # Largest speed that is left, m/s; a distance from rest counts as the speed with which it is covered
-    # in a third of the flight time of a single pulse, (T,)
+    # Residual speed, m/s; a distance from rest counts as the speed that covers it in a third of the
+    # single-pulse flight time, (T,)
     left: FloatArray
     settled: float  # Time after the touch from which on the armature counts as at rest, s
 
 
 def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
-    """Find the brake pulses that leave least of the motion: on a grid, and on finer ones about the best."""
+    """Find the brake pulses of least residual motion by grid search with successive refinement."""
     scale = plant.single.flight_time
     release = forces.release_for(1.0)[:, forces.off]
     force = np.full(len(release), np.nan)
@@ -77,7 +77,7 @@ def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
 def _left(
     plant: Plant, forces: ForceMap, release: FloatArray, rows: IntArray, tried: FloatArray
 ) -> FloatArray:
-    """Return what is left of the motion after brake pulses (rows, pulses, begin and width), m/s."""
+    """Simulate brake pulses (rows, pulses, start and width); return the residual speeds, m/s."""
     driver, scale = plant.driver, plant.single.flight_time
     drives, states = [], []
     for row, pulses in zip(rows.tolist(), tried, strict=True):
@@ -91,37 +91,36 @@ def _left(
             states.append(forces.state(row))
     watched = AHEAD + _WATCHED * scale
     ok, dots, strobes = plant.run(drives, float(watched[-1]), states, [watched] * len(drives))
-    # An armature that hovers between backstop and pack is slow too, but not at rest.
+    # An armature that hovers between backstop and pack is slow, but not at rest.
     away = np.abs(strobes.x - rest_state(plant.hammer)) / (_FALL * scale)
     remaining = np.maximum(np.abs(strobes.v), away).max(axis=1)
     return np.where(ok & (dots.extra_contacts[:, 0] == 0), remaining, np.inf).reshape(tried.shape[:2])
 
 
-# Widths of pushes that are tried, in flight times of the single pulse
+# Candidate widths of the launch, in single-pulse flight times
 _WIDTHS_LAUNCH: Final = np.linspace(0.2, 1.0, 81)
-_LENGTH: Final = 4.0  # Length of their runs, likewise
-_ALMOST: Final = 0.9  # Force that the touch alone is to print, in parts of that of the single pulse
-_WEAKER: Final = 0.03  # Change of the scale of the currents from which derivatives are taken
+_LENGTH: Final = 4.0  # Length of their simulations, likewise
+_ALMOST: Final = 0.9  # Force of the touch without a push, relative to the single pulse
+_WEAKER: Final = 0.03  # Change of the current scale for the finite difference
 
 
 @dataclass(frozen=True)
 class Launch:
-    """A start from rest."""
+    """A launch from rest."""
 
-    width: float  # Of the push, s
-    flight: float  # From firing to touch, s
-    speed: float  # At the touch, m/s
-    # By how much the displacement, m, and the speed, m/s, at the time of the touch grow with the
-    # currents, for currents twice as large
+    width: float  # Width of the push, s
+    flight: float  # Time from firing to touch, s
+    speed: float  # Speed at the touch, m/s
+    # Derivatives of displacement, m, and speed, m/s, at the time of the touch with respect to the
+    # relative current scale
     place_slope: float
     speed_slope: float
 
 
 def launch(plant: Plant, forces: ForceMap) -> Launch:
-    """Find the push from rest after which the touch alone prints almost the single-pulse force.
+    """Find the launch whose touch, without a push, prints `_ALMOST` of the single-pulse force.
 
-    The rest of the force comes from a short push into the pack, which can be measured out when the speed is
-    known.
+    A short push into the pack adds the rest of the force; its length is decided when the speed is known.
     """
     driver, scale = plant.driver, plant.single.flight_time
     widths = _WIDTHS_LAUNCH * scale
@@ -146,8 +145,8 @@ def launch(plant: Plant, forces: ForceMap) -> Launch:
     width, time = (
         float(np.interp(wanted, speed[struck][order], values[struck][order])) for values in (widths, flight)
     )
-    # How displacement and speed before the touch depend on the scale of the currents: weaker, so that the
-    # armature is not at the pack by then.
+    # Sensitivity to the current scale by a backward difference: with less current the armature has not
+    # reached the pack by then.
     pulse, before = driver.push(width), time - AHEAD
     drives = [PulseSequence([pulse.scaled(factor)], at=[0.0]) for factor in (1.0, 1.0 - _WEAKER)]
     _, _, states = plant.run(drives, before, strobes=[np.array([before])] * 2)

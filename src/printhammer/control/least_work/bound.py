@@ -1,15 +1,15 @@
-"""How little positive work of the coil a burst can do with, whatever its current.
+"""Lower bound on the positive coil work of a burst, for any current.
 
-The positive work of a dot is at least what lifts the armature from where it turned to its largest
-indentation and indents the pack: L + U(x_max) - U(x_turn), with L the loading work of the pack, and U the
-energy stored in magnet (at zero current), spring and backstop. It does not matter how the armature came to
-where it turned, nor how often it turned before. The first dot starts from rest. Each later one can turn no
-nearer to the paper than at the front of the pack, since the contact before has to end, and no nearer than a
-current within its bound can throw it from.
+The positive work of a dot is at least the energy that lifts the armature from its turning point to the
+largest indentation and indents the pack: L + U(x_max) - U(x_turn), with L the loading work of the pack, and U
+the energy stored in magnet (at zero current), spring and backstop. The history before the turning point does
+not matter. The first dot starts from rest. A later dot can turn no nearer to the paper than the front of the
+pack, since the preceding contact has to end, and no nearer than the point from which a current within its
+limit can still make the dot.
 
-Instead it may come from the backstop, which gives energy back for nothing. That is no more than an undriven
-armature takes from there, which falls with all that it had after the dot before; what the coil adds to the
-fall counts as its positive work, and a backstop gives back less of it.
+Alternatively the armature bounces off the backstop, which returns energy without coil work. The returned
+energy is at most that of an undriven armature that falls with all the energy left after the preceding dot;
+whatever the coil adds to the fall counts as positive work, and the backstop returns less than that.
 """
 
 from __future__ import annotations
@@ -30,60 +30,60 @@ from printhammer.run.window import wait_of
 from printhammer.support.arrays import FloatArray
 from printhammer.support.roots import bisect
 
-_POINTS: Final = 4001  # Places at which energies and forces are summed up
-_CURRENTS: Final = 17  # Currents among which the strongest is sought
-_SPEEDS: Final = 32  # Speeds with which an armature is thrown at the backstop
-_STROBES: Final = 4001  # Instants at which it is looked at
+_POINTS: Final = 4001  # Quadrature points over the displacement; arbitrary
+_CURRENTS: Final = 17  # Currents among which the largest force is searched
+_SPEEDS: Final = 32  # Impact speeds at the backstop; arbitrary
+_STROBES: Final = 4001  # Samples of each undriven rebound; arbitrary
 
 
 class Bound(Declared):
-    """Least positive work of the coil."""
+    """Lower bounds on the positive coil work of dots."""
 
     first: float = scalar("J", "for a dot from rest")
-    later: float = scalar("J", "for each dot after it, thrown from where the armature turned before the pack")
-    bounced: float = scalar("J", "for each dot after it, thrown after a bounce off the backstop")
-    turn: float = scalar("m", "displacement nearest to the paper from which a later dot can be thrown")
+    later: float = scalar("J", "for each later dot, from a turning point in front of the pack")
+    bounced: float = scalar("J", "for each later dot, after a bounce off the backstop")
+    turn: float = scalar("m", "turning point nearest to the paper from which a later dot can be made")
     loading: float = scalar("J", "loading work of the pack for one dot")
 
     def burst(self, dots: int) -> float:
-        """Return the least positive work of a burst of some dots, J."""
+        """Return the lower bound on the positive work of a burst, J."""
         return self.first + (dots - 1) * min(self.later, self.bounced)
 
 
 def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Bound:
-    """Bound the positive work of dots of a force, in parts of that of the single pulse.
+    """Compute lower bounds for dots with `force` times the force of the single pulse.
 
-    The hammer has magnet, pack and backstop; `largest` is the largest current of either sign, A.
+    The hammer needs magnet, pack and backstop; `largest` is the current limit of either sign, A.
     """
     static = StaticForce(hammer)
     deepest, loading = _indented(static, single, force)
     x = np.linspace(rest_state(hammer), static.front + deepest, _POINTS)
     thrown = _strongest(static, x, largest)
-    # Trapezoidal rule from every place to the last one.
+    # Trapezoidal rule from every point to the last one.
     parts = 0.5 * float(x[1] - x[0]) * (thrown[1:] + thrown[:-1])
     supplied = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
     enough = np.flatnonzero(supplied >= loading)
-    # The place after it, so that the bound errs on the safe side by a step.
+    # One point farther, so that discretisation makes the bound smaller, not larger.
     turn = min(float(x[enough[-1] + 1]), static.front) if enough.size else float(x[0])
-    # Where the energy has a crest on the way, it is best to turn on it.
+    # If the stored energy has a maximum before that point, turning there is cheapest.
     places = np.append(x[x < turn], turn)
     stored = np.array([stored_energy(hammer, place) for place in places.tolist()])
     top = stored_energy(hammer, float(x[-1]))
     first, later = loading + top - float(stored[0]), loading + top - float(stored.max())
     assert hammer.position is not None
     bottom = stored_energy(hammer, hammer.position)
-    # The pack gives back less than it took, whatever its law.
+    # Conservative for every pack law: a pack returns at most what it took.
     back = _given_back(hammer, top - bottom + loading)
     return Bound(first, later, loading + top - bottom - back, turn, loading)
 
 
 def _strongest(static: StaticForce, x: FloatArray, largest: float) -> FloatArray:
-    """Return the largest force of magnet and spring at some places, N, over all currents within a bound."""
+    """Return the largest force, N, of magnet and spring at displacements, over all allowed currents."""
     currents = np.linspace(-largest, largest, _CURRENTS).tolist()
     force = np.array([[static.free(place, current) for current in currents] for place in x.tolist()])
     rows, best = np.arange(x.size), np.clip(force.argmax(axis=1), 1, _CURRENTS - 2)
     before, at, after = (force[rows, best + shift] for shift in (-1, 0, 1))
-    # The crest of the parabola through the three, exact for equation (3).
+    # Vertex of the parabola through three points, exact for equation (3).
     bend = before - 2.0 * at + after
     crest = np.divide(0.5 * (before - after), bend, out=np.zeros_like(bend), where=bend < 0.0)
     between = at - 0.25 * (before - after) * np.clip(crest, -1.0, 1.0)
@@ -91,9 +91,9 @@ def _strongest(static: StaticForce, x: FloatArray, largest: float) -> FloatArray
 
 
 def _given_back(hammer: Hammer, most: float) -> float:
-    """Return the largest energy, J, with which an undriven armature comes back from the backstop.
+    """Return the largest energy, J, with which an undriven armature rebounds from the backstop.
 
-    It falls on it with any energy up to `most`.
+    The maximum is over incident energies up to `most`, J.
     """
     bottom, front = hammer.position, hammer.front
     assert bottom is not None
@@ -114,7 +114,7 @@ def _given_back(hammer: Hammer, most: float) -> float:
 
 
 def _indented(static: StaticForce, single: Nominal, force: float) -> tuple[float, float]:
-    """Return indentation, m, and loading work, J, at which the pack presses with a force, by its law."""
+    """Return indentation, m, and loading work, J, at which the pack force is `force` single-pulse forces."""
     wanted, front = force * single.force, static.front
     deepest = single.indentation
     while -static.pack(front + deepest) < wanted:

@@ -1,12 +1,13 @@
-"""Bursts of least work: the swing drive of the discussion of Hendriks (1983).
+"""Bursts of least coil work: the swing drive of the discussion in Hendriks (1983).
 
 "More energy might have to be expended in the first dot, but subsequent dots would be printed by keeping the
 actuator moving as in a parametric oscillator (swing). In the limit, the only energy to be expended should be
 the energy absorbed by the ribbon/paper pack."
 
-The burst is planned slot by slot, each from the state in which the one before leaves the armature: the coil
-brakes it on its way back from the paper, holds it off the backstop, and throws it again, so that the dot has
-the force asked for at its time. After the last dot the coil lets it down on the backstop.
+The burst is planned slot by slot, each from the final state of the preceding slot (a greedy optimisation, not
+a joint one over all slots): the coil brakes the armature on its return from the paper, holds it off the
+backstop, and throws it again, so that the dot has the requested force at the requested time. After the last
+dot the coil lands the armature on the backstop.
 """
 
 from __future__ import annotations
@@ -59,46 +60,44 @@ if TYPE_CHECKING:
 
     from printhammer.results.result import Entries
 
-FORCE: Final = 0.9  # Least force of an adequate dot, in parts of that of the single pulse
+FORCE: Final = 0.9  # Default least force of an adequate dot, relative to the single pulse
 SPACING: Final = 0.6
-"""Time between the nodes of the current by default, in parts of the time in which a single pulse
-indents the pack; a period holds a whole number of them."""
+"""Default time between the nodes of the current, as a fraction of the time in which a single pulse indents
+the pack; rounded to a whole fraction of the period."""
 
-MOST_DOTS: Final = 1000  # Number of dots above which a burst is refused
+MOST_DOTS: Final = 1000  # Largest number of dots in a burst
 Least = Literal["positive work", "heat"]
-# What is made least: the positive work of the coil, or its heat, which goes by the squared current
+# Objective: the positive work of the coil, or its heat, which is proportional to the squared current
 LEASTS: Final = get_args(Least)
-# Relative changes of the current under which a burst is looked at by default
+# Default relative changes of the current in `LeastWork.under_supply`
 SUPPLY: Final = (-0.03, -0.01, -0.003, -0.001, 0.0, 0.001, 0.003, 0.01, 0.03)
 Shape = Literal["free", "pulses"]
-# What the current may be: anything within its bounds, or pulses of the hammer, of any times and widths
+# Allowed currents: any current within the limits, or the hammer's pulses at any times and widths
 SHAPES: Final = get_args(Shape)
-# End of a slot after its touch, in parts of the time in which a single pulse indents the pack
+# Time from the touch to the end of a slot, as a fraction of the time in which a single pulse indents the pack
 _PAST_PEAK: Final = 1.2
-_SPARE: Final = 5e-4  # Part of the force by which a dot is planned to be harder than asked for
-# Energy in motion below which a hammer counts as at rest, in parts of what a dot costs the pack
+_SPARE: Final = 5e-4  # Relative margin on the force of a planned dot
+# Motional energy below which a hammer counts as at rest, as a fraction of the pack loss of a dot
 _SETTLED: Final = 1e-2
 
 
 class NoBurstError(PrinthammerError):
-    """No current within the bounds was found that prints the burst."""
+    """No current within the limits was found that prints the burst."""
 
 
 class SupplyCheck(Declared):
-    """A burst when the supply gives another current than it was planned for: arrays of shape (n,)."""
+    """A burst at other supply levels than it was planned for: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(
-        "number of dots in their slots with the force asked for, and without extra contacts"
+        "number of dots in their slots with the requested force and without extra contacts"
     )
-    weakest: FloatArray = part(
-        "force of the weakest dot, in parts of that of the single pulse; 0 where one is lost"
-    )
-    spread: FloatArray = part("largest deviation of a touch from its slot, s; NaN where a dot is lost")
-    status: TextArray = part("how the runs ended")
+    weakest: FloatArray = part("force of the weakest dot, relative to the single pulse; 0 if a dot is lost")
+    spread: FloatArray = part("largest deviation of a touch from its slot, s; NaN if a dot is lost")
+    status: TextArray = part("status of each simulation")
 
     def summary(self, count: int) -> Summary:
-        """Return how a burst of `count` dots fares, a row for each change of the current."""
+        """Tabulate the outcome for a burst of `count` dots, one row per change of the current."""
         columns = [
             Cells("current", [f"{100.0 * change:+.1f} %" for change in self.changes]),
             Cells("adequate dots", [f"{adequate} of {count}" for adequate in self.adequate]),
@@ -109,39 +108,37 @@ class SupplyCheck(Declared):
 
 
 class LeastWork(Result, rows="node"):
-    """A burst that prints adequate dots with least work, rest to rest.
+    """A burst that prints adequate dots with least coil work, from rest to rest.
 
-    The Dataset has motion and power over time and the contacts with the pack, the table the nodes of the
-    current. As CSV that is a sampled waveform (`printhammer.drive.waveforms.shapes.Sampled`): fired once, it
-    does what the drive of the burst does.
+    The Dataset holds motion and power over time and the pack contacts; the data frame holds the nodes of the
+    current. Saved as CSV, the nodes are a sampled waveform (`printhammer.drive.waveforms.shapes.Sampled`),
+    which, fired once, reproduces the drive of the burst.
     """
 
-    hammer: Hammer = part("the hammer")
-    drive: PulseSequence = part("the current that was found, fired slot by slot", repr=False)
+    hammer: Hammer = part("driven hammer")
+    drive: PulseSequence = part("optimised current, fired slot by slot", repr=False)
     motion: Motion = part(
-        "the whole burst under that drive, at the tolerance of the ledger, until it has settled out",
+        "motion of the whole burst, at the tolerance of the ledger, until the hammer has settled",
         repr=False,
     )
-    rate: float = scalar("Hz", "dots per second")
-    count: int = part("number of dots asked for")
-    force: float = scalar(
-        "1", "least force asked for, in parts of that of the single pulse", name="least_force"
-    )
-    largest: float = scalar("A", "bound on the current, of either sign", name="largest_current")
+    rate: float = scalar("Hz", "dot rate")
+    count: int = part("requested number of dots")
+    force: float = scalar("1", "requested force, relative to the single pulse", name="least_force")
+    largest: float = scalar("A", "current limit, of either sign", name="largest_current")
     slew: float = scalar(
-        "A/s", "bound on its slope, of either sign", name="largest_slew", more="of pulses it is no bound"
+        "A/s", "slope limit, of either sign", name="largest_slew", more="does not apply to pulses"
     )
-    least: Least = scalar("", "what was made least", more="see `LEASTS`")
-    shape: Shape = scalar("", "what the current was allowed to be", more="see `SHAPES`")
-    slots: FloatArray = part("times at which the dots were to touch, s", repr=False)
-    single: Nominal = part("the dot of the single pulse", repr=False)
-    single_work: CoilWork = part("what the coil does for one single pulse, rest to rest", repr=False)
-    bound: Bound = part("least positive work whatever the current")
-    tolerance: float = part("error allowed in one step of the search")
+    least: Least = scalar("", "objective of the optimisation", more="see `LEASTS`")
+    shape: Shape = scalar("", "kind of current allowed", more="see `SHAPES`")
+    slots: FloatArray = part("requested touch times of the dots, s", repr=False)
+    single: Nominal = part("single-pulse dot", repr=False)
+    single_work: CoilWork = part("coil work of one single pulse, from rest to rest", repr=False)
+    bound: Bound = part("lower bounds on the positive work, for any current")
+    tolerance: float = part("error tolerance per integration step of the search")
 
     @property
     def nodes(self) -> tuple[list[float], list[float]]:
-        """Times, s, and currents, A, of the nodes, between which the current runs in straight lines."""
+        """Times, s, and currents, A, of the nodes of the piecewise linear current."""
         if self.shape != "free":
             raise InputError(
                 f"shape = {self.shape!r}: the current has no nodes",
@@ -152,32 +149,32 @@ class LeastWork(Result, rows="node"):
         times, values = [0.0], [0.0]
         for at, waveform in zip(self.drive.times.tolist(), self.drive.waveforms, strict=True):
             assert isinstance(waveform, Sampled)
-            # The last sample only prolongs the one before, until the next firing cuts it off.
+            # The last sample only extends the previous one until the next firing replaces it.
             times += [at + offset for offset in waveform.times[1:-1].tolist()]
             values += waveform.values[1:-1].tolist()
         return times, values
 
     @property
     def contacts(self) -> Rows[Contact]:
-        """Contacts with the pack, in order."""
+        """Pack contacts, in order."""
         touched = (contact for contact in self.motion.contacts if contact.surface == "pack")
         return Rows(touched, Contact)
 
     @property
     def forces(self) -> FloatArray:
-        """Largest force of each contact with the pack, in parts of that of the single pulse."""
+        """Peak force of each pack contact, relative to the single pulse."""
         return np.array([contact.peak_force or 0.0 for contact in self.contacts]) / self.single.force
 
     @property
     def adequate(self) -> int:
-        """Number of dots whose force reaches the one asked for; 0 where there are more or fewer contacts."""
+        """Number of dots that reach the requested force; 0 if contacts and dots differ in number."""
         if len(self.contacts) != self.count:
             return 0
         return int((self.forces >= self.force).sum())
 
     @property
     def deviations(self) -> FloatArray:
-        """Touch of each dot less its slot, s; empty where there are more or fewer contacts than dots."""
+        """Touch minus slot time of each dot, s; empty if contacts and dots differ in number."""
         if len(self.contacts) != self.count:
             return np.zeros(0)
         return np.array([contact.t_in for contact in self.contacts]) - self.slots
@@ -194,22 +191,22 @@ class LeastWork(Result, rows="node"):
 
     @property
     def net_ratio(self) -> float:
-        """Net work of the coil over the energy that the pack absorbs, 1 in the limit; NaN without a dot."""
+        """Net coil work over the energy absorbed by the pack, 1 in the ideal limit; NaN without a dot."""
         return self._over(self.work.net)
 
     @property
     def positive_ratio(self) -> float:
-        """Positive work of the coil over the energy that the pack absorbs."""
+        """Positive coil work over the energy absorbed by the pack."""
         return self._over(self.work.positive)
 
     @property
     def bound_ratio(self) -> float:
-        """Least positive work whatever the current, over the energy that the pack absorbs."""
+        """Lower bound on the positive coil work over the energy absorbed by the pack."""
         return self._over(self.bound.burst(self.count))
 
     @property
     def single_ratio(self) -> float:
-        """Net work for one single pulse, rest to rest, over the energy that the pack absorbs of it."""
+        """Net coil work of one single pulse, from rest to rest, over the pack loss of its dot."""
         return self.single_work.net / self.single.pack_loss
 
     def _over(self, work: float) -> float:
@@ -218,7 +215,7 @@ class LeastWork(Result, rows="node"):
 
     @cached_property
     def rest_time(self) -> float:
-        """Time from which on less than a hundredth of what a dot costs the pack is left in motion, s."""
+        """Time, s, from which the motional energy stays below a hundredth of a dot's pack loss."""
         motion, hammer = self.motion, self.hammer
         rest = stored_energy(hammer, rest_state(hammer))
         stored = np.array([stored_energy(hammer, x) for x in motion.x.tolist()])
@@ -227,7 +224,7 @@ class LeastWork(Result, rows="node"):
         return float(motion.t[min(place, motion.t.size - 1)])
 
     def under_supply(self, changes: npt.ArrayLike = SUPPLY) -> SupplyCheck:
-        """Run the same drive, in one ensemble, with every current larger or smaller by given parts of it."""
+        """Simulate the same drive, as one ensemble, with every current scaled by 1 + `changes`."""
         factors = 1.0 + np.atleast_1d(np.asarray(changes, dtype=np.float64))
         if factors.ndim != 1 or not (np.isfinite(factors) & (factors > 0.0)).all():
             raise InputError.of("changes", changes, "relative changes of the current above -1")
@@ -237,7 +234,7 @@ class LeastWork(Result, rows="node"):
         assert dots is not None
         touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
         away = np.abs(touched[:, :, np.newaxis] - self.slots)
-        # The dot of a slot is the touch nearest to it, wherever its pulse was fired.
+        # A slot's dot is the touch nearest to it, whichever pulse made it.
         which = away.argmin(axis=1)
         late = away.min(axis=1)
         rows = np.arange(len(drives))[:, np.newaxis]
@@ -254,11 +251,11 @@ class LeastWork(Result, rows="node"):
 
     @property
     def title(self) -> str:
-        """What the burst is of."""
+        """Title in one line."""
         return f"burst of least work of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return what the burst prints, and what it costs."""
+        """Summarise dots, currents, works and losses of the burst."""
         work, ledger = self.work, self.ledger
         weakest = (
             f", the weakest with {self.forces.min():.4f} of the single pulse's force" if self.contacts else ""
@@ -292,7 +289,7 @@ class LeastWork(Result, rows="node"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """The hammer, the drive that was found, and how its run ended."""
+        """Provenance of hammer, drive and simulation."""
         return provenance(
             hammer=self.hammer, drive=self.drive, tolerance=self.tolerance, status=self.motion.status
         )
@@ -315,7 +312,7 @@ class LeastWork(Result, rows="node"):
         }
 
     def entries(self) -> Entries:
-        """Return motion, current and power of the coil over time, and the contacts with the pack."""
+        """Return motion, current and coil power over time, and the pack contacts."""
         motion, dots = self.motion, self.contacts
         power = coil_power(self.hammer, motion.x, motion.v, motion.force["magnet"])
         forces = [np.nan if dot.peak_force is None else dot.peak_force for dot in dots]
@@ -364,32 +361,32 @@ def least_work(
     effort: Effort = _SEARCH,
     **_keywords: Unpack[InOneThread],
 ) -> LeastWork:
-    """Find the current that prints a burst of adequate dots with least work, rest to rest.
+    """Find a current that prints a burst of adequate dots with least coil work, from rest to rest.
 
-    The tolerance is that of the search; the drive it finds is run at the tolerance of the ledger.
+    `effort.tolerance` applies to the search; the final drive is simulated at the tolerance of the ledger.
 
     Parameters
     ----------
     hammer : Hammer
-        A hammer with magnet, spring, pack, backstop and waveform.
+        The hammer, with magnet, spring, pack, backstop and waveform.
     rate : float or str, optional
-        Dots per second, Hz, or text with a unit.
+        Dot rate, Hz, or text with a unit.
     dots : int, optional
         Number of dots.
     force : float, optional
-        Least force of a dot in parts of that of the single pulse.
+        Least force of a dot, relative to the single pulse.
     largest : float or str, optional
-        Largest current of either sign, A, or text with a unit.
+        Current limit of either sign, A, or text with a unit.
     slew : float, optional
-        Largest slope of the current, A/s; by default the steepest rise of the hammer's waveform.
+        Slope limit of the current, A/s; by default the steepest rise of the hammer's waveform.
     least : str, optional
-        "positive work" of the coil, or its "heat".
+        Objective: "positive work" of the coil, or its "heat".
     shape : str, optional
-        "free": any current within the bounds; "pulses": pulses of the hammer, of which times and widths are
-        sought, see `printhammer.control.least_work.pulses`. `slew` and `spacing` do not matter then.
+        "free": any current within the limits; "pulses": the hammer's pulses with optimised times and widths,
+        see `printhammer.control.least_work.pulses`. `slew` and `spacing` are then ignored.
     spacing : float or str, optional
-        Time between nodes of the current, s, or text with a unit, rounded so that a period holds a whole
-        number of them; by default `SPACING` of the time in which a single pulse indents the pack.
+        Time between nodes of the current, s, or text with a unit, rounded to a whole fraction of the period;
+        by default `SPACING` times the time in which a single pulse indents the pack.
 
     Returns
     -------
@@ -399,7 +396,7 @@ def least_work(
     Raises
     ------
     NoBurstError
-        No current within the bounds was found.
+        No current within the limits was found; this does not prove that none exists.
     """
     period = 1.0 / read_positive(rate, "Hz", "rate")
     count = read_count(dots, "dots")

@@ -1,6 +1,7 @@
-"""Sequential quadratic programming (SLSQP: D. Kraft, DFVLR-FB 88-28 (1988)) on runs of a hammer.
+"""Local optimisation of simulated currents by sequential quadratic programming.
 
-Each step takes its derivatives from differences, all runs of which are one ensemble.
+The method is SLSQP (D. Kraft, DFVLR-FB 88-28 (1988)) as implemented in SciPy. The derivatives are finite
+differences, all of whose simulations form one ensemble.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ import numpy as np
 if TYPE_CHECKING:
     from printhammer.support.arrays import FloatArray
 
-LOST: Final = 25.0  # What a run that failed counts as, in parts of the tolerances
-_MISSED: Final = 0.05  # Deviation from the time of arrival up to which a dot meets it, in `ARRIVAL`
-_SLACK: Final = 8e-3  # Lack of force up to which a dot has the force asked for, in `_FORCE`
-ARRIVAL: Final = 20e-6  # Tolerance by which a time of arrival is measured, s
-_FORCE: Final = 0.05  # Tolerance by which a force is measured, relative
-_DIFFERENCE: Final = 1e-5  # Difference from which derivatives are taken
-_ENDS_AT: Final = 1e-5  # Change of the cost at which a descent ends
+LOST: Final = 25.0  # Deviation assigned to a failed simulation, in tolerances
+_MISSED: Final = 0.05  # Accepted deviation from the arrival time, in units of `ARRIVAL`
+_SLACK: Final = 8e-3  # Accepted shortfall of the force, in units of `_FORCE`
+ARRIVAL: Final = 20e-6  # Scale of arrival deviations, s
+_FORCE: Final = 0.05  # Scale of force deviations, relative
+_DIFFERENCE: Final = 1e-5  # Step of the finite differences
+_ENDS_AT: Final = 1e-5  # Change of the cost at which SLSQP stops
 
 
 def descend(
@@ -32,12 +33,13 @@ def descend(
     linear: tuple[FloatArray, FloatArray] | None = None,
     inward: bool = False,
 ) -> tuple[FloatArray, float]:
-    """Minimise the first row that `measured` returns; of two more the first is 0, the second not negative.
+    """Minimise the first row of `measured` by SLSQP, subject to optional constraints.
 
-    `measured` returns rows (1 or 3, places) of many places (places, n); `conditions` says whether there are
-    the two more. `bounds` hold for every number of a place. `linear`, an offset and a matrix, are further
-    numbers that are not to be negative. With `inward`, differences are taken away from the nearer of the
-    bounds 0 and 1. Returns the place, and the first row there.
+    `measured` maps points (places, n) to rows (1 or 3, places). With `conditions` there are three rows: the
+    objective, an equality constraint (second row = 0) and an inequality constraint (third row >= 0). `bounds`
+    apply to every variable. `linear`, an offset and a matrix, are linear inequality constraints, offset +
+    matrix @ y >= 0. With `inward`, the difference step points away from the nearer one of the bounds 0 and 1.
+    Returns the final point and its objective.
     """
     from scipy import optimize
 
@@ -74,15 +76,15 @@ def descend(
 
 
 def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return missed arrivals and spare forces, in parts of the tolerances.
+    """Normalise arrival deviations and excess forces by their tolerances.
 
-    Of dots that come `late`, s, not finite where there is none, with a `force` in parts of that asked for.
+    `late`, s, is not finite for a lost dot; `force` is relative to the requested force.
     """
     return np.where(np.isfinite(late), late / ARRIVAL, LOST), (force - 1.0) / _FORCE
 
 
 def met(missed: float, spare: float) -> bool:
-    """Return whether a dot of such deviations does."""
+    """Whether a dot with these normalised deviations is acceptable."""
     return abs(missed) < _MISSED and spare > -_SLACK
 
 
@@ -92,10 +94,11 @@ def best_of(
     tries: int,
     most: int | None = None,
 ) -> FloatArray | None:
-    """Return the best outcome of the best starts: of some tries, or of the first after them that has one.
+    """Run a multi-start search: return the best outcome of the most promising starts.
 
-    `attempt` returns cost and outcome of a start, by its number in `badness`; None where it has none. Starts
-    are tried up to `most` of them while none has an outcome, by default no more than `tries`.
+    Starts are ordered by `badness`. `attempt` maps the index of a start to cost and outcome, or to None if it
+    fails. The first `tries` starts are always run; further starts, up to `most` (by default `tries`), only
+    until one succeeds.
     """
     best: tuple[float, FloatArray] | None = None
     for number, start in enumerate(np.argsort(badness, kind="stable")[: most or tries].tolist()):
@@ -108,7 +111,7 @@ def best_of(
 
 
 def sobol(dimensions: int, count: int) -> FloatArray:
-    """Return points (count, dimensions) that are evenly spread over the unit cube: a Sobol sequence."""
+    """Return the first points (count, dimensions) of an unscrambled Sobol sequence in the unit cube."""
     from scipy.stats import qmc
 
     return np.asarray(qmc.Sobol(dimensions, scramble=False).random(count))

@@ -1,8 +1,8 @@
-"""Bursts of least work made of the hammer's own pulses: their times and widths are sought.
+"""Bursts of least work made of the hammer's own pulses, with optimised times and widths.
 
-In each slot two pulses are fired: the first brakes the armature on its way back, the second throws it. From
-rest one will do. A driver that can only be switched on and off, and whose current takes its own course, can
-do this. Pulses do not overlap: the next is not fired before the current of the one before has gone.
+In each slot two pulses are fired: the first brakes the returning armature, the second throws it. From rest
+one pulse is enough. This suits a driver that can only be switched on and off, and whose current follows its
+own course. Pulses do not overlap: a pulse is fired only after the current of the preceding pulse has decayed.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from printhammer.errors import InputError
 from printhammer.run.ensemble import Ensemble
 from printhammer.support.arrays import FloatArray
 
-GONE: Final = 1e-2  # The current of a pulse has gone where less than this part of its peak is left
-_PER_SLOT: Final = 2  # Number of pulses of a slot
-_TRIED: Final = 1024  # Number of times and widths from the best of which a search begins
-_TRIES, _MOST_TRIES = 4, 10  # Number of searches, and while nothing is found
-_ROUNDS: Final = 40  # Steps of a search
-_SHORTEST: Final = 0.02  # Least width, in parts of the largest one
-_SAMPLES: Final = 301  # Instants of a slot at which the power is looked at
-_HALVINGS: Final = 60  # Halvings of an interval of widths: more than a double has bits to tell them apart
-_NONE: Final = 1e-9  # Part of a slot below which a width is none
-_WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in parts of the loading work
+GONE: Final = 1e-2  # Fraction of its peak below which the current of a pulse counts as decayed
+_PER_SLOT: Final = 2  # Number of pulses per slot
+_TRIED: Final = 1024  # Number of Sobol points evaluated to select starts
+_TRIES, _MOST_TRIES = 4, 10  # Number of starts, and its maximum while no start succeeds
+_ROUNDS: Final = 40  # Iteration limit of SLSQP
+_SHORTEST: Final = 0.02  # Smallest width, as a fraction of the largest
+_SAMPLES: Final = 301  # Samples of the power per slot
+_HALVINGS: Final = 60  # Bisections of a width: more than a double has bits
+_NONE: Final = 1e-9  # Fraction of a slot below which a width counts as zero
+_WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in units of the loading work
 
 
 class PulsePlan:
-    """Times and widths found so far, and the state in which they leave the armature.
+    """Plan of a burst of pulses: the firings so far, and the state of the armature after them.
 
-    The widths of `waveform` are sought; the bound of the task on the slope of the current is not looked at.
-    Times are in s: of a slot, from the touch of a dot to the end of its slot, of the first slot, of landing.
-    It begins at rest, at a displacement in m.
+    The widths of `waveform` are optimised; the slope limit of the task is ignored. `period`, `past` (from a
+    touch to the end of its slot), `lead` (the first slot) and `landing` are times, s. The plan begins at rest
+    at the displacement `rest`, m.
 
     Raises
     ------
     InputError
-        The waveform has no width, or no width keeps its current within the bound.
+        The waveform has no width, or no width keeps its current within the limit.
     """
 
     def __init__(
@@ -78,14 +78,14 @@ class PulsePlan:
         self.touches: list[float] = []
 
     def add_dot(self) -> bool:
-        """Plan one more dot; False where no pulses were found."""
+        """Plan one more dot; return False if no pulses were found."""
         duration = self._period if self.touches else self._lead
         arrival = duration - self._past
 
         def measured(rows: FloatArray) -> FloatArray:
             return self._measured(rows, duration, arrival)
 
-        # From rest there is nothing to brake.
+        # From rest there is nothing to brake, so one pulse is enough.
         tried = sobol(2 * (_PER_SLOT if self.touches else 1), _TRIED)
 
         def attempt(row: int) -> tuple[float, FloatArray] | None:
@@ -102,7 +102,7 @@ class PulsePlan:
         return True
 
     def land(self) -> None:
-        """Plan the landing."""
+        """Plan the landing of the armature on the backstop."""
 
         def measured(rows: FloatArray) -> FloatArray:
             return self._measured(rows, self._landing, self._landing)
@@ -114,7 +114,7 @@ class PulsePlan:
         self._keep(places[int(np.argmin(costs))], self._landing, self._landing)
 
     def drive(self) -> PulseSequence:
-        """Return the whole burst as one drive."""
+        """Return the drive of the whole burst."""
         return self._drive(self._fired)
 
     def _drive(self, fired: list[tuple[float, float]]) -> PulseSequence:
@@ -122,7 +122,7 @@ class PulsePlan:
         return PulseSequence(waveforms, [time for time, _width in fired])
 
     def _pulses(self, row: FloatArray, arrival: float) -> list[tuple[float, float]]:
-        """Return times, s, and widths, s, of the pulses of the slot that begins now."""
+        """Decode variables in [0, 1] to pulse times, s, and widths, s, in the current slot."""
         shortest = _SHORTEST * self._widest
         free = self._begin
         if self._fired:
@@ -138,12 +138,12 @@ class PulsePlan:
         return pulses
 
     def _gone(self, width: float) -> float:
-        """Return the time after the width at which the current has gone, s."""
+        """Return the time from the end of a pulse until its current has decayed, s."""
         decay = getattr(self._waveform, "decay", getattr(self._waveform, "fall", 0.0))
         return float(decay) * -float(np.log(GONE)) + 1e-9 * width
 
     def _measured(self, rows: FloatArray, duration: float, arrival: float) -> FloatArray:
-        """Return cost, missed time and spare force of many rows of delays and widths."""
+        """Evaluate cost, arrival deviation and excess force for many rows of delays and widths in [0, 1]."""
         task, begin = self._task, self._begin
         end = begin + duration
         drives = [self._drive([*self._fired, *self._pulses(row, arrival)]) for row in rows]
@@ -166,7 +166,7 @@ class PulsePlan:
         if task.heat:
             spent = task.loading * np.trapezoid(current**2, grid, axis=1) / (task.largest**2 * duration)
         wanted = 1 if arrival < duration else 0
-        # A pulse that is not over when the dot touches would be one for the next slot.
+        # A pulse that outlasts the touch would belong to the next slot.
         over = np.array([sum(self._pulses(row, arrival)[-1]) for row in rows]) - begin - arrival
         odd = _WRONG * ((contacts > wanted).astype(float) + ~result.ok) + np.maximum(over, 0.0) / ARRIVAL
         cost = (spent + np.trapezoid(power, grid, axis=1)) / task.loading + odd

@@ -1,4 +1,4 @@
-"""What bursts of least work cost against the rate."""
+"""Coil work of bursts of least work as a function of the dot rate."""
 
 from __future__ import annotations
 
@@ -24,27 +24,27 @@ NOT_FOUND = "no current found"
 
 
 class LeastWorkRates(Result):
-    """Bursts of least work at several rates; nan where no current was found."""
+    """Bursts of least work at several rates; NaN where no current was found."""
 
-    hammer: Hammer = part("the hammer")
-    rates: FloatArray = coordinate("Hz", "dots per second", "rate", name="rate")
+    hammer: Hammer = part("driven hammer")
+    rates: FloatArray = coordinate("Hz", "dot rate", "rate", name="rate")
     count: int = scalar("1", "number of dots of each burst", name="dots")
-    net_ratio: FloatArray = column("1", "net work of the coil over what the pack absorbs", "rate")
-    positive_ratio: FloatArray = column("1", "positive work over what the pack absorbs", "rate")
-    bound_ratio: FloatArray = column("1", "least positive work of any current, likewise", "rate")
+    net_ratio: FloatArray = column("1", "net coil work over the energy absorbed by the pack", "rate")
+    positive_ratio: FloatArray = column("1", "positive coil work over the absorbed energy", "rate")
+    bound_ratio: FloatArray = column("1", "lower bound on the positive work, likewise normalised", "rate")
     squared_current: FloatArray = column("A^2 s", "integral of the squared current", "rate")
     adequate: IntArray = column("1", "number of adequate dots", "rate")
     status: TextArray = column(
-        "", "whether a current was found", "rate", more="no current found is no proof that there is none"
+        "", "whether a current was found", "rate", more="a failed search does not prove that none exists"
     )
 
     @property
     def title(self) -> str:
-        """What the bursts are of."""
+        """Title in one line."""
         return f"bursts of least work of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return what a burst costs, a row for each rate."""
+        """Tabulate the cost of a burst, one row per rate."""
         columns = [
             self.cells("rates", "rate", ".6g"),
             Cells("adequate dots", [f"{adequate} of {self.count}" for adequate in self.adequate]),
@@ -69,20 +69,20 @@ def least_work_rates(
     Parameters
     ----------
     hammer : Hammer
-        The hammer.
+        The hammer to drive.
     rates : sequence of float or str
-        Dots per second, Hz, or text with a unit.
+        Dot rates, Hz, or text with a unit.
     dots : int, optional
         Number of dots of each burst.
     progress : callable, optional
-        Called with the number of rates done and of all.
+        Called with the number of finished rates and the total number.
     **options
         As for `least_work`.
 
     Returns
     -------
     LeastWorkRates
-        With a status for each rate; a rate at which no current was found is no exception.
+        The ratios, with a status for each rate; a failed search raises no exception.
     """
     if isinstance(rates, str) or not len(rates):
         raise InputError.of("rates", rates, "at least one rate in a sequence")

@@ -1,13 +1,13 @@
-"""The current of one slot whose dot costs least work, and the current that lands the armature softly.
+"""Optimal current of one slot, and the current that lands the armature softly.
 
-The currents at the nodes are sought by sequential quadratic programming. It starts from the best profiles of
-a few levels (brake, wait, throw), or from what did for the slot before.
+The currents at the nodes are optimised by sequential quadratic programming (SLSQP). A search starts from the
+current of the preceding slot, or from the best profiles of a few levels: brake, wait and throw for a dot;
+hold back and let down for the landing.
 
-Currents of a few levels from which searches begin: brake, wait and throw; or hold back and let down.
-
-A few shares, numbers from 0 to 1, make a profile. They are spread evenly, and the best of them are moved,
-each for itself, to the best of a cloud of places around it that shrinks. A descent from a poorer start ends
-in one or another of many hollows, and the last bits of its numbers, which differ between processors, choose.
+Profiles are parameterised by a few shares in [0, 1]. A Sobol sequence of profiles is evaluated, and each of
+the best is refined by a deterministic local search over a shrinking cloud of points. Without the refinement
+SLSQP would stop in one of many local minima, and rounding errors that differ between processors would decide
+in which.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from printhammer.hammer.equilibrium import rest_state
 from printhammer.support.arrays import FloatArray
 
 PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of shares of a profile
-_SPREAD: Final = 512  # Number of profiles that are spread evenly
-_KEPT: Final = 16  # Number of them that are moved
-_CLOUD: Final = 32  # Number of places around a profile
+_SPREAD: Final = 512  # Number of Sobol profiles
+_KEPT: Final = 16  # Number of profiles refined
+_CLOUD: Final = 32  # Number of points in a cloud
 _MOVES: Final = 8
-_REACH, _SHRINKS = 0.25, 0.7  # Reach of the first cloud, and of the next in parts of it
+_REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and its reduction factor per move
 
 
 def printing_profile(
@@ -38,7 +38,7 @@ def printing_profile(
 ) -> FloatArray:
     """Return currents (n, nodes), A, that brake, wait and throw, for shares (n, `PRINTING_SHARES`).
 
-    The largest current is in A; the slot lasts for `duration`, and its dot touches at `arrival`, both in s.
+    `largest` is the current limit, A; the slot lasts `duration`, and its dot is due at `arrival`, both in s.
     """
     low, high = np.array([0.0, 0.0, 0.3]), np.array([1.0, 0.6, 1.0])
     released = 0.5 * arrival * shares[:, 3]
@@ -48,9 +48,10 @@ def printing_profile(
 
 
 def landing_profile(shares: FloatArray, largest: float, duration: float, nodes: int) -> FloatArray:
-    """Return currents (n, nodes - 1), A, that hold the armature back, then before the backstop.
+    """Return currents (n, nodes - 1), A, that hold the armature back and let it down on the backstop.
 
-    As `printing_profile` for shares (n, `LANDING_SHARES`), without the last node, at which no current flows.
+    Like `printing_profile`, for shares (n, `LANDING_SHARES`), without the last node, where the current is
+    zero.
     """
     caught = 0.7 * duration * shares[:, 2]
     landed = caught + shares[:, 3] * (duration - caught)
@@ -63,9 +64,9 @@ def refined(
     badness: Callable[[FloatArray], FloatArray],
     count: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return currents (n, nodes) of the best profiles, and how bad they are.
+    """Evaluate Sobol profiles and refine the best; return their currents (n, nodes) and objective values.
 
-    `profile` returns the currents of shares (n, `count`), `badness` a number for each of many currents.
+    `profile` maps shares (n, `count`) to currents, `badness` maps currents to the objective.
     """
     places = sobol(count, _SPREAD)
     bad = badness(profile(places))
@@ -83,7 +84,7 @@ def refined(
 
 
 def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int) -> FloatArray:
-    """Return the means, over the steps between nodes, of levels (n, k) that change at edges (n, k - 1), s."""
+    """Average piecewise constant levels (n, k) with edges (n, k - 1), s, over the steps between nodes."""
     ends = np.pad(edges, ((0, 0), (1, 1)), constant_values=((0.0, 0.0), (0.0, duration)))
     times = node_times(duration, nodes)
     past = np.clip(times, ends[:, :-1, np.newaxis], ends[:, 1:, np.newaxis]) - ends[:, :-1, np.newaxis]
@@ -92,24 +93,24 @@ def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int
 
 LEAD: Final = 2.0  # Length of the first slot, from rest to the touch, in flight times of the single pulse
 LANDING: Final = 5.0  # Length of the landing, in flight times of the single pulse
-_FEWEST, _MOST = 8, 96  # Least and largest number of nodes of a slot
-# Part of a step by which the current of a slot lasts longer than the slot, which cuts it off
+_FEWEST, _MOST = 8, 96  # Smallest and largest number of nodes per slot
+# Fraction of a step by which a slot's current overlaps the next slot, which replaces it
 _OVERLAP: Final = 0.01
-_LAGS: Final = 1e-3  # Lag in the pack up to which a current does, in `RELOADING`
-_WRONG: Final = 10.0  # Cost of a contact too many, or a run that failed, in parts of the loading work
-_WEAK: Final = 3.0  # Weight of a lack of force where profiles are compared
-_TRIES, _MOST_TRIES = 3, 12  # Number of profiles from which a search begins, and while none is found
-_LEGS: Final = 2  # Number of searches of which each begins where the one before has ended, until one does
-_ROUNDS, _ROUNDS_AGAIN = 30, 20  # Steps of a search from a profile, and from what did for the slot before
-_SEARCH_TOLERANCE: Final = 5e-7  # Tolerance with which profiles are compared
-_INSIDE: Final = 1.0 - 1e-9  # A hair inside a bound, which rounding would exceed
+_LAGS: Final = 1e-3  # Largest lag in the pack accepted, in units of `RELOADING`
+_WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in units of the loading work
+_WEAK: Final = 3.0  # Weight of a force shortfall in the comparison of profiles
+_TRIES, _MOST_TRIES = 3, 12  # Number of starts, and its maximum while no start succeeds
+_LEGS: Final = 2  # Maximum number of consecutive SLSQP runs, each from the end of the previous one
+_ROUNDS, _ROUNDS_AGAIN = 30, 20  # SLSQP iteration limits, from a profile and from the preceding current
+_SEARCH_TOLERANCE: Final = 5e-7  # Integration tolerance of the comparison of profiles
+_INSIDE: Final = 1.0 - 1e-9  # Factor on a limit that keeps rounding errors within it
 
 
 class NodePlan:
-    """The currents found so far, straight from node to node, and how they leave the armature.
+    """Plan of a burst with piecewise linear current: the currents so far, and the state after them.
 
-    Times are in s: of a slot, from the touch of a dot to the end of its slot, between nodes, and of the
-    flight of the single pulse.
+    `period`, `past` (from a touch to the end of its slot), `spacing` (between nodes) and `flight` (of the
+    single pulse) are times, s.
     """
 
     def __init__(self, task: Task, period: float, past: float, spacing: float, flight: float) -> None:
@@ -124,7 +125,7 @@ class NodePlan:
         self.touches: list[float] = []
 
     def add_dot(self) -> bool:
-        """Plan one more dot; False where no current was found."""
+        """Plan one more dot; return False if no current was found."""
         nodes = self._nodes if self._currents else self._lead
         duration = nodes * self._step
         before = self._currents[-1] if len(self._currents) > 1 else None
@@ -137,16 +138,16 @@ class NodePlan:
         return True
 
     def land(self) -> None:
-        """Plan the landing."""
+        """Plan the landing of the armature on the backstop."""
         current = landing_current(self._task, self._state, self._landing * self._step, self._landing)
         self._currents.append(current)
 
     def drive(self) -> PulseSequence:
-        """Return the whole current, fired slot by slot; the last one ends with the landing."""
+        """Return the drive of the whole burst, fired slot by slot; the last firing includes the landing."""
         *slots, last, landing = self._currents
         waveforms, times, begin, node = [], [], 0.0, 0
         for current in (*slots, np.concatenate([last, landing])):
-            # Each lasts a little longer than its slot and is cut off, so that no rounding leaves a gap.
+            # Each overlaps the next slot, which replaces it, so that rounding leaves no gap.
             values = np.concatenate([[begin], current, current[-1:]])
             offsets = np.append(np.arange(current.size + 1), current.size + _OVERLAP) * self._step
             waveforms.append(Sampled.from_samples(offsets, values, interpolation="linear"))
@@ -164,11 +165,11 @@ def printing_current(
     nodes: int,
     before: FloatArray | None = None,
 ) -> FloatArray | None:
-    """Find the current of a slot with which its dot costs least.
+    """Find the current of a slot that prints its dot at least cost.
 
-    The slot lasts for `duration`, and the dot is to touch at `arrival`, s after its beginning. There are some
-    `nodes` after the first one; `before` is what did for the slot before. Returns the currents at the nodes,
-    A; None where none was found.
+    The slot lasts `duration`, and the dot is due at `arrival`, s after its beginning. The current has `nodes`
+    nodes after the first; `before` is the current of the preceding slot, the first start. Returns the
+    currents at the nodes, A; None if no start leads to an acceptable dot.
     """
 
     def asked(outcomes: Outcomes) -> tuple[FloatArray, FloatArray]:
@@ -213,7 +214,7 @@ def printing_current(
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
-    """Find the currents at the nodes after the last dot with which the backstop takes least, A."""
+    """Find the nodal currents, A, after the last dot that minimise the landing cost."""
 
     def rated(currents: FloatArray, tolerance: float) -> FloatArray:
         outcomes = task.run(begin, np.pad(currents, ((0, 0), (0, 1))), duration, tolerance)
@@ -247,9 +248,9 @@ def _descend(
     *,
     printing: bool,
 ) -> tuple[float, FloatArray]:
-    """Return the cost of the best currents from a start, and these, within the bounds on value and slope.
+    """Minimise the cost from a start by SLSQP within the limits on value and slope; return cost and currents.
 
-    Without a dot to print, the current has to come back to zero in one more step.
+    For a landing (not `printing`), the current must be able to return to zero in one more step.
     """
     steps = start.size if printing else start.size + 1
     slope = (np.eye(steps) - np.eye(steps, k=-1))[:, : start.size]
@@ -270,7 +271,7 @@ def _descend(
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:
-    """Return currents that keep the bounds on value and slope to the last bit."""
+    """Clip currents so that they satisfy the limits on value and slope exactly."""
     result = np.empty(wanted.size)
     current = begin
     for node, value in enumerate(wanted.tolist()):

@@ -1,4 +1,4 @@
-"""Compensation tables: feedforward for a dot that follows others before the hammer has come to rest."""
+"""Compensation tables: feedforward for a dot that follows others before the hammer is at rest."""
 
 from __future__ import annotations
 
@@ -56,51 +56,51 @@ if TYPE_CHECKING:
 
     from printhammer.results.result import Entries
 
-_NEAR: Final = 1e-9  # Rounding allowed in a rate, relative, and in a time, s
+_NEAR: Final = 1e-9  # Rounding tolerance of a rate, relative, and of a time, s
 _CELLS: Final = "rate history"
 ANY_UNIT: Final = "any"
-"""Serial number that stands for every unit, where a table that was learned on one is to drive others."""
+"""Serial number that stands for every unit, to drive other units with a table that was learned on one."""
 
 
 class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".nc", ".zarr", ".parquet")):
-    """Pulse width and advance as a function of the last gaps between dots: a row a rate, a column a history.
+    """Pulse width and advance as a function of the last gaps: one row per rate, one column per history.
 
-    A dot of history h at a slot is fired `advance` before the slot, with a pulse of `width`. In the gap
-    before it, `brake_delay` after the slot of the dot before it, a brake pulse of `brake_width` catches the
-    armature on its way back, so that it does not rebound. What follows the last dot for long is the brake
-    pulse of a dot from rest. Arrays have a column for each of the (reach + 1)**gaps numbers of histories, see
-    `printhammer.control.table.drive`; the Dataset has one for each history that differs.
+    A dot with history h is fired `advance` before its slot, with a pulse of `width`. In the gap before the
+    dot, `brake_delay` after the slot of the preceding dot, a brake pulse of `brake_width` catches the
+    returning armature so that it does not rebound. After the last dot comes the brake pulse of a dot from
+    rest. Arrays have one column for each of the (reach + 1)**gaps history numbers, see
+    `printhammer.control.table.drive`; the Dataset has one column for each distinct history.
 
     Raises
     ------
     InputError
-        Values that make no table: a width not positive, a rate that does not ascend, a firing that would come
-        before the one before has ended.
+        The values are not a valid table: a width is not positive, the rates do not ascend, or a firing would
+        precede the end of the previous pulse.
     """
 
-    hammer: str = part("name of the hammer it is made for")
+    hammer: str = part("name of the hammer that the table is made for")
     fingerprint: str = part("fingerprint of this hammer")
-    rates: FloatArray = coordinate("Hz", "slots per second", "rate", name="rate", more="ascending")
+    rates: FloatArray = coordinate("Hz", "slot rate", "rate", name="rate", more="ascending")
     gaps: int = scalar("1", "number of gaps in a history")
-    reach: int = scalar("1", "longest gap that counts, slots", more="a longer one is rest")
+    reach: int = scalar("1", "longest gap that counts, slots", more="a longer gap counts as rest")
     advance: FloatArray = column(
-        "s", "how long before its slot a dot is fired", _CELLS, more="negative: after it"
+        "s", "time from the firing to the slot of the dot", _CELLS, more="negative: fired after the slot"
     )
-    width: FloatArray = column("s", "width of its pulse", _CELLS)
+    width: FloatArray = column("s", "width of the print pulse", _CELLS)
     brake_delay: FloatArray = column(
-        "s", "from the slot of the dot before to the brake pulse", _CELLS, more="0 without one"
+        "s", "time from the slot of the preceding dot to the brake pulse", _CELLS, more="0 without one"
     )
     brake_width: FloatArray = column("s", "width of the brake pulse, 0 for none", _CELLS)
     deviation: FloatArray = column(
         "1",
-        "worst deviation where it was tuned, in parts of the limits",
+        "worst deviation in tuning, as a fraction of the limits",
         _CELLS,
-        more="of force or arrival; nan where it is not known, and 1 is on the limit",
+        more="of force or arrival; NaN if unknown; 1 is exactly on the limit",
     )
-    largest_current: float = scalar("A", "bound on the current that was kept to")
-    driver: str = scalar("", "what switches the coil, see `printhammer.control.table.drive`", default="own")
+    largest_current: float = scalar("A", "current limit of the tuning")
+    driver: str = scalar("", "driver of the coil, see `printhammer.control.table.drive`", default="own")
     serial: str = scalar(
-        "", "serial number of the unit that it was learned on", more="empty for all units", default=""
+        "", "serial number of the unit that the table was learned on", more="empty for all units", default=""
     )
 
     def __post_init__(self) -> None:
@@ -121,7 +121,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 self._check(row, rate, history)
 
     def _check(self, row: int, rate: float, history: Sequence[int]) -> None:
-        """Refuse an entry that cannot be fired."""
+        """Raise `InputError` unless an entry can be fired."""
         number = number_of(history, self.reach)
         values = {name: float(getattr(self, name)[row, number]) for name in COLUMNS}
         where = f"rate {rate:g} Hz, history {'-'.join(map(str, history))}"
@@ -137,7 +137,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             number_of((*history[1:], gap) if history[0] else history, self.reach)
             for gap in range(self.reach + 1)
         ]
-        # The dot before may have been fired late; its pulse is over when the next one is due.
+        # The preceding dot may have been fired late; its pulse must be over before the next pulse begins.
         over = float((self.width[row, before] - self.advance[row, before]).max())
         if values["brake_width"] > 0.0:
             if values["brake_delay"] < over - _NEAR:
@@ -164,15 +164,15 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def worst(self) -> FloatArray:
-        """Largest deviation at each rate, in parts of the limits, shape (R,); NaN where it is not known."""
+        """Largest deviation at each rate, as a fraction of the limits, shape (R,); NaN where unknown."""
         return np.asarray(self.deviation.max(axis=1))
 
     def at(self, rate: float | str) -> Settings:
-        """Return what the table says at a rate, Hz, or text with a unit.
+        """Interpolate the table at a rate, Hz, or text with a unit.
 
-        Between two rates of the table it is interpolated in the period, entry by entry. Where the two do not
-        belong together, since their brake pulses differ or one fires before a rebound and the other after it,
-        the nearer one holds.
+        Between two rates of the table, each entry is interpolated linearly in the period. Where the brake
+        pulses of the two entries differ, or one fires before a rebound and the other after it, the nearer
+        entry is used unchanged.
         """
         asked = read_positive(rate, "Hz", "rate")
         low, high = float(self.rates[0]), float(self.rates[-1])
@@ -194,9 +194,9 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Return this table, tuned on what a driver makes of a hammer, as one for the hammer.
+        """Convert this table, tuned on a hammer with a driver's pulse, to one for the hammer itself.
 
-        The dot from rest takes another time with another driver; all pulses come as much earlier or later.
+        The flight time from rest depends on the driver; all pulses are shifted by the difference.
         """
         if driver == self.driver:
             return self
@@ -205,7 +205,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return self.delayed(own - nominal(driven, tolerance=DISPLAY_TOLERANCE).flight_time, driver, hammer)
 
     def delayed(self, later: float, driver: str, hammer: Hammer) -> CompensationTable:
-        """Return this table as one for a hammer and its driver, with all pulses so much later, s."""
+        """Return a copy for a hammer and its driver, with all pulses `later` seconds later."""
         delay = np.where(self.brake_width > 0.0, self.brake_delay + later, self.brake_delay)
         return replace(
             self,
@@ -217,21 +217,22 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         )
 
     def strategy(self, hammer: Hammer, serial: str | None = None) -> TableStrategy:
-        """Return the table as a way to drive a hammer, see `printhammer.printing.dots.strategy.Strategy`.
+        """Return the table as a drive strategy, see `printhammer.printing.dots.strategy.Strategy`.
 
         Parameters
         ----------
         hammer : Hammer
-            The hammer the table is made for. The strategy may then be tried on others that differ from it.
+            The hammer that the table is made for. The strategy may then drive other hammers that differ from
+            it.
         serial : str, optional
-            Serial number of the unit that is driven; `ANY_UNIT` drives any unit with a table that was learned
-            on one. A table that was not learned is for every unit.
+            Serial number of the driven unit; `ANY_UNIT` drives any unit with a table that was learned on one
+            unit. A table that was not learned is valid for every unit.
 
         Raises
         ------
         InputError
-            The table is made for another one, of another fingerprint, or was learned on another unit, or its
-            pulses would need more than `largest_current`.
+            The table is made for a hammer with another fingerprint, was learned on another unit, or has
+            pulses that exceed `largest_current`.
         """
         if self.serial and serial not in (self.serial, ANY_UNIT):
             unit = "no serial" if serial is None else f"serial = {serial!r}"
@@ -245,7 +246,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return TableStrategy(self, hammer)
 
     def check_hammer(self, hammer: Hammer) -> None:
-        """Raise `InputError` unless the table is made for a hammer."""
+        """Raise `InputError` unless the table is made for `hammer`."""
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
@@ -256,24 +257,24 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             )
 
     def drive(self, hammer: Hammer, slots: Sequence[int], rate: float | str) -> Drive:
-        """Return the drive that prints dots at some slots.
+        """Return the drive that prints dots in the given slots.
 
         Parameters
         ----------
         hammer, rate
             As for `strategy` and `at`.
         slots : sequence of int
-            Numbers of the slots, ascending; slot 0 is at `printhammer.printing.dots.strategy.FIRST_SLOT`.
+            Slot indices, ascending; slot 0 is at `printhammer.printing.dots.strategy.FIRST_SLOT`.
         """
         return self.strategy(hammer)(hammer, [tuple(slots)], read_positive(rate, "Hz", "rate"))[0]
 
     @property
     def title(self) -> str:
-        """What the table is made for."""
+        """Title in one line."""
         return f"compensation table for {self.hammer}"
 
     def summary(self) -> Summary:
-        """Return the entries at the highest rate, a row for each history."""
+        """Tabulate the entries at the highest rate, one row per history."""
         every = histories(self.gaps, self.reach)
         places = [number_of(history, self.reach) for history in every]
         advance, width, delay, brake, worst = (
@@ -294,11 +295,11 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """The hammer the table is made for, and versions."""
+        """The hammer that the table is made for, and the software versions."""
         return {"hammer": self.hammer, "hammer_fingerprint": self.fingerprint, **versions()}
 
     def entries(self) -> Entries:
-        """Return the arrays over the histories that differ, the gaps as text such as "1-2-rest"."""
+        """Return the arrays over the distinct histories, with the gaps as text such as "1-2-rest"."""
         every = histories(self.gaps, self.reach)
         numbers = [number_of(history, self.reach) for history in every]
         arrays = {
@@ -310,7 +311,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return {**arrays, "history": (note, np.array([history_text(history) for history in every]))}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row for each rate and history, the gaps of the history in columns of their own."""
+        """Return one row per rate and history, with a column for each gap of the history."""
         entries = self.entries()
         texts = np.array([text.split("-") for text in entries.pop("history")[1]])
         arrays: list[Any] = [(("rate",), self.rates), *((("history",), gap) for gap in texts.T)]
@@ -319,27 +320,27 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return frame(named, self.ROWS, plain(self.attributes))
 
     def to_csv(self) -> str:
-        """Return the text of the CSV file."""
+        """Render the table as CSV text."""
         table = self.to_dataframe()
-        # Shortest digits that tell the numbers apart, below the lines with what holds for all of them.
+        # Shortest digits that restore the same floats, below the comment lines of metadata.
         rows = str(table.to_csv(index=False, header=False, lineterminator="\n"))
         return csv_head(self._head) + csv_text(table.iloc[:0]) + rows
 
     def to_header(self, tick: float | str = NANOSECOND, budget: int | None = None) -> str:
-        """Return the text of the C header.
+        """Render the table as a C header.
 
         Parameters
         ----------
         tick : float or str, optional
-            Tick of the timer, s, or text with a unit: a whole number of nanoseconds; by default one. With
-            longer ticks times are 16 bits long where they fit.
+            Timer tick, s, or text with a unit: a whole number of nanoseconds; by default 1 ns. With longer
+            ticks, times are 16-bit integers if they fit.
         budget : int, optional
-            Most bytes that the arrays may take.
+            Largest size of the arrays, bytes.
 
         Raises
         ------
         InputError
-            The tick is no whole number of nanoseconds, or the table takes more bytes than there are.
+            The tick is not a whole number of nanoseconds, or the table exceeds the budget.
         """
         unit, size = checked_tick(tick), self.size(tick)
         if budget is not None and size > budget:
@@ -352,12 +353,12 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return header_text(self._head, self.rates, self._times, unit)
 
     def size(self, tick: float | str = NANOSECOND) -> int:
-        """Return how many bytes the arrays of the C header take with a tick, s, or text with a unit."""
+        """Return the size of the C header's arrays in bytes, for a tick, s, or text with a unit."""
         bits = bits_of(self._times, checked_tick(tick))
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
-        """Return the table as a timer with a tick, s or text, fires it; deviations are unknown."""
+        """Return the table rounded to a timer tick, s or text; its deviations are unknown."""
         unit = checked_tick(tick)
         times: dict[str, Any] = {name: np.rint(values / unit) * unit for name, values in self._times.items()}
         return replace(self, **times, deviation=np.full_like(self.deviation, np.nan))
@@ -371,14 +372,14 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return {name: getattr(self, name) for name in (*HEAD, *OPTIONAL)}
 
     def save(self, path: str | Path) -> None:
-        """Write the table, a C header (.h) among others, by the ending of the name; whole or not at all.
+        """Write the table in the format of the file suffix, a C header (.h) among others, atomically.
 
-        `load_table` reads CSV and JSON again.
+        `load_table` reads CSV and JSON back.
 
         Raises
         ------
         InputError
-            The name ends in none of `ENDINGS`, or the file cannot be written.
+            The suffix is not one of `ENDINGS`, or the file cannot be written.
         """
         texts = {".csv": self.to_csv, ".h": self.to_header}
         suffix = Path(path).suffix.lower()
@@ -389,17 +390,17 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
 
 def mixed(first: Settings, second: Settings, share: float) -> Settings:
-    """Return settings between two, by the share of the second.
+    """Interpolate linearly between two settings, with weight `share` on the second.
 
-    Where the two do not belong together, since their brake pulses differ or one fires before a rebound and
-    the other after it, the nearer one holds.
+    Where the brake pulses of two entries differ, or one fires before a rebound and the other after it, the
+    nearer entry is used unchanged.
     """
     apart = np.abs(first.advance - second.advance) > JUMP
     apart |= (first.brake_delay != second.brake_delay) | (first.brake_width != second.brake_width)
     part = np.where(apart, float(share > 0.5), share)
 
     def between(low: FloatArray, high: FloatArray) -> FloatArray:
-        # Exactly the values of the two at their own places.
+        # Reproduces the end points to the last bit.
         upper = np.where(part == 1.0, high, (1.0 - part) * low + part * high)
         return np.asarray(np.where(part == 0.0, low, upper))
 
@@ -407,7 +408,7 @@ def mixed(first: Settings, second: Settings, share: float) -> Settings:
 
 
 def checked_tick(tick: float | str) -> float:
-    """Return a tick, s, as a whole number of nanoseconds."""
+    """Convert a tick to seconds; raise `InputError` unless it is a whole number of nanoseconds."""
     asked = read_positive(tick, "s", "tick")
     count = round(asked / NANOSECOND)
     if count < 1 or abs(asked / NANOSECOND - count) > _NEAR * count:
@@ -416,9 +417,9 @@ def checked_tick(tick: float | str) -> float:
 
 
 class TableStrategy:
-    """A compensation table as a way to drive a hammer, as `CompensationTable.strategy` makes it.
+    """A compensation table as a drive strategy, made by `CompensationTable.strategy`.
 
-    The waveform of the hammer it is made for gets other widths.
+    The pulses have the waveform of the table's hammer, with the widths of the table.
     """
 
     name = "table"
@@ -438,12 +439,12 @@ class TableStrategy:
                 )
 
     def __call__(self, _hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Drive]:
-        """Return a drive for each pattern; the hammer that is driven does not change them.
+        """Return a drive for each pattern; the driven hammer does not affect the drives.
 
         Raises
         ------
         InputError
-            The table does not reach to this rate, or a firing would come before the one before it has ended.
+            The rate is outside the table, or a firing would precede the end of the previous pulse.
         """
         speed, table = read_positive(rate, "Hz", "rate"), self.table
         settings = table.at(speed)
@@ -453,13 +454,12 @@ class TableStrategy:
 
 
 def load_table(path: str | Path) -> CompensationTable:
-    """Read a compensation table that was written as CSV or JSON; it is the same to the last bit.
+    """Read a compensation table from CSV or JSON; every value is restored to the last bit.
 
     Raises
     ------
     InputError
-        The file cannot be read or is no such table; the sentence names file, key, value and what was
-        expected.
+        The file cannot be read or is not a valid table; the message names file, key, value and expectation.
     """
     target = Path(path)
     if target.suffix.lower() not in (".csv", ".json"):

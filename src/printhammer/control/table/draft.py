@@ -1,6 +1,6 @@
-"""A compensation table in the making, and how far off the last dots of patterns are with it.
+"""Draft of a compensation table: evaluate and improve the entries of all histories.
 
-All entries of a table made right: those of short histories first, since they come before the others.
+Entries of short histories are solved first, since the dots they describe precede the others in a pattern.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     Cells = Sequence[tuple[int, History]]
-    """Entries by row and history."""
+    """Entries as pairs of row and history."""
 
-VALUES: Final = (*COLUMNS, "deviation")  # Names of the arrays of a table
-# Length of the row of dots in every slot before a history, where it has to be right in long patterns too
+VALUES: Final = (*COLUMNS, "deviation")  # Names of a table's arrays
+# Length of the row of dots that precedes a history in the dense patterns; arbitrary
 _DENSE: Final = 6
 
 
 @dataclass(frozen=True)
 class Draft:
-    """What is known of a table so far: `values` of shape (5, rates, entries), named by `VALUES`."""
+    """A table under construction: `values` of shape (5, rates, entries), named by `VALUES`."""
 
     task: Task
     rates: FloatArray
@@ -63,7 +63,7 @@ class Draft:
 
     @property
     def deviation(self) -> FloatArray:
-        """How far off the entries are, in parts of the limits, shape (rates, entries); a view."""
+        """Deviation of each entry, as a fraction of the limits, shape (rates, entries); a view."""
         return np.asarray(self.values[4])
 
     @property
@@ -72,11 +72,11 @@ class Draft:
         return np.asarray(self.deviation.max(axis=1))
 
     def rows(self, which: IntArray) -> Draft:
-        """Return some rows, as a copy."""
+        """Return a copy with the rows `which`."""
         return Draft(self.task, self.rates[which], self.values[:, which])
 
     def table(self) -> CompensationTable:
-        """Return this as a table."""
+        """Convert the draft to a table."""
         task = self.task
         shared = shared_numbers(task.gaps, task.reach)
         return CompensationTable(
@@ -90,14 +90,15 @@ class Draft:
         )
 
     def places(self, cells: Cells) -> tuple[IntArray, IntArray]:
-        """Return rows and columns of some entries."""
+        """Return the row and column indices of entries."""
         columns = [number_of(history, self.task.reach) for _row, history in cells]
         return np.array([row for row, _history in cells], np.int64), np.array(columns, np.int64)
 
     def judge(self, level: Sequence[History] | None = None) -> None:
-        """Evaluate how far off histories are at all rates; by default all of them.
+        """Evaluate the deviations of histories at all rates; by default of all histories.
 
-        Then the deviation of a history of equal gaps is infinite if an error in rows of them does not shrink.
+        For all histories, the deviation of equal gaps becomes infinite if an error in a long row of them
+        grows.
         """
         lengths = range(1, self.task.gaps + 1)
         levels = [histories_of_length(self.task, n) for n in lengths] if level is None else [level]
@@ -138,13 +139,14 @@ class Draft:
         dense: bool = True,
         whole: bool = False,
     ) -> FloatArray:
-        """Return deviations of force and arrival of last dots of patterns, in parts of the limits.
+        """Return deviations of force and arrival of patterns' last dots, as fractions of the limits.
 
-        `values` (cells, 2) are advance and width of the last dots, s, and `shifts` (shifts, 2) changes of
-        these to be tried. `dense` takes several patterns for each entry, as `gaps_before` says; `whole`
-        returns the largest deviations of all dots of a pattern that have the history instead. The shape is
-        (cells, shifts, deviations), over hammers, patterns, force and arrival: NaN for a lost dot or a
-        pattern with extra contacts. Where an entry has fewer patterns than others, its first one is repeated.
+        `values` (cells, 2) are advance and width of the last dots, s, and `shifts` (shifts, 2) are trial
+        changes of both. With `dense`, each entry is evaluated in several patterns, see `gaps_before`. With
+        `whole`, the result is the largest deviation of all dots of a pattern that share the history of the
+        last one. The shape is (cells, shifts, deviations), over hammers, patterns, force and arrival; NaN for
+        a lost dot or a pattern with extra contacts. An entry with fewer patterns than the others repeats its
+        first pattern.
         """
         task = self.task
         gaps = [gaps_before(history, task.reach) if dense else [()] for _row, history in cells]
@@ -184,18 +186,18 @@ class Draft:
 
 
 def blank(task: Task, rates: FloatArray) -> Draft:
-    """Return a draft of zeros."""
+    """Return a draft of zeros for the given rates."""
     return Draft(task, rates, np.zeros((len(VALUES), rates.size, entries_of(task.gaps, task.reach))))
 
 
 def histories_of_length(task: Task, known: int) -> list[History]:
-    """List the histories that hold a number of gaps before they are rest."""
+    """List the histories with exactly `known` gaps before rest."""
     every = histories(task.gaps, task.reach)
     return [history for history in every if task.gaps - history.count(REST) == known]
 
 
 def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
-    """Return gaps before a history: none, and those of patterns that it comes late in."""
+    """Return the sequences of gaps that precede a history in test patterns: none, and several long ones."""
     late = (reach + 1,)
     if REST in history:
         return [(), late]
@@ -203,17 +205,17 @@ def gaps_before(history: History, reach: int) -> list[tuple[int, ...]]:
     return [(), late, (*row, reach), (*row, *late), (reach, 1, reach, 1)]
 
 
-GOOD: Final = 1e-4  # Deviation, in parts of the limits, from which on an entry is left as it is
-LEAST_OF_WIDEST: Final = 0.3  # Least width, in parts of the largest one
-# Deviation, in parts of the limits, above which an entry is made less wrong in all patterns
+GOOD: Final = 1e-4  # Deviation, as a fraction of the limits, below which an entry is not improved further
+LEAST_OF_WIDEST: Final = 0.3  # Smallest width, as a fraction of the largest
+# Deviation, as a fraction of the limits, above which an entry is refitted to all its patterns
 ROUGH: Final = 0.2
-_STEP: Final = 0.5e-6  # Difference of times from which derivatives are taken, s
+_STEP: Final = 0.5e-6  # Step of the finite differences, s
 
 
 def polish(draft: Draft) -> None:
-    """Improve all entries of a draft in place; that from rest stays as it is.
+    """Improve all entries of a draft in place; the entry from rest is not changed.
 
-    The draft has a first guess for every history.
+    The draft must hold an initial guess for every history of one gap.
     """
     task = draft.task
     for known in range(1, task.gaps + 1):
@@ -223,16 +225,17 @@ def polish(draft: Draft) -> None:
             guess = draft.values[:4, :, number_of(parent, task.reach)]
             draft.values[:4, :, number_of(history, task.reach)] = guess
         _polish_level(draft, level)
-    # Entries that come before others may have changed since they were judged.
+    # Entries of shorter histories may have changed since the others were judged.
     draft.judge()
     task.report()
 
 
 def _polish_level(draft: Draft, level: Sequence[History]) -> None:
-    """Improve the entries of some histories at all rates; what is printed from rest stays as it is.
+    """Improve the entries of some histories at all rates, by two least-squares fits.
 
-    At first each entry is made right in the pattern that begins with it: where all dots before are right, it
-    is right in all others as well. Where that cannot be, it is made less wrong in all.
+    The first fit makes each entry right in the shortest pattern that ends with its history; if all earlier
+    dots are right, the entry is then right in every pattern. Entries that remain rough are fitted to all
+    their patterns, and the new fit is kept only where it is better.
     """
     settled = draft.task.single.settled
     cells = [
@@ -266,7 +269,7 @@ def _solve(draft: Draft, cells: Cells, *, dense: bool) -> None:
     first = task.earliest(*draft.brakes[:, rows, columns])
 
     def measure(now: FloatArray, active: IntArray, shifts: FloatArray) -> FloatArray:
-        # Dots before the last one may have the same history.
+        # Earlier dots of the pattern may have the same history.
         draft.timing[:, rows, columns] = now.T
         off = draft.last_dots([cells[k] for k in active.tolist()], now[active], shifts, dense=dense)
         task.report()

@@ -1,16 +1,15 @@
-"""From the settings of a compensation table to a drive: a pulse for each dot, and a brake pulse after it.
+"""Drives from compensation tables: a print pulse per dot, and an optional brake pulse after it.
 
-The history of a dot: how many slots ago the dots before it were printed.
+The history of a dot lists the gaps, in slots, back to the dots before it: from the dot to the preceding one,
+from that one to its predecessor, and so on, n gaps in all. A gap longer than the reach G means that the
+hammer is at rest by then, whatever was printed before; such a gap is written as 0, "rest", and so are all
+earlier gaps.
 
-A history of length n holds the gaps, in slots, from the dot to the one before it, from that one to the one
-before, and so on, n of them. A gap longer than the reach G tells nothing any more: the hammer is at rest by
-then, whatever was printed before. It is written as 0, "rest", and so is everything that lies before it.
+Histories are numbered as n digits to the base G + 1 with the latest gap as the most significant digit, which
+is the index that the firmware computes. Numbers with a nonzero digit after a rest are aliases of the number
+with rest in all later digits.
 
-Histories are numbered with the latest gap as the most significant of n digits to the base G + 1, which is the
-index that the firmware computes. Numbers of which a digit follows a rest stand for the same dot as the number
-that is all rest from there on.
-
-What switches the coil: the hammer's own pulse, or a fast switch on a higher rail.
+Drivers of the coil: the hammer's own pulse, a fast switch on a higher rail, or an H-bridge.
 """
 
 from __future__ import annotations
@@ -33,14 +32,14 @@ from printhammer.printing.dots.strategy import slot_times
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray, IntArray
 
-REST: Final = 0  # Gap of a dot that is printed from rest
+REST: Final = 0  # Gap of a dot printed from rest
 MOST_GAPS: Final = 4  # Largest number of gaps in a history
 MOST_REACH: Final = 8  # Largest reach, slots
 History = tuple[int, ...]
 
 
 def checked_size(gaps: int, reach: int) -> tuple[int, int]:
-    """Return number of gaps and reach."""
+    """Validate the number of gaps and the reach."""
     for name, value, most in (("history", gaps, MOST_GAPS), ("reach", reach, MOST_REACH)):
         if isinstance(value, bool) or not 1 <= value <= most:
             raise InputError.of(name, value, f"a whole number from 1 to {most}")
@@ -48,12 +47,12 @@ def checked_size(gaps: int, reach: int) -> tuple[int, int]:
 
 
 def entries_of(gaps: int, reach: int) -> int:
-    """Return the number of numbers of histories."""
+    """Return the number of history numbers, aliases included."""
     return int((reach + 1) ** gaps)
 
 
 def plain(history: Sequence[int]) -> History:
-    """Return a history in which everything before a rest is rest."""
+    """Return a history with every gap after a rest replaced by rest."""
     known = list(itertools.takewhile(lambda gap: gap != REST, history))
     return (*known, *[REST] * (len(history) - len(known)))
 
@@ -67,22 +66,22 @@ def number_of(history: Sequence[int], reach: int) -> int:
 
 
 def histories(gaps: int, reach: int) -> list[History]:
-    """List all histories that differ, those with more rest first, so that what comes before is known."""
+    """List all distinct histories, shortest first, so that preceding entries are known."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return sorted((row for row in every if row == plain(row)), key=lambda row: (gaps - row.count(REST), row))
 
 
 def shared_numbers(gaps: int, reach: int) -> IntArray:
-    """Return for every number that of the history it stands for, shape (entries,)."""
+    """Map every history number to the number it is an alias of, shape (entries,)."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return np.array([number_of(row, reach) for row in every], np.int64)
 
 
 def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
-    """Return the number of the history of each dot of a pattern that begins at rest.
+    """Return the history number of each dot of a pattern that begins at rest.
 
-    The last one, of dots + 1, is that of a dot long after, which is printed from rest: all rest. `slots` are
-    those at which dots are wanted, ascending.
+    `slots` are the ascending slot indices of the dots. The array has one more element than dots: the last is
+    the number of a dot printed from rest, long after the pattern.
     """
     steps = np.diff(np.asarray(slots, np.int64))
     if (steps < 1).any():
@@ -96,42 +95,42 @@ def histories_of(slots: Sequence[int], gaps: int, reach: int) -> IntArray:
 
 
 def gap_text(gap: int) -> str:
-    """Return a gap in words."""
+    """Return a gap as text: "rest" or the number of slots."""
     return "rest" if gap == REST else str(gap)
 
 
 def history_text(history: Sequence[int]) -> str:
-    """Return a history in words, such as "1-2-rest"."""
+    """Return a history as text, such as "1-2-rest"."""
     return "-".join(map(gap_text, history))
 
 
 def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int, ...]:
-    """Return the slots of a pattern whose last dot has a history.
+    """Return the slots of a pattern whose last dot has a given history.
 
-    `before` are further gaps, the latest first, of dots still earlier; for a history without rest only.
+    `before` are gaps before the history, latest first; only for a history without rest.
     """
     gaps = [gap for gap in (*plain(history), *before) if gap != REST]
     return tuple(itertools.accumulate(reversed(gaps), initial=0))
 
 
-WIDEST: Final = 2.0  # Largest width of a pulse, in parts of that of the hammer's own
-LARGEST_CURRENT: Final = 2.0  # Largest current in any drive by default, A
-# Part of the largest current that a single pulse stays below it, for what is left of a brake pulse
+WIDEST: Final = 2.0  # Largest width of a pulse, as a multiple of the hammer's own
+LARGEST_CURRENT: Final = 2.0  # Default current limit, A
+# Fraction of the current limit reserved for the tail of a brake pulse
 MARGIN: Final = 1e-3
-ROUNDING: Final = 1e-9  # Part by which rounding may go beyond a bound
-_HALVINGS: Final = 50  # Halvings of an interval of widths: more than a double has bits to tell them apart
-_FEWER: Final = 12  # The same for a driver, of which each takes a run
-_SAMPLES: Final = 4001  # Instants at which a decaying pulse is looked at
-_WAIT: Final = 1e-6  # Step of the wait after a brake pulse, s
+ROUNDING: Final = 1e-9  # Relative rounding tolerance of a bound
+_HALVINGS: Final = 50  # Bisections of a width: about the number of bits in a double
+_FEWER: Final = 12  # Bisections of a width for a driver, each of which needs a simulation
+_SAMPLES: Final = 4001  # Samples of a decaying pulse; arbitrary
+_WAIT: Final = 1e-6  # Step of the search for the wait after a brake pulse, s
 
 JUMP: Final = 8e-6
-"""Difference of neighbouring advances from which on they belong to different ways to fire a dot, s."""
+"""Difference of neighbouring advances above which they belong to different solution branches, s."""
 
 
 class Settings(NamedTuple):
-    """What a `CompensationTable` says at one rate: arrays of shape (entries,), over the numbers of histories.
+    """Entries of a `CompensationTable` at one rate: arrays of shape (entries,), indexed by history number.
 
-    Meanings and units are those of the columns of the table.
+    Meanings and units are those of the table's columns.
     """
 
     advance: FloatArray
@@ -140,16 +139,15 @@ class Settings(NamedTuple):
     brake_width: FloatArray
 
 
-COLUMNS: Final = Settings._fields  # What a table says of a dot
+COLUMNS: Final = Settings._fields  # Names of the times of an entry
 
 
 def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
-    """Return the pulse of a hammer, and the largest width, s, at which its current keeps to a bound, A.
+    """Return the pulse of a hammer, and the largest width, s, at which its current stays within a limit, A.
 
     Raises
     ------
-    InputError
-        The hammer has no waveform, one without a width, one that is a force, or one above the bound.
+    The hammer has no waveform, a waveform without a width or in newtons, or one that exceeds the limit.
     """
     pulse = pulse_of(hammer)
     width = getattr(pulse, "width", None)
@@ -185,9 +183,9 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time, s, after its width in which a pulse has faded to a share of its peak for good.
+    """Return the time, s, from the end of a pulse until it stays below the fraction `share` of its peak.
 
-    That of a driver has faded once its current has: what the armature induces later is left out.
+    For a driver this is the first time of the current alone; later induced currents are ignored.
     """
     own: Any = pulse
     if pulse.quantity == "voltage":
@@ -198,10 +196,10 @@ def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
 
 
 def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> float:
-    """Return how long after the width of a brake pulse the next pulse may begin, s.
+    """Return the time, s, from the end of a brake pulse to the earliest start of the next pulse.
 
-    By then so much of it has decayed that pulses of the largest width one after another keep to the bound on
-    the current, A.
+    By then the brake pulse has decayed so far that two consecutive pulses of the largest width stay within
+    the current limit, A.
     """
     wide = of_width(pulse, width)
     if pulse.quantity == "voltage":
@@ -217,7 +215,7 @@ def clearance(hammer: Hammer, pulse: Waveform, width: float, largest: float) -> 
 
 
 def brake_of(pulse: Waveform, width: float) -> Waveform:
-    """Return the brake pulse of a width, s: one shorter than the peak time of a driver is its full supply."""
+    """Return a brake pulse of a width, s; one shorter than a driver's peak time applies the full supply."""
     if isinstance(pulse, PeakAndHold) and width <= pulse.peak_time:
         shared = {name: value for name, value in dict(pulse).items() if name in Rail.model_fields}
         return Rail(**{**shared, "width": width})
@@ -225,10 +223,10 @@ def brake_of(pulse: Waveform, width: float) -> Waveform:
 
 
 class Pulses(NamedTuple):
-    """What the dots of one pattern are made with: arrays of shape (dots,), s.
+    """Pulses of one pattern: arrays of shape (dots,), s.
 
-    Slot times `due`, `advance` and firing times `fired`, the `width` of the pulses, and of the brake pulses
-    that follow them the width `braked`, 0 for none, and the `offset` from the firing.
+    Slot times `due`, `advance`, firing times `fired`, and `width` of the print pulses; of the brake pulses
+    that follow, the width `braked`, 0 for none, and the `offset` from the firing.
     """
 
     due: FloatArray
@@ -240,7 +238,7 @@ class Pulses(NamedTuple):
 
 
 def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], rate: float) -> Pulses:
-    """Return what the dots of a pattern are made with."""
+    """Compute the pulses of a pattern from the settings at a rate, Hz."""
     numbers = histories_of(slots, gaps, reach)
     here, after = numbers[:-1], numbers[1:]
     due, advance = slot_times(slots, rate), settings.advance[here]
@@ -251,10 +249,9 @@ def pulses_of(settings: Settings, gaps: int, reach: int, slots: Sequence[int], r
 def sequence(
     pulses: Pulses, pulse: Waveform, known: dict[tuple[float, float, float], Waveform]
 ) -> PulseSequence:
-    """Return the drive of a pattern, by a pulse that gets other widths.
+    """Assemble the drive of a pattern from a pulse shape of variable width.
 
-    `known` holds waveforms that were made before, by width, width of the brake pulse and its offset; added
-    to.
+    `known` caches waveforms by width, brake width and brake offset; it is updated.
     """
     waveforms = []
     for width, braked, offset in zip(*(values.tolist() for values in pulses[3:]), strict=True):
@@ -268,35 +265,35 @@ def sequence(
 
 Driver = Literal["own", "switch", "bridge"]
 DRIVERS: Final = get_args(Driver)
-"""The hammer's own pulse, with the rise of its supply; a fast unipolar switch, whose current rises as fast as
-that of the hammer falls; an H-bridge, which switches off against the reversed rail."""
+"""Drivers: the hammer's own pulse, with the rise of its supply; a fast unipolar switch, whose current rises
+as fast as that of the hammer falls; an H-bridge, which switches off against the reversed rail."""
 
-# Time constant of the decay against the reversed rail, in parts of that of the rise: the current falls as
-# 2 exp(-t) - 1 and is zero at ln 2; an exponential of this constant has the same charge.
+# Decay time constant against the reversed rail over that of the rise: the current falls as 2 exp(-t) - 1 and
+# is zero at ln 2; an exponential decay with this constant carries the same charge.
 _REVERSED: Final = 1.0 - float(np.log(2.0))
 
-_EDGE: Final = 20e-6  # Time constant of a switch where the waveform of the hammer has no decay, s
-_LEAST_EDGE: Final = 1e-6  # Least time constant of a switch, s
-_GRID: Final = 33  # Number of widths that are tried at a time
-_ROUNDS: Final = 7  # How often: each time between two neighbours of the one before
+_EDGE: Final = 20e-6  # Time constant of a switch if the hammer's waveform has no decay, s; arbitrary
+_LEAST_EDGE: Final = 1e-6  # Smallest time constant of a switch, s; arbitrary
+_GRID: Final = 33  # Widths per round of the grid search
+_ROUNDS: Final = 7  # Rounds; each subdivides the bracketing interval of the previous round
 
 
 def checked_driver(driver: str) -> Driver:
-    """Return a driver by its name."""
+    """Validate the name of a driver."""
     if driver not in DRIVERS:
         raise InputError.of("driver", driver, f"{', '.join(DRIVERS[:-1])} or {DRIVERS[-1]}")
     return driver  # type: ignore[return-value]
 
 
 def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
-    """Return a hammer with the pulse of a driver, of a width at which the dot is as hard as before.
+    """Return the hammer with the pulse of a driver, at the width that gives the same print force.
 
-    `largest` is the current of a switch or a bridge, A.
+    `largest` is the current of a switch or an H-bridge, A.
 
     Raises
     ------
     InputError
-        The driver is not known, the waveform of the hammer is a force, or no width makes such a dot.
+        The driver is unknown, the hammer's waveform is not a current, or no width gives the force.
     """
     if checked_driver(driver) == "own":
         return hammer
@@ -316,7 +313,7 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
 
 
 def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
-    """Return a hammer fired by a pulse of such a width, between two, s, that the dot has a force, N."""
+    """Set the pulse to the width between `low` and `high`, s, with print force `force`, N; nested grids."""
     for _ in range(_ROUNDS):
         widths = np.linspace(low, high, _GRID).tolist()
         pulses = [of_width(pulse, width) for width in widths]
@@ -335,6 +332,6 @@ def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: fl
 
 
 def with_pulse(hammer: Hammer, pulse: Waveform) -> Hammer:
-    """Return a hammer that is fired by another pulse."""
+    """Return a copy of the hammer with another pulse."""
     constants = {key: value for key, value in dict(pulse).items() if key != "quantity"}
     return hammer.replace("waveform", {"shape": pulse.shape, **constants}, source="of the driver")

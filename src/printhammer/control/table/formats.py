@@ -1,7 +1,7 @@
-"""Compensation tables as text: CSV and JSON, which are read back.
+"""Compensation tables as CSV and JSON text, written and read back.
 
-The formats are described in docs/howto/tables.md. Times are in seconds with all their digits, so that what is
-read back is the same table to the last bit.
+The formats are described in docs/howto/tables.md. Times are in seconds with all their digits, so that reading
+restores the table to the last bit.
 """
 
 from __future__ import annotations
@@ -34,43 +34,43 @@ if TYPE_CHECKING:
     Rows = list[dict[str, Any]]
 
 FORMAT: Final = 1  # Version of the CSV format
-KIND: Final = "printhammer compensation table"  # What the first line of a CSV file says
-DEVIATION: Final = "deviation"  # Name of the array that is no time
-# What a file says of the whole table
+KIND: Final = "printhammer compensation table"  # First words of a CSV file
+DEVIATION: Final = "deviation"  # Name of the array that is not a time
+# Required metadata of a table file
 HEAD: Final = {"hammer": str, "fingerprint": str, "gaps": int, "reach": int, "largest_current": float}
 OPTIONAL: Final = {"driver": "own", "serial": ""}
-"""What a file may say besides, and what holds where it does not."""
+"""Optional metadata of a table file, with default values."""
 _FIRST: Final = f"# {KIND}, format {FORMAT}"
-_ATTRIBUTE: Final = re.compile(r"# \w+: ")  # A line of provenance in a CSV file
+_ATTRIBUTE: Final = re.compile(r"# \w+: ")  # Provenance line of a CSV file
 
 
 def columns(gaps: int) -> list[str]:
-    """Return the heading of a CSV file."""
+    """Return the column headings of a CSV file."""
     times = [f"{name} [s]" for name in COLUMNS]
     return ["rate [Hz]", *[f"gap {number}" for number in range(1, gaps + 1)], *times, DEVIATION]
 
 
 def csv_head(head: Mapping[str, Any]) -> str:
-    """Return the first lines of a CSV file: what it is, and what it is about."""
+    """Return the comment lines at the head of a CSV file: format and metadata."""
     said = [*HEAD, *(key for key, value in OPTIONAL.items() if head[key] != value)]
     lines = [_FIRST, *(f"# {key} = {json.dumps(head[key], ensure_ascii=False)}" for key in said)]
     return "\n".join(lines) + "\n"
 
 
 def read_table(text: str, suffix: str) -> dict[str, Any]:
-    """Read the text of a table, as the arguments of a `CompensationTable`; `suffix` is ".csv" or ".json".
+    """Parse the text of a table to the arguments of a `CompensationTable`; `suffix` is ".csv" or ".json".
 
     Raises
     ------
     InputError
-        It is no such table; the sentence names key, value and what was expected.
+        The text is not a valid table; the message names key, value and expectation.
     """
     head, rows = _of_json(text) if suffix == ".json" else _of_csv(text)
     return _built(head, rows)
 
 
 def _of_csv(text: str) -> tuple[Head, Rows]:
-    """Read head and rows of a CSV file."""
+    """Parse metadata and rows of a CSV file."""
     lines = text.splitlines()
     if not lines or lines[0].strip() != _FIRST:
         first = shown(lines[0] if lines else "")
@@ -121,7 +121,7 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
 
 
 def _of_json(text: str) -> tuple[Head, Rows]:
-    """Read head and rows of a JSON file, which is that of a result."""
+    """Parse metadata and rows of a JSON file, which has the format of a saved result."""
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -145,7 +145,7 @@ def _of_json(text: str) -> tuple[Head, Rows]:
 
 
 def _entries(arrays: Mapping[str, Any]) -> Rows:
-    """Return the entries of a JSON file that holds arrays over rates and histories."""
+    """Return the entries of a JSON file, whose arrays run over rates and histories."""
     wanted = ("rate", "history", *COLUMNS, DEVIATION)
     _check_keys(arrays, wanted, "columns: ")
     for name in wanted:
@@ -194,7 +194,7 @@ def _check_keys(entry: Mapping[str, Any], wanted: Sequence[str], where: str) -> 
 
 
 def _built(head: Head, rows: Rows) -> dict[str, Any]:
-    """Put the rows where they belong, each history at each rate exactly once."""
+    """Assemble the arrays from rows; check that each history occurs exactly once at each rate."""
     gaps, reach = head["gaps"], head["reach"]
     for number, row in enumerate(rows, 1):
         if not (np.isfinite(row["rate"]) and row["rate"] > 0.0):

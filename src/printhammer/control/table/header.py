@@ -1,8 +1,7 @@
-"""Compensation tables as C headers (C99, whole numbers, no library), in ticks of the timer of the firmware.
+"""Compensation tables as C headers (C99, integers, no library), in ticks of the firmware's timer.
 
-Every name of a header begins with hammer, unit, driver and rates, so that headers of several tables go into
-one program. The times between two rates, or between two values of an axis, are those that the table gives in
-Python, to the tick.
+Every name in a header has a prefix of hammer, unit, driver and rates, so that one program can include several
+headers. The C interpolation between rates, or between values of an axis, agrees with Python to the tick.
 """
 
 from __future__ import annotations
@@ -18,46 +17,46 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.c_code import comment, identifier, nested, numbers
 
 NANOSECOND: Final = 1e-9
-"""Unit of the times in a header where no tick is given, s."""
+"""Default unit of the times in a header, s."""
 
 _PLACE_BYTES: Final = 4
-"""Size of a rate, or of a value of an axis."""
+"""Size of a rate or of an axis value, bytes."""
 
 _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
 
 def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
-    """Return the size in bits of a time in ticks: 32 of nanoseconds, else 16 where all of them fit."""
+    """Return the size of a time in bits: 32 for nanoseconds, else 16 if all times fit."""
     largest = max(float(np.abs(np.rint(values / tick)).max()) for values in times.values())
     return 32 if tick == NANOSECOND or largest > np.iinfo(np.int16).max else 16
 
 
 def size_of(rates: int, entries: int, bits: int, values: int = 0) -> int:
-    """Return the bytes that the arrays of a header take, by numbers of rates, entries and values."""
+    """Return the size of the arrays of a header in bytes, for numbers of rates, entries and axis values."""
     each = len(COLUMNS) * bits // 8 + 1
     return max(values, 1) * rates * entries * each + _PLACE_BYTES * (rates + values)
 
 
 def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, reach: int) -> IntArray:
-    """Compute the look-ahead of each history: slots before its own at which a dot must be known.
+    """Compute the look-ahead of each history: how many slots in advance a dot must be known.
 
-    A dot must be known when it is fired, `advance` before its slot, and when its brake pulse is,
-    `brake_delay` after the slot of the dot before. The brake pulse of a dot from rest follows the last dot
-    for long; it is fired when the slots within reach are known to be empty.
+    A dot must be known at its firing, `advance` before its slot, and at its brake pulse, `brake_delay` after
+    the slot of the preceding dot. The brake pulse of a dot from rest follows the last dot of a pattern; it is
+    fired once the slots within reach are known to be empty.
 
     Parameters
     ----------
     times : mapping
         Arrays (..., rates, entries) by name, s.
     rates : array, shape (R,)
-        Slots per second.
+        Slot rates, Hz.
     gaps, reach : int
-        Gaps of a history, and the longest gap that counts.
+        Number of gaps in a history, and the longest gap that counts.
 
     Returns
     -------
     array, shape (..., rates, entries)
-        Whole slots, 0 for a dot that is fired after its slot and has no brake pulse.
+        Whole slots; 0 for a dot that is fired after its slot and has no brake pulse.
     """
     advance, _, delay, brake = (times[name] * rates[:, np.newaxis] for name in COLUMNS)
     gap = np.arange(entries_of(gaps, reach)) // (reach + 1) ** (gaps - 1)
@@ -67,9 +66,9 @@ def look_ahead(times: Mapping[str, FloatArray], rates: FloatArray, gaps: int, re
 
 
 def prefix_of(head: Mapping[str, Any], rates: FloatArray, axis: str = "") -> str:
-    """Return the prefix of all names in a header, from hammer, unit, driver, rates and axis.
+    """Return the prefix of all names in a header, made of hammer, unit, driver, rates and axis.
 
-    The driver is left out where it is the hammer's own, the unit where the table is for every unit.
+    The driver is omitted if it is the hammer's own, the unit if the table is valid for every unit.
     """
     driver = "" if head["driver"] == "own" else head["driver"]
     span = "_".join(f"{rate:g}" for rate in sorted({float(rates[0]), float(rates[-1])}))
@@ -84,21 +83,21 @@ def header_text(
     tick: float = NANOSECOND,
     axis: tuple[str, FloatArray] | None = None,
 ) -> str:
-    """Return a C header with the table in whole ticks, and functions that a firmware calls.
+    """Render a C header with the table in whole ticks, and the functions that firmware calls.
 
     Parameters
     ----------
     head : mapping
         Metadata of the table, see `printhammer.control.table.formats.HEAD` and `OPTIONAL`.
     rates : array, shape (R,)
-        Slots per second.
+        Slot rates, Hz.
     times : mapping
-        Arrays (rates, entries) by name, s; with an axis (values, rates, entries). Every number of a history
-        is there, so that the firmware needs no search.
+        Arrays (rates, entries) by name, s; with an axis (values, rates, entries). All history numbers,
+        aliases included, have entries, so that the firmware can index directly.
     tick : float
         Tick of the timer, s.
     axis : tuple, optional
-        Name of the axis, and its values as whole numbers.
+        Name of the axis, and its values as integers.
     """
     from printhammer import __version__
 
@@ -184,12 +183,12 @@ static inline unsigned {prefix}_slots_ahead(unsigned rate)
 
 
 def _quoted(text: str) -> str:
-    """Return a text that is safe inside a C string."""
+    """Escape a text for a C string literal."""
     return comment(text).replace('"', "'")
 
 
 def _most(prefix: str, values: int, entries: int) -> str:
-    """Return the loops over the look-ahead of one rate."""
+    """Return the C loops that compute the largest look-ahead at one rate."""
     place = f"{prefix}_look_ahead{'[value]' if values else ''}[rate][history]"
     loops = f"  for (unsigned history = 0; history < {entries}u; history++)\n"
     if values:
@@ -198,21 +197,21 @@ def _most(prefix: str, values: int, entries: int) -> str:
 
 
 class _Between(NamedTuple):
-    """Code fragments of an interpolation, over the slot period or along an axis."""
+    """C code fragments of an interpolation, over the slot period or along an axis."""
 
     said: str
     call: str
     """Name and first arguments of the function."""
 
     share: str
-    """Statements that set `below`, `above`, and `part` of `whole`."""
+    """C statements that set `below`, `above`, and the weight `part` / `whole`."""
 
     place: str
-    """Index of the arrays by `below` or `above`, which stands for `%`."""
+    """Array index with `%` as a placeholder for `below` or `above`."""
 
 
 def _over_rates(prefix: str, rates: int) -> _Between:
-    """Return the interpolation in the period, as `CompensationTable.at` does it."""
+    """Return the C code of the interpolation in the period, equivalent to `CompensationTable.at`."""
     rate = f"{prefix}_rate"
     share = f"""\
   const unsigned at = {prefix}_rate_at(millihertz), last = {max(rates - 2, 0)}u;
@@ -228,7 +227,7 @@ def _over_rates(prefix: str, rates: int) -> _Between:
 
 
 def _over_axis(prefix: str, axis: str, values: int) -> _Between:
-    """Return the interpolation between the values of an axis, at one of the rates."""
+    """Return the C code of the interpolation along an axis, at one rate of the table."""
     name = f"{prefix}_{axis}"
     share = f"""\
   unsigned above = 1u;
@@ -244,7 +243,7 @@ def _over_axis(prefix: str, axis: str, values: int) -> _Between:
 
 
 def _between(prefix: str, tick: float, over: _Between) -> str:
-    """Return the function that interpolates, as `printhammer.control.table.compensation.mixed` does."""
+    """Return the C function that interpolates, as `printhammer.control.table.compensation.mixed` does."""
     ends = "\n".join(
         f"  low[{row}] = {prefix}_{column}{over.place.replace('%', 'below')};\n"
         f"  high[{row}] = {prefix}_{column}{over.place.replace('%', 'above')};"

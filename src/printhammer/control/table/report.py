@@ -1,4 +1,4 @@
-"""A compensation table beside open loop, on patterns, rates and hammers that it was not tuned on."""
+"""Comparison of a compensation table with open loop, on patterns, rates and hammers not used in tuning."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ PERTURBATIONS: Final = (
     *(Perturbation(magnet=share) for share in (0.01, -0.01)),
     *(Perturbation(damping=share) for share in (0.2, -0.2)),
 )
-"""Hammers on which a table is judged: supply, wire travel, number of forms, drift of magnet and damping."""
+"""Default hammers of the comparison: supply, wire travel, number of forms, drift of magnet and damping."""
 
 STRATEGIES: Final = ("open loop", "table")
 
-# Patterns: all 255 of eight slots from rest; the cycle, rows and a line of text; long random ones
+# Pattern sets: all 255 of eight slots from rest; the cycle, rows and a line of text; long random patterns
 SETS: Final = ("eight slots", *KINDS, "random")
-_LONG: Final = 12  # Number of rates of a table from which on it is judged between them
+_LONG: Final = 12  # Number of rates above which a table is judged between its rates; arbitrary
 
 RANDOM: Final = 8  # Number of random patterns
 RANDOM_SLOTS: Final = 128  # Length of a random pattern, slots
@@ -51,21 +51,21 @@ _AXES: Final = "strategy driven rate patterns"
 
 
 class TableReport(Result, rows=_AXES):
-    """How a table does beside open loop, on hammers that differ, at some rates, and for sets of patterns."""
+    """Comparison of a table with open loop, by hammer, rate and set of patterns."""
 
     table: CompensationTable = part("the table", repr=False)
     hammer: Hammer = part(
-        "the hammer it is made for", more="every dot should be like that of its single pulse"
+        "the hammer that the table is made for", more="its single-pulse dot judges every dot"
     )
     hammers: tuple[str, ...] = coordinate(
-        "", "in words, how the hammers that are driven differ from it", "driven", name="driven"
+        "", "deviation of the driven hammer from the design, in words", "driven", name="driven"
     )
-    rates: FloatArray = coordinate("Hz", "slots per second", "rate", name="rate")
-    limits: Limits = part("how far a dot may be off")
-    good: FloatArray = column("1", "share of dots within the limits", _AXES)
+    rates: FloatArray = coordinate("Hz", "slot rate", "rate", name="rate")
+    limits: Limits = part("limits on the dots")
+    good: FloatArray = column("1", "fraction of dots within limits", _AXES)
     force: FloatArray = column(
         "1",
-        "largest deviation of the force, in parts of that of the single pulse",
+        "largest deviation of the force, relative to that of the single pulse",
         _AXES,
         more="of printed dots",
     )
@@ -74,35 +74,35 @@ class TableReport(Result, rows=_AXES):
     extra: FloatArray = column("1", "extra contacts", _AXES)
     multiplier: FloatArray = column(
         "1",
-        "factor by which a small error in a row grows from dot to dot",
+        "multiplier of a small error from dot to dot in a row",
         "strategy driven rate",
-        more="of rows with a dot in every slot or every second one the larger one; NaN where neither is a"
+        more="the larger one of rows with a dot in every slot and in every second slot; NaN if neither is a"
         " periodic orbit",
     )
     force_deviation: FloatArray = part(
-        "of every dot of the cycle at the first rate, of the hammer that the table is made for, shape"
+        "relative force deviation of every dot of the cycle at the first rate, for the table's hammer, shape"
         " (strategies, dots)",
-        more="nan for a lost one",
+        more="NaN for a lost dot",
         repr=False,
     )
-    arrival_deviation: FloatArray = part("likewise, s", repr=False)
+    arrival_deviation: FloatArray = part("arrival deviation of the same dots, s", repr=False)
     seed: int = scalar("1", "seed of the random patterns")
-    tolerance: float = part("error allowed in one step")
-    strategy: tuple[str, ...] = coordinate("", "way to drive", "strategy", default=STRATEGIES)
+    tolerance: float = part("error tolerance per integration step")
+    strategy: tuple[str, ...] = coordinate("", "drive strategy", "strategy", default=STRATEGIES)
     patterns: tuple[str, ...] = coordinate("", "set of patterns", "patterns", default=SETS)
 
     @property
     def passed(self) -> Any:
-        """Whether all dots are within limits, bool array of shape (strategies, hammers, rates)."""
+        """Whether all dots are within limits, boolean array of shape (strategies, hammers, rates)."""
         return (self.good == 1.0).all(axis=3)
 
     @property
     def title(self) -> str:
-        """What is judged."""
+        """Title in one line."""
         return f"compensation table for {self.hammer.name} beside open loop"
 
     def summary(self) -> Summary:
-        """Return what the table gains and loses, a row for each hammer."""
+        """Tabulate good and lost dots of both strategies, one row per hammer."""
         rates = self.rates
         span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
         share, lost = 100.0 * self.good.mean(axis=(2, 3)), self.lost.sum(axis=(2, 3))
@@ -136,38 +136,37 @@ def judge_table(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> TableReport:
-    """Judge a table beside open loop.
+    """Compare a table with open loop on hammers that differ from its design.
 
-    The patterns are those of the safe rate, long ones among them, and random ones. The table is that of the
-    hammer it is made for; it drives others that differ from it, and their dots are judged by the single pulse
-    of the hammer it is made for.
+    The patterns are those of the safe rate, long ones included, and random patterns. The dots of every hammer
+    are judged by the single pulse of the hammer that the table is made for.
 
     Parameters
     ----------
     hammer : Hammer
-        The hammer the table is made for.
+        The hammer that the table is made for.
     table : CompensationTable
         The table.
     rates : sequence of float or str, optional
-        Slots per second, Hz, or text with a unit; by default those of the table, or if these are many, five
-        that lie between them.
+        Slot rates, Hz, or text with a unit; by default those of the table or, if the table is long, five
+        rates halfway between its rates.
     perturbations : sequence of Perturbation, optional
-        How the hammers differ; by default `PERTURBATIONS`.
+        Deviations of the driven hammers; by default `PERTURBATIONS`.
     limits
         As for `printhammer.safe_rate`.
     seed : int, optional
-        Of the random patterns.
+        Seed of the random patterns.
 
     Returns
     -------
     TableReport
-        With shares of good dots and worst deviations.
+        Fractions of good dots, and the worst deviations.
 
     Raises
     ------
     InputError
-        The table is made for another hammer, or not for these rates; a hammer without what a perturbation
-        changes.
+        The table is made for another hammer or not for these rates, or a perturbation does not apply to the
+        hammer.
     """
     strategies: tuple[Strategy, Strategy] = (open_loop, table.strategy(hammer))
     asked = np.array(
@@ -232,7 +231,7 @@ def judge_table(
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:
-    """Return the multipliers of rows of some hammers at a rate, Hz, (hammers,), of each the larger one."""
+    """Compute the multipliers of rows at a rate, Hz, (hammers,): the larger one of two dot spacings."""
     rates = [rate] * len(driven)
     each = np.array([multipliers(driven, rates, strategy, effort, step) for step in (1, 2)])
     largest = np.nan_to_num(np.abs(each), nan=-1.0).argmax(axis=0)
@@ -240,7 +239,7 @@ def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: E
 
 
 def _sets(seed: int) -> dict[str, tuple[Sequence[tuple[int, ...]], int | Sequence[int]]]:
-    """Return the patterns of each of `SETS`, and the first slot that is judged of them."""
+    """Return the patterns of each set in `SETS`, with the index of the first judged slot."""
     long = {kind: [each for each in long_patterns() if each.kind == kind] for kind in KINDS}
     judged = {
         kind: ([each.slots for each in some], [each.judged_from for each in some])
@@ -256,7 +255,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def between(table: CompensationTable) -> list[float]:
-    """Return rates at which to judge a table: its own, or of a long one five in the middle between two."""
+    """Return rates at which to judge a table: its own or, for a long table, five halfway between them."""
     rates = table.rates
     if rates.size < _LONG:
         return [float(rate) for rate in rates]
@@ -266,7 +265,7 @@ def between(table: CompensationTable) -> list[float]:
 
 
 def random_patterns(seed: int) -> list[tuple[int, ...]]:
-    """Return long random patterns, some sparse and some dense; at least one dot each."""
+    """Return long random patterns of densities from 0.2 to 0.9, with at least one dot each."""
     rng = np.random.default_rng(seed)
     shares = np.linspace(0.2, 0.9, RANDOM)
     drawn = [slots_of(rng.random(RANDOM_SLOTS) < share) for share in shares.tolist()]

@@ -1,12 +1,20 @@
-"""How a dot is fired some time after another one: when, how wide, and after which brake pulse.
+"""Multi-start search and dynamic programming for the pulses of a dot that follows another dot.
 
-A dot made right leaves the hammer as every dot does. What the next dot needs is therefore a function of the
-time since then. At most times there is more than one way: fired before a rebound, on it or after it, and with
-one brake pulse or another on the way back of the armature. The bucking current that releases the armature
-slows it down when it returns; Fig. 6 of F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers*
-(1983), calls that a quenched response. All of these ways make the second dot right. They differ in what
-becomes of a dot that is a little off: in a long row on a hammer that is not quite the one in the table, some
-of them lead away from the single pulse, dot by dot, and others back to it. So the row decides which is taken.
+A candidate ("way") consists of a firing time, a pulse width and an optional brake pulse, for a dot that
+follows another dot after a given period. If the first dot is right, the state it leaves behind is always the
+same, so the candidates are a function of the period alone. At most periods several candidates make the second
+dot right: fired before, on or after a rebound, and with different brake pulses while the armature returns.
+The bucking current that releases the armature slows it down on its return; Fig. 6 of F. Hendriks, *Bounce and
+Chaotic Motion in Impact Print Hammers* (1983), calls that a quenched response. The candidates differ in
+stability: in a long row on a slightly different hammer, some drift away from the single pulse dot by dot, and
+others return to it. The cost of a candidate is therefore the deviation of such a row.
+
+Method: (1) at periods `SPACING` apart, start Newton iterations from the best cells of a grid over firing
+time, width and brake pulse, and keep the best few solutions; (2) at every period, re-solve the solutions of
+the neighbouring nodes; (3) where the best cost is poor, also try brake pulses between the grid values; (4)
+choose one candidate per period by dynamic programming (a Viterbi recursion; R. Bellman, *Dynamic Programming*
+(1957)) with a penalty for changing the branch between neighbouring periods, where the table cannot be
+interpolated. A solution that no grid cell comes near is missed.
 """
 
 from __future__ import annotations
@@ -32,36 +40,37 @@ from printhammer.control.table.ways import (
 )
 from printhammer.support.arrays import FloatArray, IntArray
 
-# Between the times at which all ways are looked for; between them those of the neighbours are tried, s
+# Distance of the periods at which a full search is run; other periods use the solutions of their neighbours,
+# s
 SPACING: Final = 30e-6
-BAD: Final = 0.75  # Cost from which on more ways are looked for
-_ROOM: Final = 100e-6  # How far before and after its slot a dot is tried, s
-_GRID: Final = (12, 8)  # Numbers of firing times and widths of the grid on which a search begins
-_FINE: Final = 3  # How much finer this grid is without a brake pulse, and how many more searches begin on it
-_DELAY: Final = 45e-6  # Step of the beginnings of brake pulses, s
-# Widths of brake pulses, in parts of that of the hammer's own
+BAD: Final = 0.75  # Cost above which more candidates are searched
+_ROOM: Final = 100e-6  # Half-width of the range of firing times about the slot, s
+_GRID: Final = (12, 8)  # Numbers of firing times and widths of the starting grid
+_FINE: Final = 3  # Refinement factor of grid and number of starts without a brake pulse
+_DELAY: Final = 45e-6  # Spacing of the brake delays of the grid, s
+# Widths of brake pulses on the grid, as fractions of the hammer's own width
 _BRAKES: Final = (0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0)
-_APART: Final = 30e-6  # Least difference of the firing times from which searches begin, s
-_STARTS: Final = 2  # Number of searches for each brake pulse
-_FAR: Final = 8.0  # Deviation, in parts of the limits, beyond which no search begins
-_KEPT: Final = 5  # Number of ways that are kept for a time
-_ENOUGH: Final = 0.6  # Cost of a way without a brake pulse up to which none with one is looked for
-_HOPELESS: Final = 20.0  # Cost above which a way is as bad as any
-_CLOSE: Final = 8e-6  # Between the times at which brake pulses between those of the grid are tried, s
-# By how much these begin later, s: no more than half of `_DELAY`
+_APART: Final = 30e-6  # Smallest distance of firing times between two starts, s
+_STARTS: Final = 2  # Number of starts per brake pulse
+_FAR: Final = 8.0  # Deviation, as a fraction of the limits, above which no iteration starts
+_KEPT: Final = 5  # Number of solutions kept per period
+_ENOUGH: Final = 0.6  # Cost without a brake pulse below which brake pulses are not searched
+_HOPELESS: Final = 20.0  # Cost at which candidates are cut off
+_CLOSE: Final = 8e-6  # Spacing of the periods of the close search, s
+# Delay offsets of the close search, s: at most half of `_DELAY`
 _LATER: Final = (-22e-6, -8e-6, 8e-6, 22e-6)
-_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # How much wider these are: between neighbours of `_BRAKES`
-_LEAST_BRAKE: Final = 0.05  # Least width of a brake pulse, in parts of that of the hammer's own
-# What it costs to go to another way from one time to the next: there nothing is interpolated
+_WIDER: Final = (0.75, 0.9, 1.0, 1.15, 1.35)  # Width factors of the close search: between values of `_BRAKES`
+_LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of the hammer's own width
+# Penalty for a change of branch between neighbouring periods, where the table is not interpolated
 _SWITCH: Final = 0.15
-_SAME: Final = 1e-6  # Difference of firing times up to which ways with the same brake pulse are the same, s
+_SAME: Final = 1e-6  # Firing-time difference below which two candidates are duplicates, s
 _ROUNDING: Final = 1e-12
 
 
 def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
-    """Choose a way for each of some times after a dot, from slot to slot, s, ascending.
+    """Choose a candidate for each of the ascending periods, s, between a dot and the next.
 
-    Returns the times at which there is a way at all, and one for each of these.
+    Returns the periods at which a candidate exists, and the chosen candidate of each.
     """
     nodes = spaced(periods, SPACING)
     known = []
@@ -85,7 +94,7 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
 
 
 def spaced(periods: FloatArray, spacing: float) -> list[float]:
-    """Return some of the times, the first and the last one among them."""
+    """Return a subset of the periods at least `spacing` apart, including the first and the last."""
     nodes: list[float] = []
     for period in periods.tolist():
         if not nodes or period >= nodes[-1] + spacing or period == float(periods[-1]):
@@ -94,7 +103,7 @@ def spaced(periods: FloatArray, spacing: float) -> list[float]:
 
 
 def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
-    """Solve several groups of ways together, and keep those of each group that make dots."""
+    """Solve several groups of candidates together; return those of each group with a finite cost."""
     every = solved(task, joined(tried))
     every = every._replace(cost=costs(task, every))
     ends = np.cumsum([group.size for group in tried])
@@ -103,12 +112,12 @@ def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
 
 
 def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
-    """Look for more ways, with brake pulses between those tried before, where the best is not good enough.
+    """Search for candidates with brake pulses between the grid values, where the best cost is poor.
 
-    Adds to the groups of ways that are known at each of the times from slot to slot.
+    Extends the groups of candidates of the periods in place.
     """
     least = [group.cost.min(initial=np.inf) for group in groups]
-    # Where not even the neighbours have a way that is any good, there is none.
+    # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected.
     hope = [row for row, cost in enumerate(least) if not cost <= BAD and cost <= _FAR]
     nodes = spaced(periods[hope], _CLOSE)
     begin, narrowest = task.brake_from, _LEAST_BRAKE * task.width
@@ -135,9 +144,9 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
 
 
 def searched(task: Task, period: float) -> Ways:
-    """Look for all ways to make a dot a time after another one, s, and keep the best, the best one first.
+    """Run the multi-start search for one period, s; return the best candidates, best first.
 
-    Those with a brake pulse, if it may be used, come after those without, where these are not good enough.
+    Candidates with a brake pulse are searched, if allowed, only where those without are not good enough.
     """
     plain = _best(task, _grid(task, period, [(0.0, 0.0)], _FINE), _FINE)
     if not task.brake or (plain.size and plain.cost[0] <= _ENOUGH):
@@ -149,7 +158,7 @@ def searched(task: Task, period: float) -> Ways:
 
 
 def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine: int = 1) -> Ways:
-    """Return cells of firing times and widths for each of some brake pulses."""
+    """Return the feasible grid cells over firing time and width, for each brake pulse."""
     fired = np.linspace(max(period - _ROOM, task.single.left), period + _ROOM, fine * _GRID[0]).tolist()
     widths = np.linspace(LEAST_OF_OWN * task.width, task.widest, fine * _GRID[1]).tolist()
     cells = ways_of([(period, *pair, time, width) for pair in brakes for time in fired for width in widths])
@@ -157,7 +166,7 @@ def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine
 
 
 def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
-    """Return the best ways that begin at some cells."""
+    """Solve from the best cells of a grid; return the best solutions."""
     if not cells.size:
         return cells
     off = largest_of(seconds(task, cells))
@@ -175,14 +184,14 @@ def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
 
 
 def _kept(task: Task, ways: Ways) -> Ways:
-    """Return the best of some ways that are solved, the best one first."""
+    """Return the `_KEPT` cheapest distinct solutions, cheapest first."""
     ways = _distinct(ways._replace(cost=costs(task, ways)))
     best = np.argsort(ways.cost, kind="stable")[:_KEPT]
     return ways.take(best[np.isfinite(ways.cost[best])])
 
 
 def _distinct(ways: Ways) -> Ways:
-    """Leave out those that lead to the same pulses as one before."""
+    """Remove candidates with nearly the same pulses as an earlier candidate."""
     kept: list[int] = []
     for place, (delay, brake, fired) in enumerate(zip(ways.delay, ways.brake, ways.fired, strict=True)):
         same = (ways.delay[kept] == delay) & (ways.brake[kept] == brake)
@@ -192,14 +201,14 @@ def _distinct(ways: Ways) -> Ways:
 
 
 def _path(ways: Ways, groups: Sequence[IntArray]) -> IntArray:
-    """Choose one of each group so that the sum of the costs and of the changes of way is least.
+    """Choose one candidate per group by dynamic programming: minimise the sum of costs and branch changes.
 
-    Between two times a table is interpolated where the way is the same.
+    A table can be interpolated between two periods only if the branch is the same.
     """
     if not groups:
         return np.zeros(0, np.int64)
     cost = np.minimum(ways.cost, _HOPELESS)
-    # A quarter more of the limits is worth more where little is left of them.
+    # Costs above the limits weigh more, since such dots fail.
     cost = cost + np.where(cost > 1.0, 2.0 * (cost - 1.0), 0.0)
     late = ways.fired - ways.period
     total = cost[groups[0]]

@@ -1,4 +1,4 @@
-"""What a compensation table is asked to do, what the single pulse does, and how far dots are off from it."""
+"""The tuning task of a compensation table: settings, single-pulse reference, and deviations from it."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from printhammer.run.simulate import simulate
 from printhammer.run.window import FLIGHTS, wait_of
 from printhammer.support.arrays import BoolArray, FloatArray
 
-# Distance from rest below which the hammer counts as settled, in parts of the way to the pack
+# Distance from rest below which the hammer counts as settled, as a fraction of the distance to the pack
 QUIET: Final = 2e-4
-_LONGEST: Final = 20e-3  # Least time in which the hammer has to settle after a single pulse, s
-_WINDOWS: Final = 2.0  # The same in windows of its runs
-_SAMPLE: Final = 2e-6  # Between the instants at which this is looked at, s
-# By how much the pulse before a brake pulse may be late or wider than the hammer's own, s
+_LONGEST: Final = 20e-3  # Shortest time allowed for settling after a single pulse, s
+_WINDOWS: Final = 2.0  # Shortest time allowed for settling, in windows (`printhammer.run.window`)
+_SAMPLE: Final = 2e-6  # Sampling interval for settling, s
+# Allowance for a late or wide print pulse before a brake pulse, s; arbitrary
 _WIDE: Final = 50e-6
-_TAIL: Final = 1e-3  # Least time that runs go on after the last slot, s: until the last contact is over
-_CONTACT: Final = 1.5  # The same in times of the single pulse until it leaves the pack
-_PIECE: Final = 4096  # Number of runs of one ensemble, which bounds the memory
+_TAIL: Final = 1e-3  # Shortest simulation time after the last slot, s: until the last contact is over
+_CONTACT: Final = 1.5  # Shortest simulation time after the last slot, in single-pulse times to departure
+_PIECE: Final = 4096  # Simulations per ensemble, which bounds the memory
 
 
 @dataclass(frozen=True)
 class Single:
-    """The single pulse from rest: its dot, and when the armature leaves the pack and stays at rest, s."""
+    """The single pulse from rest: its dot, and the times of departure from the pack and of settling, s."""
 
     nominal: Nominal
     left: float
@@ -47,7 +47,7 @@ class Single:
 
 
 def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
-    """Fire a hammer once from rest."""
+    """Simulate a single pulse from rest."""
     known = nominal(hammer, pulse, tolerance=tolerance)
     longest = max(_LONGEST, _WINDOWS * wait_of(hammer, pulse))
     times = np.arange(0.0, longest, _SAMPLE)
@@ -68,11 +68,11 @@ def single_of(hammer: Hammer, pulse: Waveform, tolerance: float) -> Single:
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked of a table.
+    """Settings of the tuning of a table.
 
-    It is tuned on `hammers`, the one it is made for first; those of `spread` differ a little from that one.
-    No pulse is wider than `widest`, and none begins earlier than `wait` after a brake pulse, s.
-    `report` is called after each step of the work.
+    The table is tuned on `hammers`, its design first; the hammers of `spread` differ a little from the
+    design. No pulse is wider than `widest`, s, and none begins earlier than `wait`, s, after the end of a
+    brake pulse. `report` is called after each step of the work.
     """
 
     gaps: int
@@ -89,63 +89,63 @@ class Task:
     effort: Effort
     report: Callable[[], None]
     mean_square: bool = False
-    """Whether the cost of a way is the root of the mean square over all hammers, not that of the worst."""
+    """Whether the cost of a candidate is the RMS over all hammers instead of the worst case."""
 
     @property
     def width(self) -> float:
-        """Width of the pulse of the hammer, s."""
+        """Width of the hammer's own pulse, s."""
         own: Any = self.pulse
         return float(own.width)
 
     @cached_property
     def faded(self) -> float:
-        """Time after its width in which the pulse has decayed to what a chain may cut off, s."""
+        """Time from the end of the pulse until it has decayed to a negligible value, s."""
         return fading(self.hammers[0], self.pulse, 0.5 * TAIL)
 
     @property
     def brake_from(self) -> float:
-        """How long after the slot of the dot before a brake pulse may begin, s.
+        """Earliest time of a brake pulse after the slot of the preceding dot, s.
 
-        By then the armature has left the pack, and the pulse of the dot has decayed, even where it is late or
-        wide by `_WIDE`.
+        By then the armature has left the pack and the print pulse has decayed, even if it is late or wide by
+        `_WIDE`.
         """
         return float(max(self.single.left, self.width + _WIDE + self.faded))
 
     @cached_property
     def window(self) -> float:
-        """Time from the last firing to the end of a run of a whole line, s."""
+        """Simulation time after the last firing of a whole line, s."""
         return wait_of(self.hammers[0], self.pulse)
 
     @property
     def tail(self) -> float:
-        """Time from the last firing to the end of the search's short runs, s; it covers the last contact."""
+        """Simulation time after the last firing in the search, s; it covers the last contact."""
         return max(_TAIL, FLIGHTS * self.single.nominal.flight_time, _CONTACT * self.single.left)
 
     def earliest(self, delay: FloatArray, brake: FloatArray) -> FloatArray:
-        """Return how long after the slot of the dot before a dot may be fired first, s.
+        """Return the earliest firing time after the slot of the preceding dot, s.
 
-        By then the armature has left the pack, so that no dot draws on what the pack of the one before gives
-        back, and so much of a brake pulse has decayed that the current keeps to its bound.
+        By then the armature has left the pack, so that no dot uses energy returned by the pack of the
+        preceding dot, and a brake pulse has decayed so far that the current stays within its limit.
         """
         return np.asarray(np.where(brake > 0.0, delay + brake + self.wait, self.single.left))
 
     def latest(self, width: FloatArray) -> FloatArray:
-        """Return how long after its slot a dot of a width may be fired, s, so that it may be braked."""
+        """Return the latest firing time after the slot, s, at which a dot of a width can still be braked."""
         return np.asarray(self.brake_from - self.faded - width)
 
     def deviations(
         self, hammer: Hammer, drives: Sequence[Drive], slots: FloatArray, ends: FloatArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Run drives, and compare all dots with that of the single pulse.
+        """Simulate drives, and compare all dots with the single-pulse dot.
 
-        The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN beyond the last
-        one; a run goes on for `tail` after `ends` (drives,), s.
+        The drives have a firing for each of `slots` (drives, dots), the slot times, s, NaN-padded; a
+        simulation continues for `tail` after `ends` (drives,), s.
 
         Returns
         -------
         off : array, shape (drives, dots, 2)
-            Deviations of force and arrival, in parts of the limits; NaN for a lost dot, and for all dots of a
-            run that did not come to its end.
+            Deviations of force and arrival, as fractions of the limits; NaN for a lost dot, and for all dots
+            of a simulation that failed.
         crowded : bool array, shape (drives, dots)
             Whether a dot has more extra contacts than the limits allow.
         """

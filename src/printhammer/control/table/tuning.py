@@ -1,6 +1,6 @@
-"""Tune a compensation table for a hammer: every dot like a dot from rest, whatever was printed before it.
+"""Tune a compensation table, so that every dot equals a dot from rest whatever was printed before it.
 
-Rates between the rates of a table: where the table is no good there, more rates are put in between.
+Where interpolation between two rates is poor, the grid of rates is refined.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ from printhammer.printing.rates.variability import Perturbation, Variability, pe
 from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray, IntArray
 
-HALVINGS: Final = 3  # How often the step between two rates is halved at most
-# Deviation between two rates, in parts of the limits, from which on there is one more between them
+HALVINGS: Final = 3  # Maximum number of bisections of the step between two rates
+# Deviation halfway between two rates, as a fraction of the limits, above which a rate is inserted
 BETWEEN: Final = 0.5
 
 
 def refined(draft: Draft) -> Draft:
-    """Put rates between those of a table where it is not good enough halfway between two of them.
+    """Insert rates into a draft where it is poor halfway between two of its rates.
 
-    Such places are where the way to fire a dot changes. The new entries follow that of the rate below or that
-    of the rate above, whichever is the better one; where neither is good, another one is looked for.
+    Such places are where the solution branch changes. A new entry follows the branch of the rate below or
+    above, whichever costs less; if both are poor, a new search is run.
     """
-    # Rates at which every dot is printed from rest need nothing.
+    # At lower rates every dot is printed from rest.
     lower = np.flatnonzero(1.0 / draft.rates[1:] <= draft.task.single.settled)
     wanted = set(draft.rates[lower].tolist())
     for _ in range(HALVINGS):
@@ -68,7 +68,7 @@ def refined(draft: Draft) -> Draft:
 
 
 def _halfway(draft: Draft, lower: IntArray) -> Draft:
-    """Return what the table says halfway between some rates and those above them, and how good that is."""
+    """Interpolate the table halfway between some rates and the next higher ones, and judge the result."""
     table = draft.table()
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
@@ -79,7 +79,7 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
 
 
 def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
-    """Return tuned rows halfway between some rates and those above them."""
+    """Tune rows halfway between some rates and the next higher ones."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     halfway = Draft(task, rates, draft.values[:, lower])
@@ -99,7 +99,7 @@ def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
         for place, row in enumerate(near.tolist()):
             best = ways.take([2 * place + int(cost[place].argmin())])
             if not cost[place].min() <= BAD:
-                # Neither goes on from its rate to here; perhaps there is one more.
+                # Neither branch continues from its rate to here; a new one may exist.
                 more = searched(task, float(periods[row]))
                 if more.size and more.cost.min() < cost[place].min():
                     best = more.take([int(more.cost.argmin())])
@@ -108,18 +108,18 @@ def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
     return halfway
 
 
-FIRST: Final = 100.0  # Lowest rate of a table over all rates, Hz: every dot is printed from rest
-STEP: Final = 5.0  # Step between the rates of such a table, Hz
+FIRST: Final = 100.0  # Lowest rate of an automatic grid, Hz: every dot is printed from rest
+STEP: Final = 5.0  # Step of an automatic grid of rates, Hz
 SPREAD: Final = (
     *(Perturbation(current=share) for share in (0.03, -0.03)),
     *(Perturbation(travel=way) for way in (10e-6, -10e-6)),
 )
-"""By how much the hammers differ on which ways to fire a dot are compared, and a robust table is tuned."""
+"""Perturbations of the hammers on which candidates are compared, and on which a robust table is tuned."""
 
-# Deviation, in parts of the limits, up to which a rate belongs to a table over all rates
+# Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid
 _USABLE: Final = 0.9
-_POOR: Final = 0.5  # Deviation, in parts of the limits, above which a given rate is tuned once more
-# How far from the times between dots ways are then looked for as well, s
+_POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
+# Offsets of additional periods at which candidates are then searched, s
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
 
 
@@ -142,51 +142,52 @@ def tune(
 ) -> CompensationTable:
     """Tune a compensation table: pulse width and advance as a function of the last gaps between dots.
 
-    A dot made like a dot from rest leaves the hammer as every such dot does. So its pulse is a function of
-    the time since the dot before, as long as that one was made right; longer histories put right what is
-    left. For each history, width and advance are found by Newton's method so that force and arrival of the
-    last dot of patterns with that history are those of the single pulse. Mostly there is more than one way to
-    do it: before a rebound or after it, with one or another brake pulse that takes some of the rebound away,
-    or without. The one is taken in which a row of such dots stays nearest to the single pulse on hammers with
-    3 % more and less current and 10 um more and less travel, counting what this hammer itself does eight
-    times. Only ways count in which a small error in a long row shrinks from dot to dot. No dot is fired
-    before the armature has left the pack of the one before.
+    If a dot equals a dot from rest, the hammer is left in the same state as after a dot from rest. The pulse
+    of the next dot is then a function of the time since that dot alone; longer histories correct the
+    remaining error. For each history, advance and width are found by a damped Gauss-Newton
+    (Levenberg-Marquardt) iteration so that force and arrival of the last dot of patterns with that history
+    are those of the single pulse. Mostly there are several solutions: before or after a rebound, with or
+    without a brake pulse that removes some of the rebound. `printhammer.control.table.search` enumerates them
+    and keeps the one for which a row of dots stays nearest to the single pulse on hammers with 3 % more and
+    less current and 10 um more and less travel; the deviation on this hammer itself has a weight of eight.
+    Solutions are admitted only if a small error decays from dot to dot in a long row. No dot is fired before
+    the armature has left the pack of the preceding dot.
 
     Parameters
     ----------
     hammer : Hammer
         A hammer with a pack, a backstop and a waveform that has a width: a current, or a driver of the coil,
-        of which the widths are then times on the rail.
+        for which widths are times on the rail.
     rate, rates : float or str, or sequence of them, optional
-        Slots per second, Hz, or text with a unit; by default rates from 100 Hz, at which every dot is printed
-        from rest, to the highest one at which the table keeps to the limits, `STEP` apart, and closer where
-        the way to fire a dot changes.
+        Slot rates, Hz, or text with a unit. By default an automatic grid from 100 Hz, where every dot is
+        printed from rest, to the highest rate at which the table is within the limits, in steps of `STEP`,
+        refined where the solution branch changes.
     history : int, optional
-        Number of gaps that a history holds, 1 to 4.
+        Number of gaps in a history, 1 to 4.
     reach : int, optional
         Longest gap that counts, slots.
     limits : Limits, optional
-        By which deviations are measured.
+        Limits that normalise the deviations.
     brake : bool, optional
         Whether brake pulses may be used.
     robust : bool, optional
-        Tune width and advance on the hammers that differ as well, for the least mean square of all, instead
-        of on this hammer alone.
+        Fit width and advance to the perturbed hammers too, in the least-squares sense, instead of to this
+        hammer alone.
     driver : str, optional
-        What switches the coil, of `DRIVERS` in `printhammer.control.table.drive`: "own", the pulse of the
-        hammer or the driver of its coil, "switch", a fast unipolar switch, or "bridge", an H-bridge. With
-        these two, which replace a current, the dot from rest is as hard as with the own pulse, and is fired
-        so much later that it arrives as it does.
+        Driver of the coil, one of `DRIVERS` in `printhammer.control.table.drive`: "own", the pulse of the
+        hammer or the driver of its coil; "switch", a fast unipolar switch; or "bridge", an H-bridge. The
+        latter two replace a current; their dot from rest has the same force as with the hammer's own pulse,
+        and is fired later so that it arrives at the same time.
     variability : Variability, optional
-        How the constants of a production are spread. The way is then taken in which a row of dots is least
-        off in the mean square, over this hammer and the sigma points of the variability.
+        Spread of the constants of a production. The cost of a candidate is then the RMS deviation of a row of
+        dots over this hammer and the sigma points of the variability.
     largest_current : float or str, optional
-        Bound on the current, A, or text with a unit.
+        Current limit, A, or text with a unit.
 
     Returns
     -------
     CompensationTable
-        With the worst deviation of each entry; it is not promised to be within the limits.
+        The table, with the worst deviation of each entry; an entry may exceed the limits.
     """
     gaps, far = checked_size(read_count(history, "history"), read_count(reach, "reach"))
     bounds = Limits() if limits is None else limits
@@ -199,7 +200,7 @@ def tune(
     asked = [rate] if rate is not None else rates
     grid = _all_rates(single) if asked is None else _given_rates(asked)
     nodes = len(spaced(_periods(grid, far, single), SPACING))
-    # Once a time at which ways are looked for, once a step of Newton's method, with and without long rows.
+    # One report per searched period, one per Newton step, with and without dense patterns.
     steps = nodes + 3 + 2 * (ROUNDS + 1) * gaps
     if variability is not None:
         spread = others = variability.sigma_points(driven)
@@ -238,7 +239,7 @@ def tune(
 
 
 def _spread(hammer: Hammer) -> list[Hammer]:
-    """Return the hammers that differ a little, as far as the laws of the hammer let them."""
+    """Return the perturbed hammers; perturbations that do not apply to the hammer's laws are skipped."""
     hammers = []
     for by in SPREAD:
         with suppress(InputError):
@@ -247,7 +248,7 @@ def _spread(hammer: Hammer) -> list[Hammer]:
 
 
 def _counter(effort: Effort, total: int) -> Callable[[], None]:
-    """Return a function that reports one more step of the work each time that it is called."""
+    """Return a function that reports one more step of the work on each call."""
     steps = iter(range(1, total + 1))
 
     def count() -> None:
@@ -258,7 +259,7 @@ def _counter(effort: Effort, total: int) -> Callable[[], None]:
 
 
 def _all_rates(single: Single) -> FloatArray:
-    """Return rates from that at which all is rest to one at which the armature is not back from the pack."""
+    """Return rates from where every dot is from rest up to where the armature has not yet left the pack."""
     lowest = STEP * np.floor(1.0 / (single.settled * STEP))
     return np.array([FIRST, *np.arange(lowest, 1.0 / single.left, STEP).tolist()])
 
@@ -273,7 +274,7 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
 
 
 def _tune_again(draft: Draft) -> None:
-    """Tune rates once more that are not good enough, with ways from times around theirs; changes the rows."""
+    """Retune the rates that are not good enough, with candidates from neighbouring periods too; in place."""
     poor = np.flatnonzero(~(draft.worst <= _POOR))
     if not poor.size:
         return
@@ -285,10 +286,10 @@ def _tune_again(draft: Draft) -> None:
 def _tuned(
     task: Task, rates: FloatArray, *, open_ended: bool = False, around: FloatArray | None = None
 ) -> Draft:
-    """Return tuned rows; the deviation of an entry for which no dot is found is infinite.
+    """Tune rows for the given rates; an entry without a solution has an infinite deviation.
 
-    An `open_ended` table ends below the first rate at which no pulse comes near. `around` is how far from the
-    times between dots ways are looked for as well, s.
+    An `open_ended` draft ends below the first rate without a solution. `around` are offsets, s, of additional
+    periods at which candidates are searched.
     """
     draft = blank(task, rates)
     draft.timing[1] = task.width
@@ -321,13 +322,13 @@ def _tuned(
 
 
 def _periods(rates: FloatArray, reach: int, single: Single) -> FloatArray:
-    """Return all times between dots, s, within which the hammer does not come to rest, ascending."""
+    """Return all periods, s, between dots within which the hammer does not settle, ascending."""
     every = np.arange(1, reach + 1) / rates[:, np.newaxis]
     return np.unique(every[every <= single.settled])
 
 
 def _usable(draft: Draft) -> int:
-    """Return the number of rates that keep well to the limits, from the lowest on."""
+    """Return the number of rates, from the lowest on, that are well within the limits."""
     bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
         raise InputError(

@@ -1,6 +1,7 @@
-"""Ways to fire a dot some time after another one: which are right, and what becomes of rows of them.
+"""Candidate pulses for a dot that follows another dot: solve for them, and rate rows of such dots.
 
-Newton's method for firing time and width of many dots at once, so that force and arrival are right.
+The solver is a damped Gauss-Newton iteration (Levenberg-Marquardt) for firing time and width, vectorised over
+dots.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ if TYPE_CHECKING:
     Measure = Callable[[FloatArray, IntArray, FloatArray], FloatArray]
     Bounded = Callable[[FloatArray, IntArray, BoolArray], None]
 
-ROUNDS: Final = 7  # Largest number of steps
-LONGEST_STEP: Final = 25e-6  # Longest change of firing time or width in one step, s
-# Damping after Levenberg and Marquardt, in parts of the limits for a change of `LONGEST_STEP`
+ROUNDS: Final = 7  # Maximum number of iterations
+LONGEST_STEP: Final = 25e-6  # Largest change of firing time or width per iteration, s
+# Levenberg-Marquardt damping, as a fraction of the limits for a change of `LONGEST_STEP`
 _DAMPING: Final = 0.02
 
 
@@ -38,14 +39,16 @@ def solve(
     most: float,
     bounded: Bounded,
 ) -> FloatArray:
-    """Return the times and widths (dots, 2) at which deviations are least, of all steps that were tried.
+    """Minimise deviations over firing times and widths (dots, 2); return the best iterates.
 
-    `measure` returns deviations (active, shifts, deviations), in parts of the limits and NaN for a lost dot,
-    from all values as they are, the numbers of the dots that are still worked on, and shifts (shifts, 2) of
-    their values. `start` are firing time, or advance, and width, s; derivatives are taken from differences of
-    `steps`, s, forward in time and backward in width. A dot whose deviation is `good` is left as it is;
-    widths are between `least` and `most`, s. `bounded` puts values in place within their bounds, given all of
-    them, the numbers of the dots that are worked on, and whether each made a step.
+    The method is Levenberg-Marquardt (J. Nocedal and S. J. Wright, *Numerical Optimization*, ch. 10).
+
+    `measure` returns deviations (active, shifts, deviations), as fractions of the limits and NaN for a lost
+    dot, from all current values, the indices of the active dots, and shifts (shifts, 2) of their values.
+    `start` holds firing time, or advance, and width, s. Derivatives are finite differences with `steps`, s,
+    forward in time and backward in width. A dot is finished at a deviation of `good`; widths stay between
+    `least` and `most`, s. `bounded` clips values in place to their bounds, from all values, the indices of
+    the active dots, and a mask of those that made a step.
     """
     now, best, best_off = start.copy(), start.copy(), np.full(len(start), np.inf)
     shifts = np.array([(0.0, 0.0), (steps[0], 0.0), (0.0, -steps[1])])
@@ -60,7 +63,7 @@ def solve(
         best[active[better]], best_off[active[better]] = now[active[better]], size[better]
         if turn == ROUNDS:
             break
-        # Half the way back to the best that is known.
+        # Step halfway back to the best iterate.
         back = active[~better]
         now[back] = 0.5 * (now[back] + best[back])
         slopes = np.stack([(off[:, 1] - here) / steps[0], (off[:, 2] - here) / -steps[1]], axis=2)
@@ -73,19 +76,20 @@ def solve(
 
 
 def largest_of(off: FloatArray) -> FloatArray:
-    """Return the largest absolute deviation of each row; infinite where one is NaN."""
+    """Return the largest absolute deviation of each row; infinite if one is NaN."""
     size = np.abs(off).reshape(off.shape[0], -1).max(axis=1)
     return np.asarray(np.where(np.isnan(size), np.inf, size))
 
 
 def changes(slopes: FloatArray, off: FloatArray, least: FloatArray, most: FloatArray) -> FloatArray:
-    """Return changes (dots, 2) of two times, s, after which deviations are least in the mean square.
+    """Compute one Levenberg-Marquardt step (dots, 2) for two times, s, with bounds on the second.
 
-    `slopes` (dots, deviations, 2) are the derivatives of the deviations `off` (dots, deviations) after firing
-    time, or advance, and width, 1/s; the change of the width, s, is between `least` and `most` (dots,).
+    `slopes` (dots, deviations, 2) are the derivatives of the deviations `off` (dots, deviations) with respect
+    to firing time, or advance, and width, 1/s; the change of width, s, is clipped to `least` and `most`
+    (dots,).
     """
     turned = slopes.transpose(0, 2, 1)
-    # A little of what Levenberg and Marquardt do: a direction in which nothing changes is left alone.
+    # The damping keeps the step finite in a direction that does not affect the deviations.
     square = turned @ slopes + (_DAMPING / LONGEST_STEP) ** 2 * np.eye(2)
     change = -np.linalg.solve(square, turned @ off[:, :, np.newaxis])[:, :, 0]
     wider = np.clip(change[:, 1], least, most)
@@ -96,28 +100,28 @@ def changes(slopes: FloatArray, off: FloatArray, least: FloatArray, most: FloatA
     return np.asarray(np.clip(np.column_stack([later, wider]), -LONGEST_STEP, LONGEST_STEP))
 
 
-ROW: Final = 8  # Number of dots of the row that decides
-NOMINAL: Final = 8.0  # How often the hammer that a table is made for counts, beside those that differ
-LEAST_OF_OWN: Final = 0.5  # Least width, in parts of that of the pulse of the hammer
-# Deviation of the second dot, in parts of the limits, from which on a way is left as it is
+ROW: Final = 8  # Number of dots in the row that rates a candidate
+NOMINAL: Final = 8.0  # Weight of the design hammer relative to the perturbed hammers
+LEAST_OF_OWN: Final = 0.5  # Smallest width, as a fraction of the hammer's own
+# Deviation of the second dot, as a fraction of the limits, at which a candidate is solved
 _SOLVED: Final = 1e-3
-_STEPS: Final = (1e-6, 0.5e-6)  # Differences of firing time and width from which derivatives are taken, s
-# Deviation of the second dot, in parts of the limits, above which a way does not make it right
+_STEPS: Final = (1e-6, 0.5e-6)  # Finite-difference steps of firing time and width, s
+# Deviation of the second dot, as a fraction of the limits, above which a candidate is not a solution
 _RIGHT: Final = 0.02
-_WRONG: Final = 1.0  # What such a way costs more, so that any that makes it right comes first
+_WRONG: Final = 1.0  # Additional cost of a candidate that is not a solution, so that solutions rank first
 STABLE: Final = 0.97
-"""Largest absolute multiplier of a row, from dot to dot, of a way: within the unit circle, with room for
-interpolation and ticks."""
+"""Largest absolute multiplier of an admissible row, from dot to dot: inside the unit circle, with a margin
+for interpolation and timer ticks."""
 
-_FAR_OFF: Final = 5.0  # Deviation, in parts of the limits, beyond which a row is no worse in a mean square
+_FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off
 _ROUNDING: Final = 1e-12
 
 
 class Ways(NamedTuple):
-    """Ways to fire a dot: arrays of shape (ways,), times after the slot of the dot before, s.
+    """Candidate pulses for a dot: arrays of shape (ways,), times after the slot of the preceding dot, s.
 
     The dot is due at `period`. A brake pulse of width `brake` begins at `delay`, both 0 without one; the dot
-    is `fired` with a pulse of `width`. `cost` says how far a row of such dots is off, see `costs`.
+    is `fired` with a pulse of `width`. `cost` is the deviation of a row of such dots, see `costs`.
     """
 
     period: FloatArray
@@ -129,7 +133,7 @@ class Ways(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Number of ways."""
+        """Number of candidates."""
         return self.period.size
 
     @property
@@ -138,36 +142,36 @@ class Ways(NamedTuple):
         return np.stack([self.period - self.fired, self.width, self.delay, self.brake])
 
     def take(self, which: Any) -> Ways:
-        """Return some of them."""
+        """Return the candidates selected by an index array, mask or slice."""
         return Ways(*(values[which] for values in self))
 
     def at(self, period: float) -> Ways:
-        """Return the same for another time, fired as long before or after it."""
+        """Return the candidates moved to another period, with the same firing time relative to the slot."""
         moved = self.fired + (period - self.period)
         return self._replace(period=np.full(self.size, period), fired=moved)
 
 
 def joined(parts: Iterable[Ways]) -> Ways:
-    """Concatenate sets of ways, none at all among them."""
+    """Concatenate sets of candidates; the result may be empty."""
     return Ways(*map(np.concatenate, zip(ways_of([]), *parts, strict=True)))
 
 
 def ways_of(cells: Sequence[tuple[float, float, float, float, float]]) -> Ways:
-    """Return ways from their period, delay, brake, firing time and width, of unknown cost."""
+    """Create candidates from tuples of period, delay, brake, firing time and width, with infinite cost."""
     period, delay, brake, fired, width = np.array(cells, dtype=np.float64).reshape(-1, 5).T
     return Ways(period, delay, brake, fired, width, np.full(period.size, np.inf))
 
 
 def fits(task: Task, ways: Ways) -> BoolArray:
-    """Return which ways fire after what comes before, and so that a brake pulse may come after."""
+    """Mask of the candidates that fire after the preceding pulses, and early enough to be braked."""
     first, last = task.earliest(ways.delay, ways.brake), ways.period + task.latest(ways.width)
     return np.asarray((ways.fired >= first - _ROUNDING) & (ways.fired <= last + _ROUNDING))
 
 
 def solved(task: Task, ways: Ways) -> Ways:
-    """Return firing times and widths for which the second dot is right, by Newton's method.
+    """Solve for firing times and widths that make the second dot right; see `solve`.
 
-    Where there are none, those of the best step.
+    A candidate that does not converge keeps its best iterate.
     """
     if not ways.size:
         return ways
@@ -197,13 +201,13 @@ def solved(task: Task, ways: Ways) -> Ways:
 
 
 def costs(task: Task, ways: Ways) -> FloatArray:
-    """Return how far off rows of dots made in some ways are, in parts of the limits.
+    """Compute the costs of candidates: deviations of rows of dots, as fractions of the limits.
 
-    That is the largest deviation of any dot of a row of `ROW`, on the hammers that differ a little from the
-    one the table is made for; what that one itself does counts `NOMINAL` times. Where a variability is stated
-    it is the root of the mean square of the largest deviations on its sigma points and on that hammer. A way
-    that cannot make even the second dot right is put behind others. Infinite where a dot is lost, the pulses
-    do not fit between each other, or an error in a long row grows: where its multiplier is beyond `STABLE`.
+    The cost is the largest deviation of any dot of a row of `ROW` dots, over the hammers of `task.spread`
+    and, with the weight `NOMINAL`, the design. With a stated variability it is instead the RMS of the largest
+    deviations over its sigma points and the design. Candidates that miss even the second dot cost `_WRONG`
+    more. The cost is infinite if a dot is lost, the pulses overlap, or the multiplier of a long row exceeds
+    `STABLE`.
     """
     cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
@@ -224,19 +228,19 @@ def costs(task: Task, ways: Ways) -> FloatArray:
 
 
 def is_stable(task: Task, ways: Ways) -> BoolArray:
-    """Return in which ways an error in a long row shrinks from dot to dot, (ways,)."""
+    """Mask of the candidates with which an error in a long row decays from dot to dot, (ways,)."""
     hammers = [task.hammers[0]] * ways.size
     growth = row_multipliers(hammers, rows_of(task, ways, DOTS), task.effort, closed=False)
     return np.abs(growth) <= STABLE
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:
-    """Return deviations of force and arrival of second dots, in parts of the limits, shape (ways, 2)."""
+    """Return deviations of force and arrival of the second dots, as fractions of the limits, (ways, 2)."""
     return _deviations(task, task.hammers[0], ways, rows_of(task, ways, 2))[:, 1]
 
 
 def rows_of(task: Task, ways: Ways, dots: int) -> list[Drive]:
-    """Return drives of rows of dots, one way each, the first dot from rest."""
+    """Return the drives of rows of `dots` dots, one per candidate; the first dot is from rest."""
     known: dict[tuple[float, float, float], Waveform] = {}
     drives: list[Drive] = []
     for period, delay, brake, fired, width, _cost in zip(*(column.tolist() for column in ways), strict=True):
@@ -250,9 +254,9 @@ def rows_of(task: Task, ways: Ways, dots: int) -> list[Drive]:
 
 
 def _deviations(task: Task, hammer: Hammer, ways: Ways, drives: Sequence[Drive]) -> FloatArray:
-    """Return deviations of force and arrival, in parts of the limits, shape (ways, dots, 2).
+    """Return deviations of force and arrival, as fractions of the limits, shape (ways, dots, 2).
 
-    NaN for a lost dot or one with extra contacts.
+    NaN for a lost dot and for a dot with extra contacts.
     """
     count = len(drives[0].times) if drives else 2
     slots = np.arange(count) * ways.period[:, np.newaxis]

@@ -1,15 +1,17 @@
-"""What the controller learns of the hammer that it drives: where the front of the pack is, and the supply.
+"""Recursive estimation of two constants of the driven hammer: front of the pack, and current scale.
 
-The front of the pack may lie farther away than it should, by some f, and all currents may be larger than
-they should be, by some part s. Neither changes from dot to dot, or only slowly; the noise does. Both are
-learned as in a Kalman filter (R. E. Kalman, J. Basic Eng. 82 (1960) 35): a mean and a standard deviation of
-each, which every dot improves and which widen a little from dot to dot, so that what is old is forgotten.
+The front may be farther away than nominal by a distance f, and all currents may deviate from nominal by a
+relative scale s. Both are constant or drift slowly from dot to dot, whereas the noise is independent. Both
+are estimated as in a Kalman filter (R. E. Kalman, J. Basic Eng. 82 (1960) 35): each dot updates mean and
+standard deviation, and process noise inflates the standard deviation between dots, so that old data are
+forgotten.
 
-A flight tells s, since a stronger coil accelerates more, see `printhammer.control.feedback.estimator.flight`.
-A contact tells f: the state of the armature before the touch is known from the flight, and where it is slowed
-down, turned and thrown back shows where the pack is. A run of the nominal hammer tells what the sensor should
-show of the contact, others how that depends on displacement and speed before it, on f and on s; the four
-follow by least squares. A weak supply is not taken for a distant pack: both are unknowns of the same fit.
+A flight observes s, since a larger current accelerates more, see
+`printhammer.control.feedback.estimator.flight`. A contact observes f: the state before the touch is known
+from the flight, and the deceleration, turning and rebound show where the pack is. A simulation of the nominal
+hammer predicts the samples of the contact, and perturbed simulations give their derivatives with respect to
+displacement and speed before it, f and s; one Gauss-Newton step then estimates all four. A weak supply is not
+mistaken for a distant pack, since both are unknowns of the same fit.
 """
 
 from __future__ import annotations
@@ -27,28 +29,28 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.run.ensemble import DISPLAY_TOLERANCE, Ensemble
 from printhammer.support.arrays import FloatArray
 
-# Standard deviation of what the nominal hammer says of a contact, in parts of the way to the pack
+# Standard deviation of the model error of a contact, as a fraction of the stroke
 _MODEL_ERROR: Final = 0.003
-_GRID: Final = 1.0 / 128.0  # Step of the fronts at which contacts are computed, likewise
-# Differences from which derivatives are taken: of the front in steps of the grid, of the scale of the
-# currents, of the displacement in parts of the way to the pack, and of the speed, m/s
+_GRID: Final = 1.0 / 128.0  # Spacing of the fronts at which contacts are simulated, likewise
+# Finite-difference steps: front in grid steps, current scale, displacement as a fraction of the stroke, speed
+# in m/s
 _FRONT_STEPS: Final = 4
 _SCALE_STEP: Final = 0.03
 _PLACE_STEP: Final = 0.005
 _SPEED_STEP: Final = 0.02
-# Mean square of what is left of the samples, in variances, above which a contact is not believed
+# Mean squared normalised residual above which a contact is rejected
 _STRANGE: Final = 9.0
 
 
 class Contacts:
-    """Contacts of the nominal hammer with packs at several places."""
+    """Simulated contacts of the nominal hammer with packs at several distances."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self._shifted = {0: plant.hammer}
 
     def learn(self, loops: Sequence[Loop], samples: Samples) -> None:
-        """Learn front and scale from the latest contact of each run, of which there are samples."""
+        """Update front and scale of each run from the samples of its latest contact."""
         stroke = self._plant.stroke
         touches = [loop.touched for loop in loops if loop.touched is not None]
         places = [round(loop.learned.front / _GRID) for loop in loops]
@@ -68,7 +70,7 @@ class Contacts:
         expected[:, 2] = [
             loop.learned.front - place * _GRID for loop, place in zip(loops, places, strict=True)
         ]
-        # The members run at nominal currents.
+        # The simulations use nominal currents.
         expected[:, 3] = base[:, 2]
         spread = np.hypot(samples.error, _MODEL_ERROR * stroke)
         rest = np.where(counts, samples.shown - runs[0], 0.0)
@@ -92,7 +94,7 @@ class Contacts:
         steps: FloatArray,
         samples: Samples,
     ) -> FloatArray:
-        """Return the displacements of the nominal hammer, and of those that differ, (5, M, N), m."""
+        """Simulate the nominal contact and its four perturbations; return displacements (5, M, N), m."""
         hammers, drives, states, strobes = [], [], [], []
         plain = [loop.recent(self._plant.driver) for loop in loops]
         stronger = [drive.scaled(1.0 + _SCALE_STEP) for drive in plain]
@@ -121,7 +123,7 @@ class Contacts:
         return whole
 
     def _with_front(self, place: int) -> Hammer:
-        """Return the nominal hammer with its pack a number of grid steps farther away."""
+        """Return the nominal hammer with its pack `place` grid steps farther away; cached."""
         if place not in self._shifted:
             self._shifted[place] = self._plant.moved(place * _GRID).hammer
         return self._shifted[place]

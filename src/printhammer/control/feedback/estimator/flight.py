@@ -1,10 +1,10 @@
-"""The observer: where a flying armature is and will touch the pack, from samples and a model of its forces.
+"""The observer: state of the flying armature and its coming touch, from samples and a force model.
 
-In flight the acceleration is that of magnet and spring, a function of displacement and current, which the
-controller knows. What it does not know are three numbers: where the armature is at one instant, how fast, and
-by which part s all currents are larger than they should be, as with another supply. With c the twofold
-integral of the acceleration from that instant, x = X + V tau + c(tau; s). This is linear in X and V, and
-nearly so in s: they follow from the samples by least squares, together with what was expected before.
+In flight the acceleration is that of magnet and spring, a known function of displacement and current. Three
+numbers are unknown: displacement X and speed V at a reference time, and the relative deviation s of all
+currents from nominal, e.g. with another supply. With c the twice integrated acceleration, x = X + V tau +
+c(tau; s). This is linear in X and V and nearly linear in s, so a few Gauss-Newton steps, with the expectation
+as a prior, give the maximum a posteriori estimate.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from printhammer.support.arrays import FloatArray
 if TYPE_CHECKING:
     Accelerations = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
-_ROUNDS: Final = 3  # Iterations: of a path, of a fit, and of the time of a touch
-_NODES: Final = 65  # Nodes of a path in time
-_SLOWEST: Final = 1e-2  # Least speed of a touch, m/s
-_SHORTEST: Final = 1e-6  # Least length of a flight, s
-# Differences from which derivatives are taken: of the speed in parts of it, and of the scale of currents
+_ROUNDS: Final = 3  # Iterations of path integration, of the fit, and of the touch time
+_NODES: Final = 65  # Time nodes of a path
+_SLOWEST: Final = 1e-2  # Smallest speed of a touch, m/s
+_SHORTEST: Final = 1e-6  # Shortest flight, s
+# Finite-difference steps: relative speed, and current scale
 _STEP: Final = 0.01
 _SCALE_STEP: Final = 0.02
-_BENDS: Final = 2  # Iterations of a path in a fit
-_PLACES, _CURRENTS = 97, 129  # Numbers of displacements and currents of the table of forces
+_BENDS: Final = 2  # Picard iterations of a path per fit
+_PLACES, _CURRENTS = 97, 129  # Numbers of displacements and currents of the force table
 
 
 class FreeForce:
-    """Force of magnet and spring of a hammer, N, read from a table over displacement and current.
+    """Force of magnet and spring, N, interpolated in a table over displacement and current.
 
-    The table ends at the displacements `low` and `high`, m, and at currents of `largest`, A, of either sign.
+    The table covers displacements from `low` to `high`, m, and currents up to `largest`, A, of either sign.
     """
 
     def __init__(self, hammer: Hammer, low: float, high: float, largest: float) -> None:
@@ -53,7 +53,7 @@ class FreeForce:
         )
 
     def __call__(self, x: FloatArray, current: FloatArray) -> FloatArray:
-        """Return the force; outside the table that of its edge."""
+        """Interpolate the force; arguments outside the table are clipped."""
         row = np.clip((x - self._low) / (self._high - self._low), 0.0, 1.0) * (_PLACES - 1)
         column = np.clip(0.5 + 0.5 * current / self._largest, 0.0, 1.0) * (_CURRENTS - 1)
         i = np.minimum(row.astype(np.int64), _PLACES - 2)
@@ -63,10 +63,10 @@ class FreeForce:
 
 @dataclass(frozen=True)
 class Expected:
-    """What is expected of touches (M,) before the samples are looked at.
+    """Prior expectation of touches (M,).
 
-    Their time, s, and speed, m/s; `scale`, the part by which all currents are larger than they should be; and
-    the covariance (M, 3, 3) of displacement at that time, m, speed, m/s, and scale.
+    Time, s, and speed, m/s; `scale`, the relative deviation of all currents from nominal; and the covariance
+    (M, 3, 3) of displacement at that time, m, speed, m/s, and scale.
     """
 
     time: FloatArray
@@ -77,19 +77,19 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight as estimated from samples."""
+    """Flights estimated from samples."""
 
     # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray
     speed: FloatArray
-    scale: FloatArray  # By which part all currents are larger than they should be, (M,)
-    reference: FloatArray  # Time, s, for which `state` and `covariance` hold, (M,)
-    # Displacement, m, speed, m/s, and scale, and their covariance, (M, 3)
+    scale: FloatArray  # Relative deviation of all currents from nominal, (M,)
+    reference: FloatArray  # Reference time of `state` and `covariance`, s, (M,)
+    # Displacement, m, speed, m/s, and scale, (M, 3), and their covariance, (M, 3, 3)
     state: FloatArray
     covariance: FloatArray
 
     def at(self, time: FloatArray, accelerations: Accelerations) -> tuple[FloatArray, FloatArray]:
-        """Return state (M, 3) and covariance (M, 3, 3) at another time, s, in free flight."""
+        """Propagate state (M, 3) and covariance (M, 3, 3) in free flight to another time, s."""
         place, speed, scale = self.state.T
         way = time - self.reference
         grid = self.reference[:, np.newaxis] + np.linspace(1.0, 0.0, _NODES) * way[:, np.newaxis]
@@ -114,10 +114,10 @@ class Flight:
 def flight_from_samples(
     samples: Samples, expected: Expected, front: FloatArray, accelerations: Accelerations
 ) -> Flight:
-    """Estimate flights and the coming touches of the pack from samples; its front is at `front`, m.
+    """Estimate flights and coming touches of packs with their fronts at `front`, m, from samples.
 
-    `accelerations` of a flying armature are a function of displacements, m, times, s, and scales, all of
-    shape (M, K) or such that they broadcast to it, in m/s².
+    `accelerations` maps displacements, m, times, s, and scales, all broadcastable to (M, K), to accelerations
+    of a flying armature, m/s².
     """
     times, shown, used, error = samples
     reference = expected.time
@@ -144,7 +144,7 @@ def flight_from_samples(
     for _ in range(_ROUNDS):
         scale = state[:, 2:]
         straight = state[:, :1] + state[:, 1:2] * ways[1]
-        # How the path bends depends on the path (Picard).
+        # The acceleration depends on the path: Picard iteration.
         curve = bent(straight, curve, scale)
         others = [bent(straight + step * way, curve, scale) for way, step in zip(ways, steps, strict=True)]
         others.append(bent(straight, curve, scale + scale_step))
@@ -174,15 +174,15 @@ def least_squares(
     prior: FloatArray,
     expected: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the step (M, U) of some unknowns that fits samples best, and its precision (Gauss-Newton).
+    """Compute the weighted least-squares step (M, U) with a prior, and its precision matrix (Gauss-Newton).
 
-    The samples depend on each of U unknowns by `slopes` (M, N); `rest` (M, N) is left of them, and they count
-    by `weight` (M, N), 0 for those that do not. What was expected is a step `expected` (M, U), and the
-    inverse `prior` (M, U, U) of its covariance. The precision (M, U, U) is the inverse of the covariance of
+    `slopes` are the derivatives (M, N) of the samples with respect to each of U unknowns, `rest` (M, N) the
+    residuals, and `weight` (M, N) the weights, 0 for unused samples. The prior is a step `expected` (M, U)
+    with the precision `prior` (M, U, U). The returned precision (M, U, U) is the inverse of the covariance of
     the step.
     """
     precision, pull = prior.copy(), np.empty(expected.shape)
-    # Sum by sum, so that a run does not depend on the others, as it may in a product of matrices.
+    # Explicit sums, so that a run's bits do not depend on the other runs, as they may in a matrix product.
     for i, slope in enumerate(slopes):
         pull[:, i] = (prior[:, i] * expected).sum(axis=1)
         pull[:, i] += np.where(weight > 0.0, weight * slope * rest, 0.0).sum(axis=1)
@@ -193,7 +193,7 @@ def least_squares(
 
 
 def _integrated(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Integrate once and twice over evenly spaced times, (M, K), back from the last one; trapezoidal rule."""
+    """Integrate once and twice over equal time steps, (M, K), backwards from the last; trapezoidal rule."""
     step = (grid[:, -1:] - grid[:, :1]) / (grid.shape[1] - 1)
 
     def backwards(integrand: FloatArray) -> FloatArray:
@@ -206,7 +206,7 @@ def _integrated(grid: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
 
 
 def _interpolated(grid: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Interpolate rows over evenly spaced times linearly; beyond the ends the value there."""
+    """Interpolate rows over evenly spaced times linearly; arguments beyond the ends are clipped."""
     count = grid.shape[1] - 1
     span = np.maximum(grid[:, -1:] - grid[:, :1], 1e-300)
     place = np.clip((times - grid[:, :1]) / span, 0.0, 1.0) * count

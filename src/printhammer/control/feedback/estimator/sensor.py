@@ -1,7 +1,7 @@
-"""A sensor that sees the hammer: position with noise, quantised, and late.
+"""A position sensor with noise, quantisation and delay.
 
-Samples are taken at whole multiples of the interval. The noise of a sample depends on the seed, on the run
-and on the number of the sample only, so that a closed loop is the same to the bit whatever is run beside it.
+Samples are taken at integer multiples of the interval. The noise of a sample depends only on the seed, the
+run and the index of the sample, so a closed loop is the same to the bit whatever runs are simulated with it.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
     Words = npt.NDArray[np.uint64]
 
 
-# Least standard deviation that a sample counts with, in parts of the way from backstop to pack
+# Smallest standard deviation assigned to a sample, as a fraction of the stroke
 _LEAST_ERROR: Final = 1e-4
-# Part of an interval by which a sample may lie beyond a boundary, so that no rounding decides
+# Tolerance of a sample time at a boundary, as a fraction of the interval, against rounding
 _SLACK: Final = 1e-6
 
 
 class Samples(NamedTuple):
-    """What a sensor shows of some runs: arrays of shape (M, N), one row a run.
+    """Sensor readings of several runs: arrays of shape (M, N), one row per run.
 
-    Times of the samples, s; displacements that are shown, m, 0 for samples that are not used; whether they
-    are used; and the standard deviation of a sample, m.
+    Sample times, s; displacements, m, 0 for unused samples; mask of the used samples; standard deviation of a
+    sample, m.
     """
 
     times: FloatArray
@@ -39,23 +39,21 @@ class Samples(NamedTuple):
     error: float
 
     def take(self, which: Any) -> Samples:
-        """Return some of the rows or columns."""
+        """Return the selected rows or columns."""
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 
 class PositionSensor(Declared):
-    """A position sensor."""
+    """A position sensor with white noise, delay and quantisation."""
 
     noise: float = part(
-        "standard deviation of a sample, in parts of the way from backstop to pack; normal, white",
+        "standard deviation of a sample, as a fraction of the stroke; normal, white",
         default=0.01,
     )
-    delay: float = scalar("s", "from the instant of a sample until it can be used", default=20e-6)
-    interval: float = scalar("s", "between samples", default=2e-6)
-    step: float = part(
-        "quantisation, in parts of the way from backstop to pack; 0 for none", default=2.0**-10
-    )
-    seed: int = part("of the noise", default=0)
+    delay: float = scalar("s", "time from a sample until it is available", default=20e-6)
+    interval: float = scalar("s", "sampling interval", default=2e-6)
+    step: float = part("quantisation step, as a fraction of the stroke; 0 for none", default=2.0**-10)
+    seed: int = part("seed of the noise", default=0)
 
     def __post_init__(self) -> None:
         for name, unit in (("noise", ""), ("delay", " s"), ("interval", " s"), ("step", "")):
@@ -72,18 +70,18 @@ class PositionSensor(Declared):
 
     @property
     def error(self) -> float:
-        """Standard deviation of a sample, in parts of the way from backstop to pack."""
+        """Standard deviation of a sample, as a fraction of the stroke, quantisation included."""
         return max(float(np.hypot(self.noise, self.step / np.sqrt(12.0))), _LEAST_ERROR)
 
     def count(self, time: float) -> int:
-        """Return the number of samples within a time, s; at least one."""
+        """Return the number of samples in a time span, s; at least one."""
         return max(1, round(time / self.interval))
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
-        """Return the numbers of the latest samples in some spans of time (M,), s, shape (M, most).
+        """Return the indices of the latest samples in time spans (M,), s, shape (M, most).
 
-        `until` is the instant at which the samples are needed: what is in by then was taken the delay before.
-        The numbers ascend; -1 in front where there are fewer.
+        `until` is the time at which the samples are needed, so the latest was taken one delay earlier. The
+        indices ascend, padded with -1 at the front.
         """
         last = np.floor((until - self.delay) / self.interval + _SLACK).astype(np.int64)
         first = np.ceil(since / self.interval - _SLACK).astype(np.int64)
@@ -91,9 +89,9 @@ class PositionSensor(Declared):
         return np.where(latest >= np.maximum(first, 0)[:, np.newaxis], latest, -1)
 
     def read(self, x: FloatArray, numbers: IntArray, runs: Words, stroke: float) -> FloatArray:
-        """Return what the sensor shows of true displacements (M, N), m, at samples of some numbers (M, N).
+        """Return the readings of true displacements (M, N), m, at samples with the given indices (M, N).
 
-        `runs` (M,) are the keys of the noise, one a run; `stroke` is the way from backstop to pack.
+        `runs` (M,) are the noise keys of the runs; `stroke` is the distance from backstop to pack, m.
         """
         shown = x + self.noise * stroke * normal(self.seed, runs[:, np.newaxis], numbers)
         if self.step > 0.0:
@@ -103,23 +101,23 @@ class PositionSensor(Declared):
 
 
 def normal(seed: int, runs: Words, numbers: IntArray) -> FloatArray:
-    """Return normally distributed numbers that depend on seed, run and number only.
+    """Return standard normal numbers that are a pure function of seed, run and index.
 
-    The bits are those of the generator splitmix64 (G. L. Steele, D. Lea, C. H. Flood, OOPSLA 2014), whose
-    state is made of the three; the distribution comes from its inverse.
+    The bits come from the generator splitmix64 (G. L. Steele, D. Lea, C. H. Flood, OOPSLA 2014), whose state
+    combines the three arguments; the inverse normal distribution maps them to normal numbers.
     """
     from scipy.special import ndtri
 
     state = _mixed(np.uint64(seed % 2**64) + np.zeros(1, np.uint64))
     state = _mixed(state ^ runs)
     state = _mixed(state ^ numbers.astype(np.uint64))
-    # The middle of one of 2**53 equal intervals, so that neither 0 nor 1 occurs.
+    # The midpoint of one of 2**53 equal intervals, so that 0 and 1 do not occur.
     share = ((state >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
     return np.asarray(ndtri(share))
 
 
 def run_key(slots: tuple[int, ...], rate: float) -> int:
-    """Return the key by which the noise of a pattern at a rate differs from that of others."""
+    """Return the noise key of a pattern at a rate, a hash of both."""
     import hashlib
 
     text = f"{rate!r} {slots!r}".encode()
