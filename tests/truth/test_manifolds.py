@@ -52,6 +52,40 @@ def test_curves_of_a_bent_saddle(a: float, b: float, side: float) -> None:
     assert np.abs(inward.points[:, 0] - inward.points[:, 1] ** 3).max() < 1e-5
 
 
+class IntoSink:
+    """u -> m u / (1 + (m - 1) u), v -> b v: 0 and 1 are fixed, with the multipliers m and 1 / m."""
+
+    def image(self, point: np.ndarray, firings: int) -> tuple[np.ndarray, np.ndarray]:
+        (u, v), slope = point, 1.0
+        for _ in range(firings):
+            below = 1.0 + 0.6 * u
+            u, v, slope = 1.6 * u / below, 0.3 * v, slope * 1.6 / below**2
+        return np.array([u, v]), np.diag([slope, 0.3**firings])
+
+
+def test_a_manifold_ends_in_the_sink_into_which_it_runs() -> None:
+    own: Any = IntoSink()
+    out = _unstable(own, np.zeros(2), 1.0, 1, _Limits(2.0, 3000, 0.02))
+    assert out.end == "sink"
+    assert out.points[-1] == pytest.approx([1.0, 0.0], abs=1e-9)
+    assert len(out.points) < 200
+    assert np.hypot(*np.diff(out.points, axis=0).T).sum() == pytest.approx(1.0, abs=1e-9)
+
+
+def test_both_halves_of_a_saddle_between_two_wells_end_in_their_sinks() -> None:
+    force = ph.SineForce(0.01, 1.0 / (2.0 * math.pi), phase="90 deg")
+    regime = Regime.of(ph.load("duffing-holmes"), drive=force)
+    # The window is a hundredth of a well wide.
+    wide: Any = {"length": 1e4, "points": 20_000, "spacing": 3.0}
+    curves = manifolds(orbit(regime, (-0.005, 0.0005)), kinds=("unstable",), **wide)
+    assert curves.ends == ("sink", "sink")
+    wells = [(curves.points(number)[-1]).tolist() for number in (0, 1)]
+    assert wells[0][0] * wells[1][0] < 0.0
+    for x, v in wells:
+        settled = ph.strobe(regime.hammer, drive=force, state=(x, v), points=1, transient=200, verdict=False)
+        assert (settled.x[-1], settled.v[-1]) == pytest.approx((x, v), abs=1e-8)
+
+
 @pytest.fixture(scope="module")
 def curves() -> Any:
     regime = Regime.of(ph.load("duffing-holmes"), drive=FORCE)

@@ -13,6 +13,7 @@ from tests.errors import refused
 import printhammer as ph
 from printhammer.chaos.basins.quench import QuenchMap, TwoPulseDrive, two_pulse_drives
 from printhammer.drive.segments import table
+from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.drivers import Rail
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Trapezoid
 
@@ -44,6 +45,28 @@ def test_cells_of_equal_pulses_are_single_runs(hammer: "ph.Hammer", found: Quenc
         assert found.peak[row, 1] == pytest.approx(peak[1], abs=1e-5 * way)
     assert found.lost[:, 1].any()
     assert found.struck[:, 1].any()
+
+
+def test_the_peak_of_a_lost_dot_is_that_of_the_motion_where_a_pulse_ends_at_it() -> None:
+    hammer = ph.load("hendriks-1983-1")
+    assert hammer.waveform is not None
+    pulse = hammer.waveform
+    found = ph.quench_map(hammer, gaps=(0.98e-3, 1e-3, 3), widths=(60e-6, 64e-6, 3), tolerance=TIGHT)
+    way = hammer.front - hammer.origin
+    for row, gap in enumerate(found.gaps.tolist()):
+        for column, width in enumerate(found.widths.tolist()):
+            if found.struck[row, column]:
+                continue
+            second = type(pulse)(**{**dict(pulse), "width": width})
+            motion = ph.simulate(
+                hammer, PulseSequence([pulse, second], [0.0, gap]), duration=gap + found.tail, tolerance=TIGHT
+            )
+            t = np.linspace(gap, gap + found.tail, 100_001)
+            x, v = motion.at(t)
+            tops = x[1:][(v[:-1] > 0.0) & (v[1:] <= 0.0)]
+            # Of samples every 10 ns one is no more than 1e-11 m below a turn.
+            assert found.peak[row, column] == pytest.approx(tops.max(), abs=1e-5 * way)
+    assert found.lost.any()
 
 
 class Both(Rectangle):

@@ -48,6 +48,8 @@ TAIL: Final = 1e-3
 
 _PIECE: Final = 8192
 _SPACING: Final = 5e-6
+_FINE: Final = 8
+"""Number of samples of a second run on either side of the highest one of the first, within its spacing."""
 _FIRST, _SECOND = 2, 3
 
 
@@ -310,7 +312,19 @@ def _piece(
     assert hammer.front is not None
     second = dots.struck[:, number]
     after = np.repeat(begin + gaps, len(drives))
-    turned = _highest(grid, x.astype(np.float64), after)
+    turned, times = _highest(grid, x.astype(np.float64), after)
+    lost = np.flatnonzero(result.ok & ~second & np.isfinite(turned))
+    if lost.size:
+        # Where a pulse begins or ends beside the turn no parabola goes through three samples.
+        offsets = (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, 2 * _FINE + 1)
+        moments = np.clip(times[lost, np.newaxis] + offsets, after[lost, np.newaxis], ends[lost, np.newaxis])
+        strobes = [np.unique(row) for row in moments]
+        closer = Ensemble(
+            hammer, [every[k] for k in lost], ends[lost], starts=begin, tolerance=effort.tolerance
+        ).run(strobes=strobes, threads=effort.threads)
+        assert closer.strobes is not None
+        top = _top(closer.strobes.t, closer.strobes.x, closer.strobes.v)
+        turned[lost] = np.where(np.isfinite(top), top, turned[lost])
     peak = np.where(second, np.fmax(hammer.front + dots.indentation[:, number], turned), turned)
     return (
         second,
@@ -321,16 +335,31 @@ def _piece(
     )
 
 
-def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the largest local maximum after some times, shape (M,), from samples; NaN where there is none.
+def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the largest local maximum after some times and its time, shape (M,) each, from samples.
 
-    The samples, shape (M, T), are evenly spaced, and NaN where there is none.
+    The samples, shape (M, T), are evenly spaced, and NaN where there is none, as is a maximum.
     """
     before, here, following = x[:, :-2], x[:, 1:-1], x[:, 2:]
     bend = before - 2.0 * here + following
     slope = 0.5 * (following - before)
     top = (here > before) & (here >= following) & (bend < 0.0)
     shift = np.divide(-slope, bend, out=np.zeros_like(here), where=top)
-    late = grid[1:-1] + shift * (grid[1] - grid[0]) > after[:, np.newaxis]
-    heights = np.where(top & late, here + 0.5 * slope * shift, -np.inf).max(axis=1)
-    return np.where(np.isfinite(heights), heights, np.nan)
+    times = grid[1:-1] + shift * (grid[1] - grid[0])
+    late = times > after[:, np.newaxis]
+    heights = np.where(top & late, here + 0.5 * slope * shift, -np.inf)
+    place = heights.argmax(axis=1)[:, np.newaxis]
+    highest = np.take_along_axis(heights, place, axis=1)[:, 0]
+    return np.where(np.isfinite(highest), highest, np.nan), np.take_along_axis(times, place, axis=1)[:, 0]
+
+
+def _top(t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the largest displacement at which the velocity falls through 0 between samples, shape (M,).
+
+    NaN where it does so nowhere. The velocity is linear between samples, shape (M, T).
+    """
+    falls = (v[:, :-1] > 0.0) & (v[:, 1:] <= 0.0)
+    drop = np.where(falls, v[:, :-1] - v[:, 1:], 1.0)
+    heights = x[:, :-1] + 0.5 * np.diff(t, axis=1) * v[:, :-1] ** 2 / drop
+    highest = np.where(falls, heights, -np.inf).max(axis=1)
+    return np.where(np.isfinite(highest), highest, np.nan)

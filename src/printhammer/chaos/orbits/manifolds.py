@@ -47,6 +47,8 @@ _FINEST: Final = 1e-3
 """Share of the spacing below which a bend gets no more points."""
 _TIGHT: Final = 1e-12
 """Distance of points of a fundamental segment below which what lies apart is a jump."""
+_SETTLED: Final = 0.1
+"""Extent of the image of a fundamental segment, as a fraction of the spacing, that may be at a sink."""
 _CLOSE: Final = 1e-10
 _NEWTON: Final = 8
 _FEW: Final = 4
@@ -67,8 +69,8 @@ class Manifolds(Result, rows="point"):
     )
     kinds: IntArray = column("1", "kind of the curve", "curves", dtype=np.int32, codes=KINDS, name="kind")
     ends: tuple[str, ...] = part(
-        'why each curve ends: "length"; "points"; "no preimage", where Newton\'s method finds none; "no'
-        ' value", where no run comes through'
+        'why each curve ends: "length"; "points"; "sink", where it runs into a stable orbit; "no preimage",'
+        ' where Newton\'s method finds none; "no value", where no run comes through'
     )
     spacing: float = part("distance of neighbouring points that was aimed at")
 
@@ -230,6 +232,7 @@ def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits
     points, total, level = [saddle], 0.0, 0
     shares = [0.0, 1.0]
     row = [on_segment(share, 0) for share in shares]
+    extent = math.inf
     while True:
         level += 1
         row = [own.image(point, firings)[0] if np.isfinite(point).all() else point for point in row]
@@ -252,6 +255,27 @@ def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits
                 return _Curve(np.array(points), "points")
         if not np.isfinite(row).any():
             return _Curve(np.array(points), "no value")
+        before, extent = extent, float(np.ptp(row, axis=0).max())
+        if extent < min(before, _SETTLED * limits.spacing):
+            sink = _sink(own, row[-1], firings, limits.spacing)
+            if sink is not None:
+                return _Curve(np.array([*points, sink]), "sink")
+
+
+def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> FloatArray | None:
+    """Return the stable fixed point no farther than the spacing from a point, if Newton's method finds it."""
+    guess = point
+    for _ in range(_NEWTON):
+        image, jacobian = own.image(guess, firings)
+        if not np.isfinite(jacobian).all() or np.linalg.det(jacobian - np.eye(2)) == 0.0:
+            return None
+        move = np.linalg.solve(jacobian - np.eye(2), image - guess)
+        guess = guess - move
+        if not float(np.hypot(*(guess - point))) <= spacing:
+            return None
+        if float(np.hypot(*move)) <= _CLOSE * max(1.0, float(np.hypot(*guess))):
+            return guess if np.abs(np.linalg.eigvals(jacobian)).max() < 1.0 else None
+    return None
 
 
 def _gap(row: list[FloatArray], k: int, spacing: float) -> bool:
