@@ -1,12 +1,11 @@
-"""The circuit of a coil from records of its current under a voltage: resistance, inductance, and what else.
+"""Fit the constants of a coil circuit to records of its current under a voltage.
 
-    current(t) = that of the equation of motion with the circuit of the coil
+  current(t) = solution of the equation of motion together with the coil circuit, as the probe shows it
 
-Data: the columns ``time``, from switching on, and ``current``, perhaps ``voltage``; one shot a file. Where
-there is no voltage, the hammer's own driver is what switches. The final current tells the resistance, the
-rise the inductance, what bends it a shorted turn or the saturation; an armature that moves adds its own.
-
-A probe has errors of its own, see `printhammer.identify.probe`.
+Data: columns ``time`` and ``current``, optionally ``voltage``; one shot per file. Without a voltage column
+the hammer's own driver is the source. The final current determines the resistance, its rise the inductance,
+and the curvature of the rise a shorted turn or saturation; a moving armature adds a back-EMF. The errors of
+the current probe are declared or fitted, see `printhammer.identify.probe`.
 """
 
 from __future__ import annotations
@@ -53,13 +52,13 @@ _REACH: Final = 1e3
 """Largest factor between a fitted constant and its initial guess; arbitrary."""
 
 _TOLERANCE: Final = 1e-10
-"""Relative tolerance of the descents: derivatives by differences are no better."""
+"""Relative tolerance of the least-squares iterations: finite differences are no more accurate."""
 
 _SPARE: Final = 4
 """Smallest number of rows in excess of parameters, for the standard errors; arbitrary."""
 
 _EXACT: Final = 1e-6
-"""Residuals below this part of the current are errors of the integration: they test no law."""
+"""Residual, as a fraction of the current, below which integration errors dominate and no law is tested."""
 
 _COARSE: Final = 1.5
 """Ratio of resolution to residual standard deviation above which quantisation dominates the residuals."""
@@ -88,42 +87,43 @@ def fit_coil(
 ) -> Fit:
     """Fit constants of the circuit to records of the current, one shot each.
 
-    An error of the probe is a number or a text with a unit; "1 +- 0.01", a value with its standard deviation,
-    which counts; or "fit". Errors that are not stated are taken as absent, and the law is tested for them.
+    A probe error is a number or a text with a unit; "1 +- 0.01", a value with its standard deviation, which
+    enters as a prior; or "fit". Errors that are not stated are assumed absent, and the law is tested against
+    them.
 
     Parameters
     ----------
     paths : sequence of path
-        Tables with the columns ``time``, ``current`` and perhaps ``voltage``, which then drives the coil from
-        the first row on; each of its edges lies anywhere between two rows. Without it the coil is switched on
-        at time 0.
+        Tables with the columns ``time``, ``current`` and optionally ``voltage``, which then drives the coil
+        from the first row on; the time of each of its edges is uncertain between two rows. Without it the
+        coil is switched on at time 0.
     hammer : Hammer
-        All that is known; its values are where the fit begins. A resistance or inductance that it does not
-        state is estimated first.
+        Hammer with the known constants and the initial guesses. A missing resistance or inductance is
+        estimated from the first record.
     free : sequence of str, optional
-        Constants to find, by default `default_constants`.
+        Constants to fit, by default `default_constants`.
     also : sequence of str, optional
-        Further ones; such as "coil.turn_resistance", "magnet.saturation_flux".
+        Additional constants to fit, e.g. "coil.turn_resistance", "magnet.saturation_flux".
     locked : float or str, optional
-        Displacement at which the armature was held, m; by default what a comment ``# locked: 100 um`` says,
-        and else it is free.
+        Displacement at which the armature was held, m; by default that of a comment ``# locked: 100 um``,
+        else the armature is free.
     offset, gain, delay : float or str, optional
         Offset, A, gain, and delay, s, of the probe.
     bandwidth : float or str, optional
-        Bandwidth of the probe, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, else unlimited.
+        Bandwidth of the probe, Hz; by default that of a comment ``# bandwidth: 200 kHz``, else unlimited.
     resolution : float or str, optional
-        Step of the readings, A; by default the one of which all of them are whole multiples.
+        Step of the readings, A; by default the largest step of which all readings are multiples.
     robust : bool, optional
-        Whether rows that lie too far off are left out.
+        Whether to exclude outliers.
     columns : str, optional
-        What the columns of the table hold, such as "time=1, current=2*-10 A/V"; by default what a file
-        beside it says, and else its heading; see `printhammer.support.tables.columns`.
+        Contents of the table's columns, such as "time=1, current=2*-10 A/V"; by default as described in a
+        file beside the table, else by its heading; see `printhammer.support.tables.columns`.
 
     Raises
     ------
     InputError
-        A record cannot be used or is too short, current flows before the switching, a constant is not known
-        or not stated, or the hammer has no circuit for a voltage.
+        A record is invalid or too short, current flows before switch-on, a constant is unknown or not stated,
+        or the hammer has no coil circuit.
     """
     names = list(dict.fromkeys([*(default_constants(hammer) if free is None else free), *also]))
     if not names:
@@ -138,7 +138,7 @@ def fit_coil(
     data = _data(traces)
     space = law.space(start)
     enough(data, len(space.start) + _SPARE, "the constants of the coil and their errors")
-    # What the hammer lacks is said here; on the way constants that make no circuit are only passed over.
+    # Raises for a hammer without a coil circuit; in the iterations invalid constants merely give NaN.
     law.simulated(space.start)
     solution = solved(data, law, space, robust=robust)
     terms = law.missing(solution.p)
@@ -182,8 +182,8 @@ def fit_coil(
 class CurrentLaw:
     """Currents of all records, A, shape (m,).
 
-    p are the values of the constants named, the errors of the probe that are fitted, and how far each edge of
-    a recorded voltage lies from the middle between its rows, SI.
+    p holds the named constants, the fitted probe errors, and the offset of each edge of a recorded voltage
+    from the middle between its two rows, SI.
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class CurrentLaw:
         self._slopes: dict[bytes, FloatArray] = {}
 
     def space(self, start: FloatArray) -> Parameters:
-        """Return where the fit begins, and how far it may go, of constants that begin at `start`."""
+        """Return guess, bounds, prior and sizes of all parameters, from the guesses `start` of constants."""
         longest = max(float(trace.times[-1]) for trace in self.traces)
         peak = max(float(np.abs(trace.table.values["current"]).max()) for trace in self.traces)
         ends = [bounds_of(error, longest) for error in self.fitted]
@@ -207,7 +207,7 @@ class CurrentLaw:
             np.concatenate([start, [error.value for error in self.fitted], 0.0 * edge]),
             low=np.concatenate([start / _REACH, [low for low, _high in ends], -edge]),
             high=np.concatenate([start * _REACH, [high for _low, high in ends], edge]),
-            # An edge lies anywhere between two rows.
+            # The time of an edge is uniformly distributed between two rows.
             deviation=np.concatenate(
                 [
                     0.0 * start + math.inf,
@@ -220,7 +220,7 @@ class CurrentLaw:
         )
 
     def simulated(self, p: FloatArray, **added: float) -> FloatArray:
-        """Return the currents, with errors of the probe added."""
+        """Simulate the currents of all records as the probe shows them, with `added` probe errors."""
         count = len(self.names)
         hammer = self.hammer.replace(dict(zip(self.names, p[:count].tolist(), strict=True)))
         probe = {error.name: error.value for error in self.errors}
@@ -243,21 +243,21 @@ class CurrentLaw:
         return np.concatenate(shown)
 
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
-        """Return the derivatives by errors of the probe that are not stated, by what they look like."""
+        """Return the derivatives with respect to undeclared probe errors, by the advice that each implies."""
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
         unstated = [name for name in steps if name not in [error.name for error in self.errors]]
         terms = {}
         for name in unstated:
             ahead = self.simulated(p, **{name.replace(" ", "_"): steps[name]})
-            # A probe is never faster than it is.
+            # A time constant cannot be negative, so its difference is one-sided.
             both = name == "delay"
             behind = self.simulated(p, **({name: -steps[name]} if both else {}))
             terms[SIGNS[name]] = (ahead - behind) / steps[name]
         return terms
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the currents; NaN where the constants make no circuit."""
+        """Return the currents; NaN if the constants are invalid."""
 
         def made() -> FloatArray:
             try:
@@ -268,7 +268,7 @@ class CurrentLaw:
         return _kept(self._values, p, made)
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives by the parameters, by central differences."""
+        """Return the derivatives with respect to the parameters, by central differences."""
 
         def made() -> FloatArray:
             sizes = {"offset": 1e-3, "gain": 1e-3, "delay": _SHORT * self.step, "time constant": 0.0}
@@ -284,16 +284,16 @@ class CurrentLaw:
         return _kept(self._slopes, p, made)
 
     def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the components of the variance: one error of the probe for each record."""
+        """Return the variance components: one noise variance per record."""
         count = len(self.traces)
         return np.repeat(np.eye(count), [len(trace.table) for trace in self.traces], axis=0)
 
 
 class Averaged:
-    """A law of readings whose steps exceed their noise: its means over the rows of each step.
+    """A law averaged over quantisation plateaus, for readings whose step exceeds their noise.
 
-    Rows on one step of the readings share their rounding error. Where the law passes through the step it
-    averages out; where the law stays on it, the error is anything up to half a step.
+    Rows on the same plateau share their rounding error. Where the law crosses the step the rounding averages
+    out; where the law stays on the step, the error is up to half a step.
     """
 
     def __init__(self, law: CurrentLaw, plateau: IntArray, fitted: FloatArray, step: float) -> None:
@@ -310,7 +310,7 @@ class Averaged:
         return np.asarray(np.add.reduceat(values, self.begins, axis=0) / self.rows)
 
     def data(self, data: Data) -> Data:
-        """Return the means of the data; each has the line of its first row."""
+        """Average the data over plateaus; each mean has the line number of its first row."""
         return replace(
             data,
             abscissa=self.mean(data.abscissa),
@@ -329,17 +329,17 @@ class Averaged:
         return np.column_stack([self.mean(column) for column in slopes.T])
 
     def spread(self, p: FloatArray) -> FloatArray:
-        """Return the components of the variance: the rounding error of each record."""
+        """Return the variance components: the rounding variance of each record."""
         return np.asarray(self.law.spread(p)[self.begins] * self.share[:, np.newaxis])
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:
-    """Return where the second of two fits begins; what is known beforehand keeps its mean."""
+    """Return the start of a second fit: the first result, but the prior mean where there is a prior."""
     return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
 
 
 def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], FloatArray]) -> FloatArray:
-    """Return what was computed at parameters before, or compute it: a fit asks for the same ones often."""
+    """Return the cached value at parameters `p`, computing it on first use: a fit repeats requests."""
     key = p.tobytes()
     if key not in known:
         known[key] = made()
@@ -347,7 +347,7 @@ def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], Floa
 
 
 def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, FloatArray]:
-    """Return the hammer with a coil that has a resistance, and the values with which the fit begins."""
+    """Return the hammer with a resistance and an inductance, and the initial guesses."""
     t, current = trace.table.values["time"], np.abs(trace.table.values["current"])
     top = int(np.argmax(current))
     if not (current[top] > 0.0 and trace.waveform.peak > 0.0):

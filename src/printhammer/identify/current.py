@@ -1,8 +1,8 @@
-"""Current of a coil driven by a voltage, as a current probe shows it: simulated, and read from records.
+"""Coil current under a voltage as a current probe shows it: simulation, and reading of records.
 
-A record has the columns ``time`` and ``current``, perhaps ``voltage``; one shot a file. The armature is free
-or locked. The probe is a first-order low-pass. Between moments at most 0.5 us apart the current is taken as
-straight.
+A record has the columns ``time`` and ``current``, optionally ``voltage``; one shot per file. The armature is
+free or locked. The probe is a first-order low-pass; between points at most 0.5 us apart the current is taken
+as linear.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.tables.readings import Readings, read_table
 
 _FINEST: Final = 0.5e-6
-"""Largest step of the current that goes through the probe, s."""
+"""Largest time step of the current for the low-pass, s."""
 
 _MOST: Final = 2_000_000
-"""Steps of a record, which bound its room in the memory."""
+"""Largest number of steps in a record, which bounds the memory."""
 
 _LOCKED: Final = 1e9
 """Mass of a locked armature, kg: in a second 100 N move it by 0.05 um."""
@@ -48,7 +48,7 @@ _RAMP: Final = 1e-5
 
 
 def check_driver(hammer: Hammer) -> None:
-    """Refuse a hammer whose waveform is no voltage."""
+    """Raise `InputError` unless the hammer's waveform is a voltage."""
     if hammer.waveform is None or hammer.waveform.unit != "V":
         raise InputError(
             f"{hammer.path}: the hammer has no [waveform] that is a voltage",
@@ -63,13 +63,13 @@ def probe_current(
 ) -> FloatArray:
     """Simulate the probe current, A, at ascending times `t`, s, of a coil that is switched on at time 0.
 
-    The armature begins at rest, or is locked at a displacement, m; `tau` is the time constant of the
-    probe, s. Before time 0 there is no current.
+    The armature starts at rest or is locked at a displacement, m; `tau` is the time constant of the probe, s.
+    Before time 0 the current is zero.
 
     Raises
     ------
     InputError
-        The hammer has no circuit for a voltage, the record is too long, or the run does not reach its end.
+        The hammer has no coil circuit, the record is too long, or the simulation fails.
     """
     after = t[t >= 0.0]
     shown = np.zeros(len(t))
@@ -101,16 +101,14 @@ def probe_current(
 class Trace(Declared, eq=False):
     """Record of a coil current with its driving voltage."""
 
-    table: Readings = part("its columns")
+    table: Readings = part("columns of the record")
     waveform: Waveform = part(
-        "the voltage of the hammer's driver, or that of the table with its edges halfway"
+        "voltage of the hammer's driver, or recorded voltage with its edges halfway between rows"
     )
-    locked: float | None = part("where the armature is held, m; None where it is free")
-    tau: float = part("time constant of the probe by the table, s")
-    times: FloatArray = part(
-        "times since the coil was switched on, or since the record of a voltage begins, s"
-    )
-    edges: IntArray = part("rows of the table after which its voltage jumps")
+    locked: float | None = part("displacement at which the armature is held, m; None if it is free")
+    tau: float = part("time constant of the probe, stated in the table, s")
+    times: FloatArray = part("time since switch-on, or since the start of a recorded voltage, s")
+    edges: IntArray = part("indices of the rows after which the voltage jumps")
 
     @property
     def step(self) -> float:
@@ -118,7 +116,7 @@ class Trace(Declared, eq=False):
         return float(np.median(np.diff(self.times)))
 
     def driven(self, shifts: FloatArray) -> Waveform:
-        """Return the voltage with its edges moved from the middle between two rows, s."""
+        """Return the voltage with its edges shifted from the middle between two rows by `shifts`, s."""
         if not self.edges.size:
             return self.waveform
         t, volts = self.times, self.table.values["voltage"]
@@ -133,7 +131,7 @@ class Trace(Declared, eq=False):
 def read_trace(
     path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool, columns: str | None = None
 ) -> Trace:
-    """Read a record, locked where the argument says, m, or a comment of its file."""
+    """Read a record; the armature is locked as the argument says, m, or a comment in the file."""
     table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"}, columns=columns)
     table.check_times()
     t = table.values["time"]
@@ -168,7 +166,7 @@ def read_trace(
 
 
 def _check_begin(table: Readings, recorded: bool) -> None:
-    """Refuse a record whose current flows when the coil is switched on, or when a recorded voltage begins."""
+    """Raise `InputError` if current flows at switch-on or at the start of a recorded voltage."""
     t, current = table.values["time"], np.abs(table.values["current"])
     before = current[:1] if recorded else current[t <= 0.0][-3:]
     if before.size and float(np.median(before)) > _FLOWS * float(current.max()):

@@ -1,4 +1,4 @@
-"""The one entry to the fits: a kind of measurement, its tables, and a hammer that knows the rest."""
+"""Entry point of all fits: a kind of measurement, its tables, and a hammer with the known constants."""
 
 from __future__ import annotations
 
@@ -19,44 +19,43 @@ KINDS: Final = ("magnet", "solenoid", "spring", "pack", "backstop", "motion", "c
 def fit(
     kind: str, path: str | Path | Sequence[str | Path], *, hammer: Hammer | None = None, **options: Any
 ) -> Fit:
-    """Find constants from a measurement.
+    """Fit constants to a measurement.
 
     Parameters
     ----------
     kind : str
-        "magnet": F0, Am, Bm (and Bs, As) from forces against displacement and current; "solenoid": the
-        circuit of the law `reluctance` from forces and inductances against the gap; "spring": Bs, As from
-        forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
-        rebounds; "motion": mass, damping and others from records of single shots;
-        "coil": resistance, inductance and others from records of the current under a voltage.
+        "magnet": F0, Am, Bm (and Bs, As) from forces over displacement and current; "solenoid": the
+        magnetic circuit of the law `reluctance` from forces and inductances over the gap; "spring": Bs, As
+        from forces of the spring alone; "pack": the stiffness from load cycles; "backstop": l/k, and l, from
+        rebounds; "motion": mass, damping and others from records of single shots; "coil": resistance,
+        inductance and others from records of the current under a voltage.
     path : path, or sequence of path
-        The table, CSV with units in its heading; for "motion" and "coil" several are allowed, for "magnet"
-        a second one without currents, that of the spring alone.
+        The table, CSV with units in its heading; several for "motion" and "coil", and for "magnet" optionally
+        a second table without currents, for the spring alone.
     hammer : Hammer, optional
-        What is known already: position of the backstop, thickness of the pack, stiffness of the backstop; for
-        "motion" and "coil", which need one, all constants that are not fitted. What it knows with an error
-        counts with that error, but for "coil".
+        Hammer with the known constants: position of the backstop, thickness of the pack, stiffness of the
+        backstop; for "motion" and "coil", which require it, all constants that are not fitted. The
+        uncertainty of a known constant is propagated, except for "coil".
     **options
-        Of the kind; lengths in m or with a unit. All: `robust` (true), whether rows that lie too far off are
-        left out; `columns`, what the columns of the table hold, see `printhammer.support.tables.columns`.
+        Options of the kind; lengths in m or with a unit. For all: `robust` (true), whether to exclude
+        outliers, and `columns`, the contents of the columns, see `printhammer.support.tables.columns`. For
         "magnet": `spring`, a table of the spring alone; `position` of the backstop; `zero`, the reading of
-        the displacement sensor at x = 0, or None to fit it. "solenoid": as
-        `printhammer.identify.static.solenoid.fit_solenoid`. "spring": `position`. "pack":
-        `thickness`; `exponents`, whether these are fitted too. "backstop": `stiffness`, N/m^1.5 or a
-        `printhammer.identify.static.backstop.Stiffness`. "motion": as
-        `printhammer.identify.shots.motion.fit_motion`. "coil": as
-        `printhammer.identify.coil.fit_coil`.
+        the displacement sensor at x = 0, or None to fit it. For "solenoid": see
+        `printhammer.identify.static.solenoid.fit_solenoid`. For "spring": `position`. For "pack":
+        `thickness`; `exponents`, whether to fit these too. For "backstop": `stiffness`, N/m^1.5 or a
+        `printhammer.identify.static.backstop.Stiffness`. For "motion": see
+        `printhammer.identify.shots.motion.fit_motion`. For "coil": see `printhammer.identify.coil.fit_coil`.
 
     Returns
     -------
     Fit
-        Constants with standard errors and 95 % intervals, their covariance, what the data cannot tell apart,
-        and whether they reject the law.
+        Constants with standard errors and 95 % intervals, their covariance, the combinations that the data do
+        not determine, and the test of the law.
 
     Raises
     ------
     InputError
-        There is no such kind, a table cannot be used, or too little was measured; the sentence says what is
+        The kind is unknown, a table is invalid, or the data are insufficient; the message says what is
         missing.
     """
     if kind not in KINDS:
@@ -88,7 +87,7 @@ def fit(
 
 
 def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
-    """Tell which of two tables has no currents."""
+    """Sort two tables into the one with currents and the one without."""
     from printhammer.support.tables.readings import read_table
 
     columns = {"displacement": "m", "force": "N"}
@@ -105,7 +104,7 @@ def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
 
 
 def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any]) -> Fit:
-    """Fit a table; a constant that the hammer knows with an error has it counted."""
+    """Fit a table; propagate the uncertainty of a known constant by central differences."""
     name, key = _TAKEN[kind]
     known = None
     if options.get(name) is None:
@@ -127,11 +126,11 @@ _TAKEN: Final = {
     "pack": ("thickness", "pack.thickness"),
     "backstop": ("stiffness", "backstop.stiffness"),
 }
-"""What each static fit takes as known: its option, and the constant of the hammer."""
+"""Constant that each static fit takes as known: the name of the option, and the key in the hammer."""
 
 
 def _known(hammer: Hammer | None, key: str) -> float | None:
-    """Return what a hammer says of a constant, SI; a stiffness also where it follows from bodies."""
+    """Return a known constant of a hammer, SI, or None; a stiffness may be derived from body properties."""
     if hammer is None:
         return None
     if key == "backstop.stiffness":

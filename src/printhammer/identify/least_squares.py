@@ -1,14 +1,14 @@
-"""Least squares as measurements need it: outliers left out, weights from the data, errors that stay honest.
+"""Robust weighted least squares with outlier rejection, variance components and sandwich errors.
 
     data = law(p) + noise,   variance of the noise in row i = sum over j of spread[i, j] theta[j]
 
-A robust fit (soft-l1 loss, scale from the median absolute residual) finds the parameters and the components
-theta >= 0 of the variance; rows too far off are left out; the rest is fitted by weighted least squares until
-rows and weights stay as they are. The covariance is the sandwich HC2, which is right also where the weights
-are not, with degrees of freedom of its own for each parameter (R. M. Bell and D. F. McCaffrey, Survey
+A robust fit (soft-l1 loss, scale from the median absolute residual) estimates the parameters and the variance
+components theta >= 0; outliers are excluded; the rest is fitted by iteratively reweighted least squares until
+rows and weights converge. The covariance is the sandwich estimator HC2, which is valid even if the weights
+are wrong, with degrees of freedom for each parameter (R. M. Bell and D. F. McCaffrey, Survey
 Methodology 28 (2002) 169; G. W. Imbens and M. Kolesar, Rev. Econ. Stat. 98 (2016) 701).
 
-An error in the abscissa enters as a column of `spread` that is the squared slope of the law (effective
+An error in the abscissa enters as a column of `spread` equal to the squared slope of the law (effective
 variance: J. Orear, Am. J. Phys. 50 (1982) 912).
 """
 
@@ -24,7 +24,7 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray
 
 _FALSE_OUTLIERS: Final = 0.01
-"""Expected number of good rows left out per fit, for normal noise."""
+"""Expected number of good rows excluded per fit, for normal noise."""
 
 _EXACT: Final = 1e-11
 """Residual, as a fraction of the data, below which it is rounding, not noise."""
@@ -38,29 +38,29 @@ _HOLDING: Final = 4.0
 """Ratio of the variances of a parameter without and with rows above which they determine it; arbitrary."""
 
 _AT_BOUND: Final = 1e-6
-"""Distance from a bound, as a fraction of the parameter, below which a descent ended there."""
+"""Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""
 
 _SINGULAR: Final = 1e-12
-"""Least singular value of a Jacobian with columns of unit length that determines all parameters."""
+"""Smallest singular value of a Jacobian with normalised columns at which all parameters are determined."""
 
 _TIED: Final = 0.5
-"""Component of the weakest direction, as a fraction of the largest, of a parameter that may be held."""
+"""Component in the weakest direction, as a fraction of the largest, above which a parameter may be held."""
 
 _RESISTS: Final = 1.0
 """Increase of the weighted sum of squares, one standard error, up to which a parameter is held elsewhere."""
 
 _DIFFERENCES: Final = 1e-9
-"""Error of derivatives by differences, as a fraction of the largest datum."""
+"""Error of finite-difference derivatives, as a fraction of the largest datum."""
 
 
 class Law(Protocol):
     """Model to fit: data as a function of parameters."""
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the data that the law expects, shape (m,)."""
+        """Return the predicted data, shape (m,)."""
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return their derivatives by the parameters, shape (m, n)."""
+        """Return the derivatives of the data with respect to the parameters, shape (m, n)."""
 
     def spread(self, p: FloatArray) -> FloatArray:
         """Return the coefficient of each variance component in each row, shape (m, q), not negative."""
@@ -74,15 +74,15 @@ class Parameters(Declared, eq=False):
     high: FloatArray = part("upper bounds; inf for none")
     deviation: FloatArray = part("standard deviation of the prior; inf for none")
     size: FloatArray | None = part(
-        "plausible change of a parameter, its own magnitude at least; a parameter is held where the data do"
-        " not show that change. None to hold only what the Jacobian does not determine at all",
+        "plausible change of a parameter, at least its own magnitude; a parameter is held if the data would"
+        " not show that change. None to hold only parameters that the Jacobian does not determine",
         default=None,
     )
     rest: FloatArray | None = part(
-        "value of a parameter that is held because the data do not determine it; None for `start`",
+        "value at which an undetermined parameter is held; None for `start`",
         default=None,
     )
-    tolerance: float = part("relative tolerance of the descents", default=1e-15)
+    tolerance: float = part("relative tolerance of the least-squares iterations", default=1e-15)
 
     @classmethod
     def of(
@@ -106,35 +106,33 @@ class Solution(Declared, eq=False):
     """Fitted parameters with their covariance, residuals and diagnostics."""
 
     p: FloatArray = part("parameters, shape (n,)")
-    covariance: FloatArray = part("of the parameters, shape (n, n); 0 for those held")
-    fitted: FloatArray = part("the law, shape (m,)")
-    residuals: FloatArray = part("the data less the law, shape (m,)")
-    jacobian: FloatArray = part("at `p`, shape (m, n)")
-    variance: FloatArray = part("of the noise in each row; all 1 where the data are exact. Shape (m,)")
-    outliers: BoolArray = part("rows left out, shape (m,)")
-    degrees_of_freedom: int = part("rows used less parameters")
-    freedoms: FloatArray = part(
-        "degrees of freedom with which the variance of each parameter is known. Shape (n,)"
-    )
+    covariance: FloatArray = part("covariance of the parameters, shape (n, n); 0 for held parameters")
+    fitted: FloatArray = part("predicted data, shape (m,)")
+    residuals: FloatArray = part("data minus prediction, shape (m,)")
+    jacobian: FloatArray = part("Jacobian at `p`, shape (m, n)")
+    variance: FloatArray = part("noise variance of each row; all 1 if the data are exact. Shape (m,)")
+    outliers: BoolArray = part("mask of the excluded rows, shape (m,)")
+    degrees_of_freedom: int = part("rows used minus free parameters")
+    freedoms: FloatArray = part("degrees of freedom of the estimated variance of each parameter. Shape (n,)")
     residual_scale: float = part("root of the sum of squared residuals over the degrees of freedom")
-    condition_number: float = part("of the weighted Jacobian with columns of unit length")
-    exact: bool = part("whether the residuals are no more than rounding")
-    parameters: Parameters = part("where the fit began, and where it could go")
-    free: BoolArray = part("parameters that the data determine; the others are held. Shape (n,)")
+    condition_number: float = part("condition number of the weighted Jacobian with normalised columns")
+    exact: bool = part("whether the residuals are only rounding errors")
+    parameters: Parameters = part("initial guess, bounds and prior")
+    free: BoolArray = part("mask of the parameters that the data determine; the others are held. Shape (n,)")
 
     @property
     def used(self) -> BoolArray:
-        """Rows that were not left out."""
+        """Mask of the rows that were not excluded."""
         return ~self.outliers
 
     @property
     def standard_errors(self) -> FloatArray:
-        """Roots of the diagonal of the covariance, shape (n,)."""
+        """Square roots of the diagonal of the covariance, shape (n,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def weights(self) -> FloatArray:
-        """Proportional to 1 / variance, the largest 1, shape (m,)."""
+        """Weights proportional to 1 / variance, the largest 1, shape (m,)."""
         weights: FloatArray = self.variance.min() / self.variance
         return weights
 
@@ -145,7 +143,7 @@ class Solution(Declared, eq=False):
 
 
 class NoSolutionError(ArithmeticError):
-    """No parameters of a law come near the data; `row` is farthest from those that the fit began with."""
+    """No parameters of a law come near the data; `row` is farthest from the initial prediction."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"no parameters of the law come near the data, row {row} lies farthest off")
@@ -153,16 +151,16 @@ class NoSolutionError(ArithmeticError):
 
 
 def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust: bool = True) -> Solution:
-    """Fit a law to data, shape (m,), more than it has parameters, from parameters near enough.
+    """Fit a law to data, shape (m,), with more rows than parameters, from an initial guess.
 
-    A robust fit leaves outliers out, but never all rows that determine a parameter. A
-    parameter that the data do not determine, or that runs to a bound, is held, and the others are fitted
-    again: the weakest direction of the scaled Jacobian (singular values) says which.
+    A robust fit excludes outliers, but never all rows that determine a parameter. A parameter that the data
+    do not determine, or that runs into a bound, is held and the others are fitted again; the weakest right
+    singular vector of the scaled Jacobian selects it.
 
     Raises
     ------
     NoSolutionError
-        The parameters run away, or the law has no finite value on the way.
+        The parameters diverge, or the law is not finite on the way.
     """
     space = start if isinstance(start, Parameters) else Parameters.of(start)
     free = np.ones(len(space.start), dtype=bool)
@@ -184,13 +182,13 @@ def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust:
 def _finite_solution(
     law: Law, data: FloatArray, space: Parameters, start: FloatArray, free: BoolArray, robust: bool
 ) -> Solution | None:
-    # A row very far off can drive the first fit, which counts it in full, away; a second try leaves that out.
+    # A gross outlier can make the first, non-robust fit diverge; the second attempt skips that fit.
     for plain_first in (True, False) if robust else (True,):
         with np.errstate(all="ignore"):
             try:
                 solution = _solve(law, data, space, start, free, robust, plain_first)
             except (ArithmeticError, ValueError):
-                # What SciPy and LAPACK raise where residuals or Jacobian are not finite.
+                # SciPy and LAPACK raise these if residuals or Jacobian are not finite.
                 continue
         if np.isfinite(solution.p).all() and np.isfinite(solution.covariance).all():
             return solution
@@ -198,7 +196,7 @@ def _finite_solution(
 
 
 def _at_bound(solution: Solution) -> BoolArray:
-    """Return which parameters ended at a bound, shape (n,)."""
+    """Mask of the parameters that ended at a bound, shape (n,)."""
     space, p = solution.parameters, solution.p
     room = np.minimum(p - space.low, space.high - p)
     at_bound: BoolArray = room <= _AT_BOUND * np.maximum(np.abs(p), np.abs(space.start))
@@ -206,7 +204,7 @@ def _at_bound(solution: Solution) -> BoolArray:
 
 
 def _undetermined(solution: Solution, data: FloatArray) -> int | None:
-    """Return the parameter to hold next; None where the data determine all that are free."""
+    """Return the index of the parameter to hold next; None if the data determine all free parameters."""
     space, free = solution.parameters, np.flatnonzero(solution.free)
     bound = [k for k in free.tolist() if _at_bound(solution)[k]]
     if bound:
@@ -217,19 +215,19 @@ def _undetermined(solution: Solution, data: FloatArray) -> int | None:
     if space.size is None:
         rows = rows / lengths_of(rows)
     else:
-        # Derivatives of laws that are computed by differences are no better than this, of the largest datum.
+        # Finite-difference derivatives are no more accurate than this fraction of the largest datum.
         noise = _DIFFERENCES * float(np.abs(data).max()) if solution.exact else 1.0
         rows, limit = rows * np.maximum(space.size, np.abs(solution.p))[free], noise
     _, singular, directions = np.linalg.svd(rows, full_matrices=False)
     if singular[-1] >= limit:
         return None
     parts = np.abs(directions[-1])
-    # Of parameters that go together the last, which is what a law adds to its main constants.
+    # Of correlated parameters the last is held, since laws list their main constants first.
     return int(free[np.flatnonzero(parts > _TIED * parts.max())[-1]])
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Return parameters with one held at rest, or where it is if it is at a bound or the data resist."""
+    """Return parameters with one held at rest, or where it is if at a bound or if the data resist."""
     p, space = solution.p.copy(), solution.parameters
     if _at_bound(solution)[held]:
         return p
@@ -285,7 +283,7 @@ def _solve(
             inside = _inside(jacobian[:, free], residuals, variance, used)
             inside = _keep_what_holds(_weighted(jacobian, variance, None, space, free), inside)
             if inside.tobytes() in tried:
-                # Where rows come and go by turns they stay out.
+                # Rows that alternate between in and out stay out.
                 inside &= used
             tried.add(inside.tobytes())
         else:
@@ -302,15 +300,16 @@ def _solve(
 
 
 def _keep_what_holds(rows: FloatArray, inside: BoolArray) -> BoolArray:
-    """Return the mask of rows to use, which never leaves a parameter undetermined.
+    """Return a mask of rows that leaves no parameter undetermined.
 
     Rows determine a parameter if its variance without them is more than `_HOLDING` times as large; such rows
-    are used, also as outliers. `rows` is the weighted Jacobian, shape (m and more, n); masks have shape (m,).
+    are included even if they are outliers. `rows` is the weighted Jacobian, shape (m and more, n); masks have
+    shape (m,).
     """
     if inside.all():
         return inside
     scaled = rows / lengths_of(rows)
-    # Rows of the prior cannot be left out.
+    # The rows of the prior are always included.
     kept = np.concatenate([inside, np.ones(len(rows) - len(inside), dtype=bool)])
     all_rows = np.linalg.pinv(scaled)
     before, after = np.sum(all_rows**2, axis=1), np.sum(np.linalg.pinv(scaled[kept]) ** 2, axis=1)
@@ -375,12 +374,12 @@ def _solution(
 
 
 def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the covariance HC2 of a linear regression, shape (n, n), and its degrees of freedom, shape (n,).
+    """Compute the HC2 covariance of a linear regression, (n, n), and its degrees of freedom, (n,).
 
-    Of the weighted Jacobian, shape (m, n), and the weighted residuals; rows beyond the residuals are what is
-    known beforehand, with a variance of 1. The freedoms are for the Student's t of each parameter, those of
-    Bell and McCaffrey. A row that alone determines a parameter has no residual of its own: what its residual
-    leaves open of its variance is that of all rows together.
+    `rows` is the weighted Jacobian, shape (m, n), and `errors` are the weighted residuals; rows beyond the
+    residuals belong to the prior, with variance 1. The degrees of freedom, for Student's t of each parameter,
+    are those of Bell and McCaffrey. A row that alone determines a parameter has no residual of its own, so
+    the unexplained part of its variance is taken from the pooled residuals of all rows.
     """
     n, m = rows.shape[1], len(errors)
     length = lengths_of(rows)
@@ -398,8 +397,8 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
     if m <= n:
         return covariance, freedoms
     for k in range(n):
-        # The estimated variance is the quadratic form (1 - H) D (1 - H) of the noise, H the projection on the
-        # rows, D diagonal; its mean and spread give the freedom.
+        # The estimated variance is the quadratic form (1 - H) D (1 - H) of the noise, H the hat matrix, D
+        # diagonal; mean and spread of the form give the degrees of freedom (Satterthwaite).
         each = inverse[k, :m] ** 2
         d = each / divisor + float(each[alone] @ own[alone]) / max(left, 1e-300)
         inner = basis.T @ (d[:, None] * basis)
@@ -411,19 +410,19 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def leverage(rows: FloatArray) -> FloatArray:
-    """Return how much each row determines its own fitted value, 0 to 1, shape (m,)."""
+    """Return the leverage of each row, 0 to 1, shape (m,)."""
     shares: FloatArray = np.sum(_basis(rows) ** 2, axis=1)
     return shares
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of what the columns span, shape (m, rank)."""
+    """Return an orthonormal basis of the column space, shape (m, rank)."""
     basis, singular, _ = np.linalg.svd(rows / lengths_of(rows), full_matrices=False)
     return basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
 
 
 def lengths_of(rows: FloatArray) -> FloatArray:
-    """Return the lengths of the columns; 1 for a column of zeros."""
+    """Return the Euclidean norms of the columns; 1 for a zero column."""
     lengths: FloatArray = np.linalg.norm(rows, axis=0)
     lengths[lengths == 0.0] = 1.0
     return lengths
@@ -439,7 +438,7 @@ def descend(
     free: BoolArray,
     loss: Any = "linear",
 ) -> FloatArray:
-    """Return the parameters of the least weighted squares near `start`; those that are not free stay."""
+    """Minimise the weighted sum of squares from `start` (trust-region reflective) over free parameters."""
     from scipy.optimize import least_squares
 
     if not free.any():
@@ -481,7 +480,7 @@ def _is_exact(data: FloatArray, residuals: FloatArray) -> bool:
 
 
 def _inside(jacobian: FloatArray, residuals: FloatArray, variance: FloatArray, used: BoolArray) -> BoolArray:
-    """Return which rows lie as far off as noise can put them."""
+    """Mask of the rows whose residuals are consistent with the noise."""
     from scipy.stats import norm
 
     root = np.sqrt(variance)

@@ -1,8 +1,8 @@
-"""What a sensor of limited bandwidth shows: the first-order low-pass of a motion and of a waveform, exactly.
+"""First-order low-pass of a motion and of a waveform, solved exactly, for sensors of limited bandwidth.
 
-The output y of a sensor of bandwidth f (-3 dB) follows tau y' = u - y with tau = 1 / (2 pi f). Where u is a
-polynomial p, one solution is p - tau p' + tau^2 p'' - ..., and what is left of the past dies as exp(-t /
-tau). No sampling of u enters but its own pieces.
+The output y of a sensor of bandwidth f (-3 dB) obeys tau y' = u - y with tau = 1 / (2 pi f). If u is a
+polynomial p, a particular solution is p - tau p' + tau^2 p'' - ..., and the transient decays as exp(-t /
+tau). The solution is assembled from the polynomial pieces of u, without sampling.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 def time_constant(bandwidth: float | None) -> float:
-    """Return the time constant, s, of a sensor of a bandwidth, Hz; 0 for None, a sensor without delay."""
+    """Return the time constant, s, of a sensor of a bandwidth, Hz; 0 for None (unlimited)."""
     return 0.0 if bandwidth is None else 1.0 / (2.0 * math.pi * bandwidth)
 
 
 def bandwidth_of(table: Readings) -> float | None:
-    """Return the bandwidth that a comment of a table tells, Hz; None where it tells of no limit."""
+    """Return the bandwidth stated in a comment of a table, Hz; None without a limit."""
     text = table.comments.get("bandwidth", "")
     if text in ("", "none", "unlimited"):
         return None
@@ -45,10 +45,10 @@ def bandwidth_of(table: Readings) -> float | None:
 
 
 def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) -> FloatArray:
-    """Return what the sensor shows of motions that were at rest until the first time, shape (n, columns).
+    """Filter motions that were at rest until the first time, shape (n, columns).
 
-    Displacements, m, and velocities, m/s, of several motions, or derivatives of them, are columns at
-    ascending times, s. Between the times the displacement is the cubic that has the given values and slopes.
+    Displacements, m, and velocities, m/s, of several motions, or their derivatives, are columns at ascending
+    times, s. Between the times the displacement is the cubic Hermite interpolant.
     """
     if tau == 0.0 or len(times) < 2:
         return x.copy()
@@ -67,9 +67,9 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
 
 
 def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArray:
-    """Return what the sensor shows of straight lines between ascending times, s, shape (n,).
+    """Filter a piecewise linear signal given at ascending times, s, shape (n,).
 
-    The sensor has settled at the first value.
+    The output is settled at the first value.
     """
     if tau == 0.0 or len(times) < 2:
         return values.copy()
@@ -83,10 +83,10 @@ def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArr
 
 
 def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:
-    """Return what the sensor shows at ascending times, s, of a waveform that is fired at time 0, A or N.
+    """Filter a waveform that is fired at time 0, A or N; return the output at ascending times, s.
 
-    The waveform is a segment table, see `printhammer.drive.segments`, whose support ends; the time constant
-    is more than 0 s.
+    The waveform is a segment table, see `printhammer.drive.segments`, with finite support; the time constant
+    is positive.
     """
     times = np.asarray(t, dtype=np.float64)
     result = np.zeros(len(times))
@@ -106,14 +106,14 @@ def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> Floa
 
 
 def _settled(row: list[float], s: FloatArray, tau: float) -> FloatArray:
-    """Return the solution for one segment that has no decaying part of its own."""
+    """Return the particular solution of the low-pass for one segment, without the transient."""
     _start, kind, p0, p1, p2, p3 = row
     if kind == POLYNOMIAL:
         value = p0 + s * (p1 + s * (p2 + s * p3))
         return value - tau * (p1 + s * (2 * p2 + s * 3 * p3) - tau * (2 * p2 + 6 * p3 * s - tau * 6 * p3))
     if kind == EXPONENTIAL:
         left = 1.0 - p2 * tau
-        # Where both decay alike the solution is s exp(-s / tau), the limit of this one.
+        # At equal decay rates the solution is s exp(-s / tau), the limit of the expression.
         left = left if abs(left) > 1e-6 else math.copysign(1e-6, left)
         return p0 + p1 / left * np.exp(-p2 * s)
     turn = p2 * tau

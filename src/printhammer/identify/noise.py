@@ -12,22 +12,22 @@ _MAD: Final = 1.482602218505602
 """Standard deviation of a normal distribution over its median absolute deviation."""
 _SPIKE: Final = 10.0
 _FAR: Final = 4.5
-"""Residuals of more standard deviations are outliers: of 100 000 normal ones, less than one."""
+"""Threshold of outliers, in standard deviations: exceeded by less than one of 100 000 normal residuals."""
 _LONGEST_MEMORY: Final = 8
 
 _CLIP: Final = 2.5
-"""Residuals count as no larger than this, in standard deviations, while the outliers are not known."""
+"""Clipping level of residuals, in standard deviations, while the outliers are unknown."""
 
 
 def robust_scale(values: FloatArray) -> float:
-    """Return the standard deviation of normal noise about 0 from its median absolute value."""
+    """Estimate the standard deviation of zero-mean normal noise from the median absolute value."""
     return _MAD * float(np.median(np.abs(values)))
 
 
 def noise_of_record(values: FloatArray) -> float:
-    """Return the standard deviation of the white noise in evenly spaced samples of something smoother.
+    """Estimate the standard deviation of white noise in evenly spaced samples of a smooth signal.
 
-    From third differences, which leave no parabola; their median does not see outliers or contacts.
+    Third differences remove a parabola; their median is insensitive to outliers and contacts.
     """
     if len(values) < 8:
         return 0.0
@@ -35,7 +35,7 @@ def noise_of_record(values: FloatArray) -> float:
 
 
 def running_median(values: FloatArray, width: int) -> FloatArray:
-    """Return the running median over an odd number of samples; at the ends that of the outermost ones."""
+    """Return the running median over an odd number of samples; the ends repeat the outermost medians."""
     half = width // 2
     windows = np.lib.stride_tricks.sliding_window_view(values, width)
     first, last = np.median(values[:width]), np.median(values[-width:])
@@ -43,22 +43,22 @@ def running_median(values: FloatArray, width: int) -> FloatArray:
 
 
 def spikes_of(values: FloatArray, noise: float) -> BoolArray:
-    """Return which samples of a record stand out of their neighbours, more than noise and slope explain."""
+    """Mask of the samples that differ from their neighbours by more than noise and slope explain."""
     middle = running_median(values, 5)
     padded = np.pad(middle, 2, mode="edge")
     return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
 
 
 def outliers_of(residuals: FloatArray, floor: float) -> BoolArray:
-    """Return which residuals of mostly good data are larger than normal noise, or the floor, has them."""
+    """Mask of the residuals beyond the outlier threshold, in robust standard deviations or `floor`."""
     return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
 
 
 def memory_factor(residuals: FloatArray) -> float:
-    """Return by how much the variance of a slow average exceeds that of independent residuals.
+    """Return the variance of a slow average relative to that of independent residuals.
 
-    An autoregressive process is fitted (Yule and Walker), its order by the Bayes criterion; the factor is its
-    spectrum at frequency 0 over its variance. 1 for white noise.
+    An autoregressive process is fitted (Yule-Walker equations), with its order by the Bayesian information
+    criterion; the factor is its spectral density at frequency 0 over its variance, 1 for white noise.
     """
     count = len(residuals)
     centred = residuals - residuals.mean() if count else residuals
@@ -70,7 +70,7 @@ def memory_factor(residuals: FloatArray) -> float:
     error = r[0]
     a = np.zeros(0)
     for order in range(1, longest + 1):
-        # Levinson's recursion.
+        # Levinson-Durbin recursion.
         reflection = (r[order] - a @ r[order - 1 : 0 : -1]) / error if order > 1 else r[1] / error
         a = np.append(a - reflection * a[::-1], reflection)
         error *= 1.0 - reflection * reflection
@@ -90,12 +90,12 @@ def variance_of(
     *,
     clipped: bool = False,
 ) -> FloatArray:
-    """Return the variance of each row, shape (m,), by maximum likelihood of its components.
+    """Estimate the variance of each row, shape (m,), by maximum likelihood of variance components.
 
-    Each step multiplies every component by the root of the ratio of what the residuals ask for to what they
-    have; a component that is not needed goes to zero. Each component has its `spread`, shape (m, q), in each
-    row; only the rows used count, and the parameters of the law take up as many residuals. Where the outliers
-    are not known yet, large residuals are clipped.
+    The iteration multiplies each component by the square root of the ratio of its observed to its expected
+    score; superfluous components tend to zero. `spread`, shape (m, q), holds the coefficients of the
+    components; only the used rows count, with a correction for the fitted `parameters`. With `clipped`, large
+    residuals are clipped, as long as the outliers are unknown.
     """
     from scipy.stats import chi2
 
@@ -106,7 +106,7 @@ def variance_of(
     first = robust_scale(residuals[used]) ** 2 if clipped else float(r2.mean())
     theta = np.full(g.shape[1], (first or float(r2.mean())) / g.shape[1])
     limit = _CLIP * _CLIP
-    # Mean of a squared normal number that is cut at the limit.
+    # Mean of a squared standard normal number that is clipped at the limit.
     mean = float(chi2.cdf(limit, 3) + limit * chi2.sf(limit, 1)) if clipped else 1.0
     share = len(r2) / (len(r2) - parameters) if len(r2) > parameters else 1.0
     for _ in range(500):
@@ -118,7 +118,7 @@ def variance_of(
         theta = theta * factor
         if np.abs(np.where(theta > 1e-9 * theta.max(), factor, 1.0) - 1.0).max() < 1e-6:
             break
-    # Weights that rest on a handful of residuals would follow their noise: no row counts 1e4 times another.
+    # A variance from a handful of residuals is unreliable: weights are limited to a ratio of 1e4.
     v = kept @ theta
     variance: FloatArray = np.maximum(v, 1e-4 * v.max())
     return variance

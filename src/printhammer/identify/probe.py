@@ -23,7 +23,7 @@ FIT: Final = "fit"
 """Setting of a probe error that is fitted."""
 
 NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0}
-"""Errors of a probe that has none, SI."""
+"""Errors of an ideal probe, SI."""
 
 UNITS: Final = {"offset": "A", "gain": "1", "delay": "s", "time constant": "s"}
 
@@ -36,15 +36,15 @@ SIGNS: Final = {
 """Advice for each undeclared probe error that a record shows."""
 
 _WIDEST: Final = 0.2
-"""Lower bound of a bandwidth that is fitted, over the reciprocal of the record."""
+"""Upper bound of a fitted time constant, as a fraction of the length of the longest record."""
 
 
 class ProbeError(Declared):
     """Probe error with its standard deviation."""
 
     name: str = part("offset, gain, delay or time constant")
-    value: float = part("SI")
-    deviation: float = part("standard deviation, SI; 0 where it is exact, infinite where it is free")
+    value: float = part("value, SI")
+    deviation: float = part("standard deviation, SI; 0 if exact, infinite if free")
 
     @property
     def is_fitted(self) -> bool:
@@ -58,16 +58,16 @@ class ProbeError(Declared):
 
     @property
     def text(self) -> str:
-        """Value with unit, and its standard deviation where it has one."""
+        """Value with unit, and with its standard deviation unless it is exact."""
         unit = UNITS[self.name]
         return f"{self.value!r} {unit}" + (f" +- {self.deviation:.3g} {unit}" if self.deviation else "")
 
 
 def read_probe(settings: Mapping[str, float | str | None], step: float) -> list[ProbeError]:
-    """Read the errors of a probe that are stated; `step` is the time between samples, s.
+    """Read the declared errors of a probe; `step` is the sampling interval, s.
 
-    Settings are "offset", A, "gain", "delay", s, and "bandwidth", Hz: a number or a text with a unit, a
-    value with its standard deviation such as "0 us +- 5 us", or "fit". Those that are None are not stated.
+    Settings are "offset", A, "gain", "delay", s, and "bandwidth", Hz: a number or a text with a unit, a value
+    with its standard deviation such as "0 us +- 5 us", or "fit". None means not declared.
     """
     errors = []
     for name, written in settings.items():
@@ -113,7 +113,7 @@ def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
 
 
 def resolution_of(values: FloatArray) -> float:
-    """Return the step of which readings are whole multiples; 0 where they have none, or too few repeat."""
+    """Return the quantisation step of readings; 0 if there is none, or if too few values repeat."""
     levels = np.unique(values)
     if len(levels) < 3 or len(levels) == len(values):
         return 0.0
@@ -127,7 +127,7 @@ _WHOLE: Final = 0.02
 
 
 def plateaus(fitted: FloatArray, series: IntArray, step: float) -> IntArray:
-    """Return the plateau of each row, ascending: rows that a law puts on the same step of the readings."""
+    """Return plateau indices: consecutive rows whose fitted values round to the same step share one."""
     code = np.rint(fitted / step)
     begins = (np.diff(code) != 0.0) | (np.diff(series) != 0)
     return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)

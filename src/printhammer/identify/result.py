@@ -1,4 +1,4 @@
-"""What a fit returns: constants with their uncertainty, and what the data say of the law."""
+"""Result of a fit: constants with their uncertainty, and diagnostics of data and law."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 CONFIDENCE: Final = 0.95
-"""Probability with which an interval is meant to contain the constant."""
+"""Confidence level of the intervals."""
 
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
-"""Laws whose constants are fitted, by role; of a magnet another one where the kind is "solenoid"."""
+"""Fitted law by role; the magnet has another one for the kind "solenoid"."""
 
 _BODIES: Final = (
     "radius1",
@@ -45,38 +45,37 @@ REPLACED: Final = {
     "backstop.stiffness": [f"backstop.{name}" for name in _BODIES],
     "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
-"""Constants from which another one follows, and which go where that one is given itself, by its key."""
+"""Constants that a stated constant, the key, replaces because they would determine it too."""
 
 
 HELD: Final = "held, the data do not determine it"
-"""Source of a constant that a fit held."""
+"""Source text of a constant that was held."""
 
 _SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}
-"""Units that make handy numbers of what a hammer has."""
+"""Units of display for constants in m, kg and s."""
 
 
 class FittedConstant(Declared):
-    """One constant that a fit has found."""
+    """One fitted constant."""
 
     key: str = part(
         'dotted key of the hammer file, such as "magnet.F0"; another name where `in_file` is false'
     )
-    value: float = part("SI")
-    standard_error: float = part("SI")
-    interval: tuple[float, float] = part("ends of the 95 % interval, SI")
+    value: float = part("value, SI")
+    standard_error: float = part("standard error, SI")
+    interval: tuple[float, float] = part("bounds of the 95 % interval, SI")
     unit: str = part("SI unit")
     in_file: bool = part(
-        "whether a hammer file has such a constant; a combination of constants, or an exponent, has no"
-        " place there",
+        "whether the constant has a key in a hammer file; combinations of constants and exponents have none",
         default=True,
     )
     how: str = part(
-        'how it was found if not by the fit to the files, such as "computed from radii and Young\'s moduli"',
+        'origin if not the fit to the files, such as "computed from radii and Young\'s moduli"',
         default="",
     )
     held: bool = part(
-        "whether the data do not determine it, so that it was held; the interval is where it could go, the"
-        " standard error infinite",
+        "whether the constant was held since the data do not determine it; the interval is then its range,"
+        " the standard error infinite",
         default=False,
     )
 
@@ -92,14 +91,14 @@ class FittedConstant(Declared):
         in_file: bool = True,
         how: str = "",
     ) -> Self:
-        """Make a constant with the 95 % interval of Student's t, of the freedom of the estimated noise."""
+        """Create a constant with its 95 % interval of Student's t for given degrees of freedom."""
         half = student(degrees_of_freedom) * float(standard_error)
         ends = float(value) - half, float(value) + half
         return cls(key, float(value), float(standard_error), ends, unit, in_file, how)
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """Value, standard error, interval and unit; as many digits as the error has meaning."""
+        """Value, standard error, interval and unit, with as many digits as are significant."""
         unit = _SHOWN_IN.get(self.unit, self.unit)
         value, error, low, high = (
             from_si(number, self.unit, unit) if math.isfinite(number) else number
@@ -115,95 +114,93 @@ class FittedConstant(Declared):
 
 
 class Profile(Declared, eq=False):
-    """How much worse the fit becomes where one constant is held at other values."""
+    """Profile of the weighted sum of squares over one constant, with the others refitted."""
 
     values: FloatArray = part("values at which the constant is held, SI, ascending, shape (n,)")
     increase: FloatArray = part(
-        "increase of the weighted sum of squares over its least value, in units of the noise variance;"
-        " all other constants are fitted again; shape (n,)"
+        "increase of the weighted sum of squares over its minimum, in units of the noise variance, with all"
+        " other constants refitted; shape (n,)"
     )
     interval: tuple[float, float] = part(
-        "ends of the 95 % interval where the increase reaches the square of Student's t, SI; infinite"
-        " where it does not"
+        "bounds of the 95 % interval, where the increase reaches the square of Student's t, SI; infinite"
+        " if it does not"
     )
 
 
 class Fit(Result):
-    """The result of a fit."""
+    """Fitted constants with covariance, residuals, test of the law and remarks."""
 
     kind: str = scalar(
-        "", "what was fitted", more='"magnet", "solenoid", "spring", "pack", "backstop", "motion" or "coil"'
+        "", "kind of the fit", more='"magnet", "solenoid", "spring", "pack", "backstop", "motion" or "coil"'
     )
     source: tuple[str, ...] = scalar("", "names of the files", more="without their folders")
     constants: Mapping[str, FittedConstant] = part("constants by key")
     keys: tuple[str, ...] = coordinate(
         "",
-        "constant of the covariance",
+        "constants of the covariance",
         "key",
         name="key",
-        more="a constant from which another one was computed may be missing",
+        more="may lack a constant from which another one was computed",
     )
     covariance: FloatArray = column("SI", "covariance of two constants", "key other_key")
-    abscissa: FloatArray = column("SI", "where the datum was measured", "datum")
+    abscissa: FloatArray = column("SI", "abscissa of the datum", "datum")
     data: FloatArray = column("SI", "datum", "datum")
-    fitted: FloatArray = column("SI", "the law there", "datum")
-    residuals: FloatArray = column("SI", "datum less law", "datum")
+    fitted: FloatArray = column("SI", "fitted law", "datum")
+    residuals: FloatArray = column("SI", "datum minus fitted law", "datum")
     axes: tuple[tuple[str, str], tuple[str, str]] = part(
         "name and SI unit of the abscissa and of the data",
         more='such as (("displacement", "m"), ("force", "N"))',
     )
     degrees_of_freedom: float = scalar(
-        "1", "data used less parameters fitted", more="less where residuals depend on each other"
+        "1", "number of data used minus fitted parameters", more="fewer if residuals are correlated"
     )
     residual_scale: float = scalar("", "standard deviation of the noise in the data", more="SI")
     weights: FloatArray = column(
         "1", "weight, proportional to 1 / variance", "datum", more="the largest is 1"
     )
-    outliers: BoolArray = column("1", "whether it was left out as too far off", "datum")
+    outliers: BoolArray = column("1", "whether the datum was excluded as an outlier", "datum")
     condition_number: float = scalar(
         "1",
-        "condition number of the Jacobian with columns of unit length",
-        more="large where constants cannot be told apart",
+        "condition number of the Jacobian with normalised columns",
+        more="large if constants are hard to distinguish",
     )
     series: IntArray = column(
-        "1", "place among the series", "datum", more="a current, a branch or a file of `series_names`"
+        "1", "index of the series", "datum", more="a current, a branch or a file in `series_names`"
     )
     series_names: tuple[str, ...] = scalar("", "names of the series, for the legend")
-    lines: IntArray = part("line of the file of each datum", more="empty where data are no rows")
+    lines: IntArray = part("line number of each datum in its file", more="empty if data are not rows")
     given: Mapping[str, str] = scalar(
         "",
-        "what was taken as known",
-        more="dotted key or a phrase, to its value with unit",
+        "constants taken as known",
+        more="dotted key or phrase, mapped to the value with unit",
         default_factory=dict,
     )
     indistinct: tuple[str, ...] = scalar(
-        "", "one sentence for each thing that the data cannot tell apart", default=()
+        "", "combinations that the data do not determine, one sentence each", default=()
     )
-    profiles: Mapping[str, Profile] = part(
-        "profiles of constants that are weakly determined", default_factory=dict
-    )
-    rejected: str = scalar("", "why the data reject the law", more="empty where they do not", default="")
+    profiles: Mapping[str, Profile] = part("profiles of weakly determined constants", default_factory=dict)
+    rejected: str = scalar("", "reason to reject the law", more="empty if it is not rejected", default="")
     p_value: float = scalar(
         "1",
-        "probability of data as far from the law as these if the law holds",
-        more="nan where it was not tested",
+        "probability of residuals at least as large if the law holds (p-value)",
+        more="NaN without a test",
         default=float("nan"),
     )
-    remarks: tuple[str, ...] = scalar("", "further sentences", default=())
+    remarks: tuple[str, ...] = scalar("", "remarks", default=())
     slopes: Mapping[str, FloatArray] = part(
-        "changes of the constants in `keys` with one that was taken as known but has an error, by its key;"
-        " SI, shape (n,)",
+        "derivatives of the constants in `keys` with respect to uncertain known constants, by key; SI,"
+        " shape (n,)",
         default_factory=dict,
     )
     records: tuple[str, ...] = part("fingerprints of the records of motion", default=())
 
     @property
     def title(self) -> str:
-        """One line that says what was fitted to what."""
+        """Title in one line."""
         return f"fit of the {self.kind} to {', '.join(self.source)}"
 
     def summary(self) -> Summary:
-        """Return the constants with their uncertainty, and what the data say of the law."""
+        """Tabulate the constants with their uncertainty, and summarise the diagnostics."""
         files = f"  {styled('dim', ' and '.join(self.source))}" if self.source else ""
         scale = f"residual scale {self.residual_scale:.3g} {self.axes[1][1]}"
         several = len(self.keys) > 1
@@ -270,7 +267,7 @@ class Fit(Result):
 
     @property
     def for_file(self) -> dict[str, dict[str, str | float]]:
-        """The constants that a hammer file has, as tables for `Hammer.replace`, with status and source."""
+        """Constants with a key in hammer files, as tables for `Hammer.replace` with status and source."""
         return {
             key: {
                 "value": constant.value,
@@ -285,18 +282,18 @@ class Fit(Result):
     @property
     def _laws(self) -> dict[str, str]:
         if self.kind == "coil":
-            # Any law of the magnet has a current.
+            # The coil current fits any magnet law.
             return {}
         return {**LAWS, "magnet": "reluctance"} if self.kind == "solenoid" else LAWS
 
     def _source(self, constant: FittedConstant) -> str:
-        """Return the source of a constant, such as "fitted to magnet.csv, standard error 0.02 N"."""
+        """Return the source text of a constant, such as "fitted to magnet.csv, standard error 0.02 N"."""
         how = constant.how or f"fitted to {' and '.join(self.source)}"
         error = constant.standard_error
         return f"{how}, standard error {error:.2g} {constant.unit}" if error and not constant.held else how
 
     def fragment(self) -> str:
-        """Return the constants as TOML text for a hammer file, with comments on what they hold for."""
+        """Render the constants as TOML for a hammer file, with comments on their validity."""
         from printhammer.hammer.edit import changed_text
 
         files = f", fitted to {' and '.join(self.source)}" if self.source else ""
@@ -309,11 +306,11 @@ class Fit(Result):
         sections = {key.rpartition(".")[0]: None for key in constants}
         laws = [(f"{section}.law", self._laws[section]) for section in sections if section in self._laws]
         comments = "".join(f"# {' '.join(remark.split())}\n" for remark in remarks)
-        # Tables come last, or the constants at the top would become theirs.
+        # Tables come last, since a key after a table header would belong to that table.
         return changed_text(comments, sorted([*laws, *constants.items()], key=lambda edit: "." in edit[0]))
 
     def covariance_table(self) -> str:
-        """Return the covariance as CSV: a row and a column for each constant, SI, units in comments."""
+        """Render the covariance as CSV: one row and column per constant, SI, with units in comments."""
         lines = [f"# unit of {key}: {self.constants[key].unit}" for key in self.keys]
         lines.append(",".join(["constant", *self.keys]))
         for key, row in zip(self.keys, self.covariance, strict=True):
@@ -321,15 +318,16 @@ class Fit(Result):
         return "\n".join(lines) + "\n"
 
     def into(self, hammer: Hammer) -> Hammer:
-        """Return a hammer with the constants replaced by those found.
+        """Return a copy of a hammer with the fitted constants.
 
         Raises
         ------
         InputError
-            The hammer has another law for the part, or takes as different what the fit took as known.
+            A law of the hammer differs from the fitted one, or a constant differs from the value taken as
+            known.
         """
         known = hammer.constants
-        # What was held as the hammer has it stays as it is there, with its source.
+        # A held constant at the hammer's own value keeps its source there.
         constants = {
             key: table
             for key, table in self.for_file.items()
@@ -355,7 +353,7 @@ class Fit(Result):
         )
 
     def _uncertainty(self, hammer: Hammer, set_anew: set[str]) -> dict[str, Any] | None:
-        """Return how well a hammer with the constants is known: these, the others, and both together."""
+        """Return the uncertainty table of the updated hammer, for fitted and remaining constants."""
         own = [key for key, each in self.constants.items() if each.in_file and not each.held]
         before = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
         rest = before.without(set_anew)
@@ -379,7 +377,7 @@ class Fit(Result):
 
     @property
     def report(self) -> list[str]:
-        """What there is to say, line by line."""
+        """The result as lines of text."""
         lines = []
         for constant in self.constants.values():
             low, high = constant.interval
@@ -405,13 +403,13 @@ class Fit(Result):
         return [*lines, *self.indistinct, *self.remarks]
 
     def outlier_lines(self, most: int = 20) -> str:
-        """Say which rows were left out; of several files, also to which series each belongs."""
+        """List the excluded rows as text, with their series if there are several files."""
         rows = [int(row) for row in np.flatnonzero(self.outliers)]
         count = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
         if not len(self.lines):
             return count
         series = [int(self.series[row]) for row in rows]
-        # Rows that follow one another in a series are one stretch, from its first line to its last.
+        # Consecutive rows of a series are listed as a range of lines.
         starts = [
             k for k, row in enumerate(rows) if k == 0 or row != rows[k - 1] + 1 or series[k] != series[k - 1]
         ]
@@ -430,15 +428,15 @@ class Fit(Result):
 
 
 def with_error(fit: Fit, key: str, error: float, slopes: list[float]) -> Fit:
-    """Return a fit whose constants also have the error of one that was taken as known.
+    """Return a copy of a fit with the uncertainty of a known constant propagated.
 
-    `slopes` are their changes with it, for each of `Fit.keys`; all SI.
+    `slopes` are the derivatives of the constants in `Fit.keys` with respect to the known constant; all SI.
     """
     slope = np.array(slopes)
     constants = dict(fit.constants)
     for each, change in zip(fit.keys, slope.tolist(), strict=True):
         constant, added = fit[each], abs(change) * error
-        # The error of what was known is normal, that of the fit has Student's t of its own freedom.
+        # The known constant's error is normal, the fit's has Student's t; the half-widths add in quadrature.
         half = math.hypot(0.5 * (constant.interval[1] - constant.interval[0]), student(math.inf) * added)
         constants[each] = replace(
             constant,
@@ -463,7 +461,7 @@ def student(degrees_of_freedom: float) -> float:
 
 
 def _agrees(hammer: Hammer, key: str, text: str) -> None:
-    """Refuse a hammer whose constant is another than the one that the fit took as known."""
+    """Raise `InputError` if the hammer's constant differs from the value that the fit took as known."""
     from printhammer.units import parse
 
     known = hammer.constants.get(key)

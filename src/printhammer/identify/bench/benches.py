@@ -1,17 +1,17 @@
-"""The benches of the laboratory: what is there to be measured of a hammer, without any error of a sensor.
+"""The benches of the synthetic laboratory: true values of each measurement, before sensor errors.
 
 magnet
-    Armature held at a grid of displacements and currents, pack absent: the force of magnet and spring.
+    Armature held on a grid of displacements and currents, pack absent: force of magnet and spring.
 spring
-    The same without the magnet.
+    The same with the magnet removed.
 pack
     Slow load cycles to several indentations: the loading branch up, the unloading branch down.
 backstop
-    The armature alone thrown at the backstop at several speeds: the speed with which it comes back.
+    The armature alone thrown at the backstop at several speeds: rebound speed.
 motion
-    One shot from rest: displacement and current, a while before the firing included.
+    One shot from rest: displacement and current, from shortly before the firing.
 current
-    The current of one shot whose driver is a voltage, the armature free or locked.
+    Current of one shot of a voltage driver, with the armature free or locked.
 """
 
 from __future__ import annotations
@@ -38,49 +38,49 @@ from printhammer.run.window import CYCLE, wait_of
 from printhammer.support.arrays import FloatArray
 
 DISPLACEMENTS: Final = 31
-"""Places at which the armature is held, from the backstop to the platen."""
+"""Default number of displacements, from the backstop to the platen."""
 
 CURRENTS: Final = 6
 HIGHEST_CURRENT: Final = 1.25
-"""Number of currents, and the highest one in units of the peak of the waveform."""
+"""Default number of currents, and the highest current relative to the peak of the waveform."""
 
 PEAKS: Final = (0.3, 0.45, 0.6)
-"""Largest indentations of the load cycles, in units of the thickness of the pack."""
+"""Default peak indentations of the load cycles, relative to the thickness of the pack."""
 
 BRANCH_POINTS: Final = 30
-"""Readings on one branch of a load cycle."""
+"""Default number of readings per branch of a load cycle."""
 
 SPEEDS: Final = (0.1, 2.0, 40)
-"""Slowest and fastest impact on the backstop, m/s, and the number of impacts."""
+"""Default slowest and fastest impact on the backstop, m/s, and number of impacts."""
 
 BEFORE: Final = 100e-6
-"""Time before the firing from which on a shot is recorded, s."""
+"""Default time between the start of the record and the firing, s."""
 
 _FINEST: Final = 0.5e-6
-"""Largest step of the displacement that goes through the sensor, s: a hundredth of a contact."""
+"""Largest time step of the displacement for the low-pass, s: a hundredth of a contact."""
 
 _MOST: Final = 2_000_000
-"""Steps of a record, which bound its room in the memory."""
+"""Largest number of steps in a record, which bounds the memory."""
 
 _RUN_UP: Final = 10e-6
-"""Way before the backstop, m; without any force it changes nothing."""
+"""Starting distance from the backstop, m; without forces its value does not matter."""
 
 _LONGEST: Final = 30
-"""Doublings of the time that a rebound is given."""
+"""Maximum number of doublings of the simulation time for a rebound."""
 
 _LEAST: Final = 1e-6
-"""Restitution below which no backstop is taken for one that sends the armature back."""
+"""Smallest restitution in the search for a rebound."""
 
 
 class Bench(Declared, eq=False):
-    """What is there to be measured."""
+    """True values of one measurement, before sensor errors."""
 
-    what: str = part("one line that says what is measured, and how")
+    what: str = part("description of the measurement in one line")
     true: dict[str, FloatArray] = part("columns by name, SI, before noise and resolution, shape (rows,)")
-    suspect: str = part("column in which wrong readings occur")
-    words: dict[str, tuple[str, ...]] = part("columns of words", default_factory=dict)
-    exact: tuple[str, ...] = part("columns that have no error, such as the time", default=())
-    notes: dict[str, str] = part("comments that a fit of the table reads", default_factory=dict)
+    suspect: str = part("column in which gross errors occur")
+    words: dict[str, tuple[str, ...]] = part("text columns", default_factory=dict)
+    exact: tuple[str, ...] = part("columns without errors, such as the time", default=())
+    notes: dict[str, str] = part("comments that a fit reads from the table", default_factory=dict)
 
 
 def magnet(
@@ -90,7 +90,7 @@ def magnet(
     displacements: npt.ArrayLike | None = None,
     currents: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Hold the armature at displacements, m, with currents, A, in the coil."""
+    """Measure the force with the armature held at displacements, m, at coil currents, A."""
     if hammer.magnet is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [magnet]",
@@ -125,7 +125,7 @@ def spring(
     *,
     displacements: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Hold the armature at displacements, m, with the magnet taken out."""
+    """Measure the force with the armature held at displacements, m, and the magnet removed."""
     if hammer.spring is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [spring]",
@@ -149,7 +149,7 @@ def pack(
     peaks: npt.ArrayLike | None = None,
     points: int = BRANCH_POINTS,
 ) -> Bench:
-    """Press the pack to largest indentations, m, each on fresh paper, and let it go."""
+    """Measure load cycles of the pack to peak indentations, m, each on fresh paper."""
     if hammer.pack is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [pack]", file=hammer.path, key="pack", expected="one to press"
@@ -187,7 +187,7 @@ def pack(
 
 
 def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = None) -> Bench:  # noqa: ARG001
-    """Throw the armature alone at the backstop with speeds, m/s."""
+    """Measure rebound speeds of the armature alone, thrown at the backstop at `speeds`, m/s."""
     if hammer.backstop is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [backstop]",
@@ -211,7 +211,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
 def motion(
     hammer: Hammer, sensor: Sensor, *, duration: float | str | None = None, before: float | str = BEFORE
 ) -> Bench:
-    """Record one shot from rest for a duration after the firing, s, and a while before, s."""
+    """Record one shot from rest, from `before`, s, before the firing to `duration`, s, after it."""
     from printhammer.drive.trains import PulseTrain
 
     if hammer.waveform is None:
@@ -251,7 +251,7 @@ def current(
     before: float | str = BEFORE,
     locked: float | str | None = None,
 ) -> Bench:
-    """Record the current of one shot by voltage, the armature free or locked at a displacement, m."""
+    """Record the coil current of one shot by voltage, the armature free or locked at a displacement, m."""
     from printhammer.drive.input import read_number
 
     check_driver(hammer)
@@ -280,7 +280,7 @@ BENCHES: Final[dict[str, Callable[..., Bench]]] = {
 def _record(
     sensor: Sensor, duration: float | str | None, before: float | str, least: float = CYCLE
 ) -> tuple[int, int, float, float]:
-    """Return the first and the last sample of a record, their rate, Hz, and the duration, s."""
+    """Return the first and last sample index of a record, the sampling rate, Hz, and the duration, s."""
     from printhammer.drive.input import read_number, read_positive
 
     rate = sensor.sampling_rate
@@ -355,7 +355,7 @@ def _peaks(hammer: Hammer) -> FloatArray:
 
 
 def _rebound(bare: Hammer, speed: float) -> float:
-    """Return the speed, m/s, with which an armature without other forces leaves its backstop."""
+    """Compute the speed, m/s, at which an armature without other forces leaves the backstop."""
     part = bare.backstop
     if isinstance(part, HertzBackstop):
         from scipy.optimize import brentq
@@ -364,7 +364,7 @@ def _rebound(bare: Hammer, speed: float) -> float:
         if damping == 0.0:
             return speed
 
-        # The exact law of a free rebound, equations (6) and (7), falls with the restitution.
+        # Closed form of a free rebound, equations (6) and (7): the damping falls with the restitution.
         def excess(e: float) -> float:
             return damping_from_restitution(k, e, speed) / damping - 1.0
 

@@ -1,8 +1,8 @@
-"""The synthetic laboratory: measurements of a hammer, with the errors of real sensors and a seed.
+"""The synthetic laboratory: simulated measurements of a hammer with realistic sensor errors.
 
-What there is to be seen of a hammer is computed (`benches`), goes through the sensors (`sensor`), and becomes
-a table like those that a laboratory hands in. Every kind of measurement and every column has its own random
-numbers, so that none disturbs another.
+True values are computed (`benches`), pass through the sensors (`sensor`), and become a table like those of a
+real laboratory. Each kind of measurement and each column has its own random number stream, so that a change
+of one does not affect the others.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 KINDS: Final = tuple(BENCHES)
-"""What can be measured."""
+"""Kinds of measurements."""
 
 UNITS: Final = {
     "displacement": ("m", "um"),
@@ -45,14 +45,14 @@ UNITS: Final = {
     "rebound speed": ("m/s", "m/s"),
     "time": ("s", "us"),
 }
-"""SI unit of each column, and the unit in which it is written."""
+"""SI unit of each column, and its unit in files."""
 
 SI: Final = {name: si for name, (si, _unit) in UNITS.items()}
 """SI unit of each column."""
 
 SAMPLING_RATE: Final = 1e6
 BANDWIDTH: Final = 200e3
-"""Of the record of a shot, Hz."""
+"""Default sampling rate and bandwidth of a record, Hz."""
 
 _LENGTH: Final = Channel(noise=Amount(0.2e-6), resolution=Amount(0.05e-6))
 _FORCE: Final = Channel(noise=Amount(0.005, FULL_SCALE), resolution=Amount(0.0005, FULL_SCALE))
@@ -67,31 +67,27 @@ SENSORS: Final = {
     "motion": Sensor({"displacement": _LENGTH, "current": _CURRENT}, SAMPLING_RATE, BANDWIDTH),
     "current": Sensor({"current": _CURRENT}, SAMPLING_RATE, BANDWIDTH),
 }
-"""The sensors of an ordinary bench, by what is measured."""
+"""Default sensors by kind of measurement."""
 
 
 class Measurement(Result):
-    """One table of measurements."""
+    """One table of simulated measurements."""
 
-    kind: str = scalar("", "what was measured", more=f"{', '.join(BENCHES)}")
-    comments: dict[str, str] = scalar(
-        "", "what was measured, of which hammer, with what sensors and which seed"
-    )
+    kind: str = scalar("", "kind of measurement", more=f"{', '.join(BENCHES)}")
+    comments: dict[str, str] = scalar("", "description of measurement, hammer, sensors and seed")
     values: dict[str, FloatArray] = part("readings by column, SI")
-    words: dict[str, tuple[str, ...]] = part("columns of words")
-    true: dict[str, FloatArray] = part(
-        "what noise, resolution, offset and wrong readings have been added to, SI"
-    )
-    outliers: IntArray = part("rows with a wrong reading")
-    hammer: Hammer = part("what was measured")
+    words: dict[str, tuple[str, ...]] = part("text columns")
+    true: dict[str, FloatArray] = part("true values, before noise, resolution, offset and gross errors, SI")
+    outliers: IntArray = part("indices of the rows with gross errors")
+    hammer: Hammer = part("measured hammer")
 
     @property
     def title(self) -> str:
-        """One line that says what was measured."""
+        """Title in one line."""
         return f"measurement of the {self.kind} of {self.hammer.name}"
 
     def entries(self) -> Entries:
-        """Return readings and words, what they were without the sensors as `true_force`, and `wrong`."""
+        """Return readings and text columns, true values such as `true_force`, and the mask `wrong`."""
         entries: Entries = {}
         for name, readings in self.values.items():
             key, si = name.replace(" ", "_"), SI[name]
@@ -104,14 +100,14 @@ class Measurement(Result):
         return entries | {"wrong": (Column("1", "whether the reading is wrong", ("row",)), wrong)}
 
     def to_csv(self) -> str:
-        """Return the table as CSV: comments, a heading with units, the rows."""
+        """Render the table as CSV: comments, a heading with units, the rows."""
         from printhammer.units import from_si
 
         lines = [f"# {key}: {value}" for key, value in self.comments.items()]
         columns = []
         for name, values in self.values.items():
             si, unit = UNITS[name]
-            # Fifteen digits leave out what only the binary numbers add.
+            # Fifteen digits, so that binary rounding does not show.
             columns.append([f"{from_si(value, si, unit):.15g}" for value in values.tolist()])
         columns += [list(words) for words in self.words.values()]
         lines.append(",".join([*(f"{name} [{UNITS[name][1]}]" for name in self.values), *self.words]))
@@ -134,29 +130,29 @@ def measure(
     seed: int = 0,
     **bench: Any,
 ) -> Measurement:
-    """Measure a hammer on a bench.
+    """Simulate a measurement of a hammer on a bench.
 
     Parameters
     ----------
     kind : str
-        "magnet": static force of magnet and spring over displacement and current; "spring": that of the
-        spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": the record of one shot;
-        "current": that of a current probe in one shot by voltage.
+        "magnet": static force of magnet and spring over displacement and current; "spring": force of the
+        spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": record of one shot;
+        "current": record of a current probe in one shot by voltage.
     sensor : Sensor or mapping, optional
-        By default that of an ordinary bench, `SENSORS`; or what is different there, such as
-        {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `sensor_settings.adjusted`.
+        Sensors; by default `SENSORS`. A mapping states only the differences from these, such as
+        {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `printhammer.identify.bench.sensor.adjusted`.
     seed : int, optional
-        Of the random numbers; the same seed gives the same table.
+        Seed of the random number generator; the same seed gives the same table.
     **bench
-        What is measured where, in SI: `displacements`, `currents` (magnet); `displacements` (spring);
-        `peaks`, the largest indentations, and `points` of a branch (pack); `speeds` (backstop); `duration`
-        and `before`, the time before the firing (motion, current); `locked`, where the armature is held
+        Options of the bench, in SI: `displacements`, `currents` (magnet); `displacements` (spring); `peaks`,
+        the peak indentations, and `points` per branch (pack); `speeds` (backstop); `duration` and `before`,
+        the time before the firing (motion, current); `locked`, the displacement at which the armature is held
         (current).
 
     Raises
     ------
     InputError
-        There is no such kind, or the hammer lacks what is to be measured.
+        The kind is unknown, or the hammer lacks the part to be measured.
     """
     if kind not in BENCHES:
         raise InputError.of("kind", kind, f"one of {', '.join(KINDS)}")

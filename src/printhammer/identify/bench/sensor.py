@@ -1,10 +1,9 @@
-"""What sensors make of a quantity: noise, resolution, a zero offset, and readings that are wrong altogether.
+"""Sensor errors: noise, resolution, zero offset, and gross errors.
 
     reading = resolution * round((true + offset + noise) / resolution)
 
-The noise is white and normal. A limited bandwidth acts before all this, see `printhammer.identify.lowpass`.
-
-Sensors as a user describes them: text with units, by quantity.
+The noise is white and normal. A limited bandwidth acts first, see `printhammer.identify.lowpass`. Users
+describe sensors by text with units, per quantity.
 """
 
 from __future__ import annotations
@@ -27,17 +26,17 @@ FULL_SCALE: Final = "of full scale"
 READING: Final = "of reading"
 
 _WRONG: Final = 0.1
-"""Standard deviation of what is added to a wrong reading, of full scale."""
+"""Standard deviation of a gross error, as a fraction of full scale; arbitrary."""
 
 
 @dataclass(frozen=True)
 class Amount:
-    """A size in SI, or a share of the full scale or of the reading."""
+    """A size in SI, or a fraction of full scale or of the reading."""
 
     size: float = 0.0
-    """SI, or the share."""
+    """Size in SI, or the fraction."""
     of: str = ""
-    """Empty for SI, "of full scale", which is the largest true value, or "of reading"."""
+    """Empty for SI; "of full scale", the largest true value; or "of reading"."""
 
     @classmethod
     def read(cls, text: str | float, si: str, name: str, *, signed: bool = False) -> Amount:
@@ -58,18 +57,18 @@ class Amount:
         return cls(size, of)
 
     def at(self, true: FloatArray) -> FloatArray:
-        """Return the size at each true value, SI, shape of `true`."""
+        """Return the size at each true value, SI, with the shape of `true`."""
         if self.of == READING:
             return self.size * np.abs(true)
         return np.full(true.shape, self.size * (full_scale(true) if self.of else 1.0))
 
 
 class Channel(Declared):
-    """One quantity as it is read."""
+    """Sensor errors of one quantity."""
 
-    noise: Amount = part("standard deviation of white, normal noise", default_factory=Amount)
+    noise: Amount = part("standard deviation of the noise; white, normal", default_factory=Amount)
     resolution: Amount = part("step of the readings; 0 for none", default_factory=Amount)
-    offset: Amount = part("what is read at zero", default_factory=Amount)
+    offset: Amount = part("zero offset", default_factory=Amount)
 
     def __post_init__(self) -> None:
         if self.resolution.of == READING:
@@ -78,19 +77,20 @@ class Channel(Declared):
             )
 
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
-        """Return what is read of true values, SI, with standard normal numbers for the noise, shape (n,)."""
+        """Return the readings of true values, SI, with standard normal numbers for the noise, shape (n,)."""
         shown = true + self.offset.at(true) + self.noise.at(true) * normal
         return self.rounded(shown, true)
 
     def rounded(self, shown: FloatArray, true: FloatArray) -> FloatArray:
-        """Return readings in whole steps of the resolution, with the full scale of `true`."""
+        """Round readings to whole steps of the resolution, for the full scale of `true`."""
         step = self.step(full_scale(true))
         return np.rint(shown / step) * step if step > 0.0 else shown
 
     def step(self, full: float) -> float:
         """Return the step of the readings, SI, for a full scale, SI.
 
-        A share of the full scale is rounded down to 1, 2 or 5 times a power of ten, as instruments have it.
+        A fraction of full scale is rounded down to 1, 2 or 5 times a power of ten, as is usual for
+        instruments.
         """
         if not self.resolution.of:
             return self.resolution.size
@@ -102,7 +102,7 @@ class Channel(Declared):
         return float(f"{digit}e{power}")
 
     def described(self, si: str, unit: str, full: float) -> str:
-        """Return noise, resolution and offset as text in a unit, for a full scale, SI."""
+        """Describe noise, resolution and offset in words, in a unit, for a full scale, SI."""
         from printhammer.units import from_si
 
         def absolute(size: float) -> str:
@@ -120,16 +120,16 @@ class Channel(Declared):
 
 @dataclass(frozen=True)
 class Sensor:
-    """The sensors of one bench."""
+    """Sensors of one bench."""
 
     channels: Mapping[str, Channel]
     """By quantity: "displacement", "indentation", "current", "force", "impact speed", "rebound speed"."""
     sampling_rate: float | None = None
-    """Of records, Hz; None on a bench without records."""
+    """Sampling rate of records, Hz; None for a bench without records."""
     bandwidth: float | None = None
-    """-3 dB frequency of a first-order low-pass before the sampling of records, Hz; None for none."""
+    """-3 dB frequency of a first-order low-pass before sampling, Hz; None for no limit."""
     outliers: float = 0.0
-    """Share of the rows whose measured quantity is wrong."""
+    """Fraction of rows whose measured quantity has a gross error."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
@@ -140,21 +140,21 @@ class Sensor:
             raise InputError.of("outliers", self.outliers, "a share from 0 to 0.5", said=" is expected to be")
 
     def exact(self) -> Sensor:
-        """Return sensors without errors: no noise, resolution, offset, bandwidth or outliers."""
+        """Return a copy without errors: no noise, resolution, offset, bandwidth limit or outliers."""
         return replace(
             self, channels={name: Channel() for name in self.channels}, bandwidth=None, outliers=0.0
         )
 
 
 def full_scale(true: FloatArray) -> float:
-    """Return the largest true value without its sign, SI."""
+    """Return the largest absolute true value, SI."""
     return float(np.abs(true).max()) if true.size else 0.0
 
 
 def wrong_rows(share: float, true: FloatArray, rng: np.random.Generator) -> tuple[IntArray, FloatArray]:
-    """Draw which readings, a share of all, are wrong, ascending, and by how much.
+    """Draw the rows with gross errors, ascending, and the errors, SI.
 
-    Errors are normal, a tenth of the full scale of what is there, SI.
+    The errors are normal, with a standard deviation of a tenth of full scale.
     """
     count = int(share * len(true) + 0.5)
     rows = np.sort(rng.permutation(len(true))[:count])
@@ -162,25 +162,25 @@ def wrong_rows(share: float, true: FloatArray, rng: np.random.Generator) -> tupl
 
 
 NONE: Final = "none"
-"""What a bandwidth is called that does not limit anything."""
+"""Text for an unlimited bandwidth."""
 
 PARTS: Final = ("noise", "resolution", "offset")
-"""What every quantity has."""
+"""Error settings of every quantity."""
 
 _OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
 
 
 def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, str]) -> Sensor:
-    """Return a sensor with settings changed; `units` are the SI units of the quantities.
+    """Return a copy of a sensor with other settings; `units` are the SI units of the quantities.
 
-    Settings are "noise", "resolution", "offset": mapping of quantity to amount, such as {"force": "0.5 %"};
-    "sampling_rate", "bandwidth": "100 kHz" or a number in Hz, "none" for no limit; "outliers": share, "2 %"
-    or 0.02; "exact": True to begin without any error.
+    Settings are "noise", "resolution", "offset": a mapping of quantity to amount, such as {"force": "0.5 %"};
+    "sampling_rate" and "bandwidth": "100 kHz" or a number in Hz, "none" for no limit; "outliers": a
+    fraction, "2 %" or 0.02; "exact": True to start from a sensor without errors.
 
     Raises
     ------
     InputError
-        A setting or quantity is not known, or the value is not what it should be.
+        A setting or quantity is unknown, or a value is invalid.
     """
     for name in settings:
         if name not in (*PARTS, *_OTHERS):
@@ -213,7 +213,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings that are about what a sensor has: its quantities, and records if it makes them."""
+    """Return the settings that apply to a sensor: its quantities, and records if it makes any."""
     kept = dict(settings)
     for role in PARTS:
         if role in kept:
@@ -225,14 +225,14 @@ def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
-    """Read settings such as "force=0.5 %" or "0.2 um", which goes to all quantities of its dimension.
+    """Parse settings such as "force=0.5 %", or "0.2 um" for all quantities of that dimension.
 
-    The text of the amount is returned by quantity; `part`, such as "noise", is for messages.
+    Returns the text of the amount by quantity; `part`, such as "noise", is used in messages.
 
     Raises
     ------
     InputError
-        A quantity is not known, given twice, or none has the dimension.
+        A quantity is unknown or set twice, or no quantity has the dimension.
     """
     amounts: dict[str, str] = {}
     for text in texts:
