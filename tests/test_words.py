@@ -33,6 +33,7 @@ ROOMS = (
     "errors",
     "figures",
     "hammer",
+    "identify",
     "kernel/lanes",
     "kernel/methods",
     "kernel/model",

@@ -1,15 +1,13 @@
-"""A hammer of a data sheet: each constant is the sheet's, derived from it, or assumed, and says which.
+"""Build a hammer from a data sheet; each constant states whether it is printed, derived or assumed.
 
 The armature rests at the backstop at 0 and is pulled through the stroke to its end, where the gap is
-`end_gap`. What it strikes, there or at `target`, is a spring and a dashpot with the restitution of the sheet,
-so stiff that the work of the magnet presses it in by a quarter of the gap that is left.
+`end_gap`. What it strikes, there or at `target`, is a spring with a dashpot of the sheet's restitution, so
+stiff that the work of the magnet indents it by a quarter of the remaining gap.
 
-The magnet of a data sheet: the reluctance law whose forces and inductance are those that a maker prints.
-
-A sheet has a few forces at one current, where the law has seven constants. So what the sheet does not settle
-is held near what such devices have: every constant but the area has a guess and a spread, in logarithms, and
-the sum of squared misfits of forces, inductance and guesses is made least. A constant that comes out much
-less uncertain than its guess was is derived; another one is assumed.
+The magnet follows the reluctance law. A sheet has a few forces at one current, whereas the law has seven
+constants, so the fit is a maximum a posteriori estimate: every constant but the pole area has a log-normal
+prior typical of such devices, and the sum of squared misfits of forces, inductance and priors is minimised. A
+constant that ends up much less uncertain than its prior is marked as derived, another one as assumed.
 """
 
 from __future__ import annotations
@@ -34,18 +32,18 @@ from printhammer.support.roots import bisect
 from printhammer.units import split
 
 FORCE_ERROR: Final = 0.03
-"""Relative error of a printed force."""
+"""Relative standard error of a printed force; assumed."""
 
 INDUCTANCE_ERROR: Final = 0.05
-"""Relative error of a printed inductance."""
+"""Relative standard error of a printed inductance; assumed."""
 
 DERIVED: Final = 0.5
-"""Of its guess's spread: a constant that is less uncertain than this is derived."""
+"""Posterior over prior standard deviation below which a constant counts as derived."""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """What such devices have."""
+    """Log-normal prior of a constant, typical of such devices."""
 
     value: float
     spread: float
@@ -63,54 +61,54 @@ GUESSES: Final = {
     "fringe": Guess(0.5, 0.7, "flanks that fringe half as high as the pole's radius, within a factor 2"),
     "leakage": Guess(0.3, 1.0, "a third of the printed inductance passes the armature, within a factor e"),
 }
-"""Constants in the terms in which devices of all sizes are alike; core is a gap, leakage a share."""
+"""Priors, in terms in which devices of all sizes are similar; `core` is a gap, `leakage` a fraction."""
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """What a data sheet says of the magnet, SI."""
+    """Magnet data of a sheet, SI."""
 
     current: float
     """Current of the forces, A."""
     gaps: FloatArray
     forces: FloatArray
-    """Gaps, m, and forces there, N."""
+    """Gaps, m, and forces at these gaps, N."""
     inductance: tuple[float, float] | None
     """Inductance at small currents, H, and the gap where it was measured, m."""
     turns: float | None
     area: float | None
-    """Area of the pole face, m^2; like the turns None where the sheet does not tell."""
+    """Area of the pole face, m^2; like the turns, None if not stated."""
     residual_gap: float | None
-    """Air in series with the gap, m; None where the sheet does not tell."""
+    """Air gap in series with the working gap, m; None if not stated."""
     closed_at: float
     """Displacement at which the gap is closed, m."""
 
 
 @dataclass(frozen=True)
 class SheetMagnet:
-    """A magnet and how its constants came about."""
+    """A fitted magnet, and the origin of its constants."""
 
     part: ReluctanceMagnet
     derived: dict[str, float]
-    """Constants that the sheet settles, with their relative standard errors."""
+    """Constants that the sheet determines, with their relative standard errors."""
     assumed: dict[str, str]
-    """The others, with what was assumed."""
+    """Assumed constants, with the assumption."""
     forces: FloatArray
     """Forces of the law at the gaps of the sheet, N."""
     misfit: float
-    """Largest relative deviation of these."""
+    """Largest relative deviation of these forces from the sheet."""
     inductance: float
-    """Inductance of the law at small currents at full gap or where it was measured, H."""
+    """Inductance of the law at small currents, at the gap of the sheet's inductance or the full gap, H."""
 
 
 def fit_magnet(sheet: Sheet) -> SheetMagnet:
-    """Fit the reluctance law to a data sheet."""
+    """Fit the reluctance law to a data sheet by maximum a posteriori estimation."""
     from scipy.optimize import least_squares
 
     known = {"turns": sheet.turns is not None, "leakage": sheet.inductance is None}
     known["residual_gap"] = sheet.residual_gap is not None
     names = [name for name in GUESSES if not known.get(name)]
-    # The area that the force at the widest gap would have without fringe and iron.
+    # Pole area from the force at the widest gap, without fringe and iron.
     widest = int(np.argmax(sheet.gaps))
     open_gap = float(sheet.gaps[widest]) + GUESSES["residual_gap"].value
     turned = (sheet.turns or GUESSES["turns"].value) * sheet.current
@@ -152,14 +150,14 @@ def fit_magnet(sheet: Sheet) -> SheetMagnet:
 
 
 def forces_of(part: ReluctanceMagnet, sheet: Sheet) -> FloatArray:
-    """Return the forces of a magnet at the gaps of a sheet, N."""
+    """Compute the forces of a magnet at the gaps of a sheet, N."""
     c = part.packed(0.0)
     places = (sheet.closed_at - sheet.gaps).tolist()
     return np.array([law.magnet_force(c, place, sheet.current) for place in places])
 
 
 def inductance_of(part: ReluctanceMagnet, sheet: Sheet) -> float:
-    """Return the inductance of a magnet at small currents, H, at the gap of the sheet's or the widest one."""
+    """Compute the inductance at small currents, H, at the gap of the sheet's inductance or the widest gap."""
     gap = float(sheet.gaps.max()) if sheet.inductance is None else sheet.inductance[1]
     return law.magnet_inductance(part.packed(0.0), sheet.closed_at - gap, 0.0)
 
@@ -170,7 +168,7 @@ def _described(
     spread: dict[str, float],
     forces: Callable[[ReluctanceMagnet, Sheet], FloatArray],
 ) -> SheetMagnet:
-    """Sort the constants into derived and assumed ones."""
+    """Classify the constants as derived or assumed."""
     key = {
         "turns": "turns",
         "residual_gap": "residual_gap",
@@ -194,22 +192,21 @@ def _described(
 
 
 RESTITUTION: Final = 0.3
-"""Of a stop whose sheet does not tell: steel on steel with a thin film between."""
+"""Assumed restitution of a stop: steel on steel with a thin film between."""
 
 INDENTATION: Final = 0.25
-"""Part of the gap left by which the work of the magnet presses in what is struck."""
+"""Fraction of the remaining gap by which the work of the magnet indents the target; assumed."""
 
 _GRID: Final = 200
 
 
 def hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
-    """Make a hammer of a data sheet; return it, and how well its magnet fits.
+    """Build the hammer of a data sheet; return the hammer and its fitted magnet.
 
     Raises
     ------
     InputError
-        The magnet does not pull the armature off its spring at the current of the forces, or the driver is
-        none.
+        The magnet cannot overcome the spring at the current of the forces, or the driver is invalid.
     """
     with located(sheet.where):
         return _hammer_of(sheet)
@@ -249,7 +246,7 @@ def _hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
 
 
 def _head(sheet: DataSheet, magnet: SheetMagnet, current: float) -> str:
-    """Return the text of a hammer file that has texts and a mass, to be replaced."""
+    """Return the text of a hammer file with name, title and note, and a placeholder mass."""
     import tomlkit
 
     points = len(sheet.force)
@@ -274,7 +271,7 @@ def _made(value: float, unit: str, status: str, source: str) -> dict[str, Any]:
 
 
 def _magnet(sheet: DataSheet, magnet: SheetMagnet) -> dict[str, Any]:
-    """Return the table of the magnet."""
+    """Return the magnet table of the hammer file."""
     count = len(sheet.force)
     guessed = "force" in sheet.assumed
     what = f"fitted to {count}{' assumed' * guessed} force{'s' if count > 1 else ''}"
@@ -314,7 +311,7 @@ def _derived_from(sheet: DataSheet, key: str, how: str) -> tuple[str, str]:
 
 
 def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any] | None:
-    """Return the table of the return spring, None without one; InputError if the magnet is weaker."""
+    """Return the spring table, None without a spring; raise `InputError` if the magnet is weaker."""
     stated = [name for name in ("preload", "stiffness") if f"spring.{name}" in sheet.entries]
     if not stated:
         return None
@@ -336,7 +333,7 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
         **zero,
         **{name: sheet.constant(f"spring.{name}") for name in stated},
     }
-    # The spring drives the armature back to the backstop.
+    # The preload is negative: the spring pushes the armature toward the backstop.
     table["preload"]["value"] = plain(-float(table["preload"]["value"]))
     return table
 
@@ -348,7 +345,7 @@ def _restitution(sheet: DataSheet) -> dict[str, Any]:
 
 
 def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Return the table of what is struck."""
+    """Return the pack table, for the target that the armature strikes."""
     place = "target" if "target" in sheet.entries else "stroke"
     table: dict[str, Any] = {"law": "dashpot", "front": sheet.constant(place)}
     if "stop.stiffness" in sheet.entries:
@@ -369,7 +366,7 @@ def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, An
 
 
 def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -> float:
-    """Return the work of magnet and spring up to a place at a constant current, J."""
+    """Compute the work of magnet and spring up to a displacement at a constant current, J."""
     c = magnet.part.packed(0.0)
     x = np.linspace(0.0, front, _GRID)
     pull = np.array([law.magnet_force(c, place, current) for place in x.tolist()])
@@ -388,21 +385,22 @@ def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -
 
 
 def damping_ratio(restitution: float) -> float:
-    """Return the damping ratio of a spring and dashpot that do not pull, which return a part of the speed."""
+    """Return the damping ratio of a spring and dashpot without adhesion that has a given restitution."""
 
     def returned(ratio: float) -> float:
         root = math.sqrt(1.0 - ratio * ratio)
         angle = math.pi - math.atan2(2.0 * ratio * root, 1.0 - 2.0 * ratio * ratio)
         return math.exp(-ratio / root * angle) - restitution
 
-    # At critical damping exp(-2) is returned; less than that asks for more.
+    # The restitution at critical damping is exp(-2); a smaller one needs a larger ratio, which is not
+    # modelled.
     if restitution <= math.exp(-2.0) or restitution >= 1.0:
         return float(restitution < 1.0)
     return bisect(returned, 0.0, 1.0 - 1e-12)
 
 
 def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Return the table of the standard waveform: the driver of the sheet, or the rail alone."""
+    """Return the waveform table: the driver of the sheet, or the rail alone."""
     from printhammer.drive.waveforms.shapes import SHAPES
 
     table: dict[str, Any] = {"shape": sheet.driver.get("shape", "rail"), "voltage": sheet.constant("rail")}
@@ -426,7 +424,7 @@ def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str
     if "on_time" in sheet.entries:
         table["width"] = sheet.constant("on_time")
     elif "width" not in table:
-        # Twice what the current takes to rise and the armature to fly, at the mean force.
+        # Twice the sum of the coil's time constant and the flight time under the mean force.
         work = _work(sheet, magnet, sheet.si("stroke"), current)
         flight = math.sqrt(2.0 * sheet.si("mass") * sheet.si("stroke") ** 2 / work)
         width = 2.0 * (magnet.inductance / sheet.si("resistance") + flight)

@@ -1,4 +1,4 @@
-"""Data sheets of actuators: TOML with what a maker prints, read and checked.
+"""Read and validate data sheets of actuators: TOML with the values that a maker prints.
 
     name = "pull-12v"
     source = "data sheet of the maker, page 3"
@@ -8,19 +8,21 @@
     stroke = "4.75 mm"
     mass = "26 g"
 
-These are needed. Optional are
+These are required. Optional are
 
-- `current`, that of the forces (rail over resistance), and `end_gap`, what is left of the gap at the end of
+- `current`, the current of the forces (default: rail over resistance), and `end_gap`, the remaining gap at
+the end of
   the stroke (0 mm);
 - `inductance`, with the gap at which it was measured, as ``["45 mH", "4 mm"]``; `turns`; `pole_diameter`;
-  `residual_gap`, air in series with the gap;
-- `spring`, with `preload` at rest and `stiffness`; `target`, the way to what is struck, where that is not the
-  end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of what is
-  struck;
-- `on_time`; `driver`, a waveform table but for its voltage; `title` and `note`.
+  `residual_gap`, an air gap in series with the working gap;
+- `spring`, with `preload` at rest and `stiffness`; `target`, the distance to the struck object, if it is not
+at the
+  end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of the
+  struck object;
+- `on_time`; `driver`, a waveform table without its voltage; `title` and `note`.
 
-What the reader of the sheet has guessed is named in `assumed`, and ``[why]`` tells a source of its own for a
-key.
+`assumed` lists the keys whose values the reader of the sheet has guessed, and ``[why]`` states a source for
+single keys.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ from printhammer.support.files import read_text
 from printhammer.units import describe, split, to_si
 
 TEXTS: Final = {"name": True, "source": True, "title": False, "note": False}
-"""Texts of a sheet, and whether they are needed."""
+"""Text keys of a sheet, and whether they are required."""
 
 QUANTITIES: Final = {
     "rail": ("V", True),
@@ -53,13 +55,13 @@ QUANTITIES: Final = {
     "target": ("m", False),
     "on_time": ("s", False),
 }
-"""Quantities of a sheet, their SI units, and whether they are needed."""
+"""Quantities of a sheet, their SI units, and whether they are required."""
 
 TABLES: Final = {
     "spring": {"preload": "N", "stiffness": "N/m"},
     "stop": {"restitution": "1", "stiffness": "N/m", "damping": "N s/m"},
 }
-"""Tables of a sheet, and the quantities in them."""
+"""Tables of a sheet, and their quantities with SI units."""
 
 _ZERO: Final = ("end_gap", "spring.preload", "spring.stiffness", "stop.restitution", "stop.damping")
 _OTHERS: Final = ("force", "inductance", "driver", "assumed", "why")
@@ -69,18 +71,18 @@ _WHOLE: Final = 1e6
 
 @dataclass(frozen=True)
 class Entry:
-    """A quantity of a sheet."""
+    """A quantity of a sheet, as written and in SI."""
 
     key: str
     value: float
     unit: str
-    """As written."""
+    """Unit as written."""
     si: float
 
 
 @dataclass(frozen=True)
 class DataSheet:
-    """What a data sheet says."""
+    """Contents of a data sheet."""
 
     where: str
     """Name of the file, for messages."""
@@ -90,19 +92,19 @@ class DataSheet:
     force: list[tuple[Entry, Entry]]
     """Gaps and forces, in the order of the sheet."""
     inductance: tuple[Entry, Entry] | None
-    """Inductance and gap."""
+    """Inductance, and the gap at which it was measured."""
     driver: dict[str, Any]
     assumed: frozenset[str]
-    """Keys that the reader of the sheet has guessed."""
+    """Keys whose values the reader of the sheet has guessed."""
     why: dict[str, str] = field(default_factory=dict)
-    """Source of its own of a key."""
+    """Source texts of single keys."""
 
     def si(self, key: str, otherwise: float = math.nan) -> float:
-        """Return a quantity in SI."""
+        """Return a quantity in SI, or `otherwise` if the sheet lacks it."""
         return self.entries[key].si if key in self.entries else otherwise
 
     def origin(self, key: str) -> tuple[str, str]:
-        """Return status and source of a key: itself, or the table or text that it belongs to."""
+        """Return status and source of a key, possibly inherited from its table."""
         holder = key.partition(".")[0]
         guessed = not self.assumed.isdisjoint((key, holder))
         otherwise = "assumed beside the data sheet" if guessed else f"data sheet: {self.texts['source']}"
@@ -110,25 +112,25 @@ class DataSheet:
         return "assumed" if guessed else "datasheet", why
 
     def constant(self, key: str) -> dict[str, Any]:
-        """Return a quantity as a constant of a hammer file."""
+        """Return a quantity as a constant of a hammer file, with status and source."""
         entry = self.entries[key]
         status, source = self.origin(key)
         return {"value": plain(entry.value), "unit": entry.unit, "status": status, "source": source}
 
 
 def plain(value: float) -> float | int:
-    """Return a number as one writes it, without a fraction where it has none."""
+    """Return an integer if the number is whole, else the number."""
     return int(value) if value.is_integer() and abs(value) < _WHOLE else value
 
 
 def read_sheet(path: str | Path) -> DataSheet:
-    """Read a data sheet.
+    """Read and validate a data sheet.
 
     Raises
     ------
     InputError
-        The file cannot be read, is not TOML, or something in it is missing, not known, of another dimension
-        or out of its bounds; the sentence names file, key, value and what was expected.
+        The file cannot be read, is not TOML, or has a missing, unknown or invalid entry; the message names
+        file, key, value and expectation.
     """
     source = Path(path)
     document = read_document(read_text(source, "the data sheet"), str(source))
@@ -206,7 +208,7 @@ def _quantity_text(key: str) -> str:
 
 
 def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
-    """Read a quantity that must be positive, or may be `zero`."""
+    """Parse a quantity that must be positive or, with `zero`, not negative."""
     zero = zero or key in _ZERO
     if isinstance(written, bool) or not isinstance(written, str | int | float):
         raise InputError.of(
@@ -226,7 +228,7 @@ def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
 
 
 def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[Entry, Entry]:
-    """Read two quantities, of which a length may be 0."""
+    """Parse a pair of quantities, of which a length may be 0."""
     if not isinstance(written, list) or len(written) != _PAIR:
         raise InputError.of(key, written, wanted, written=shown(written), said=": expected")
     first, second = (_entry(key, part, si, zero=si == "m") for part, si in zip(written, units, strict=True))
@@ -234,7 +236,7 @@ def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[
 
 
 def _keys(document: Mapping[str, Any]) -> list[str]:
-    """List the keys of a sheet whose origin may be told: tables, and what is in them."""
+    """List the keys of a sheet that may have an origin: tables, and their entries."""
     whole = [key for key in document if key not in (*TEXTS, "assumed", "why")]
     inner = [f"{name}.{key}" for name in (*TABLES, "driver") for key in document.get(name, {})]
     return [*whole, *inner]
@@ -273,7 +275,7 @@ def _why(document: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _check(sheet: DataSheet) -> None:
-    """Refuse what does not fit together."""
+    """Raise `InputError` for inconsistent entries."""
     gaps = [gap.si for gap, _force in sheet.force]
     if len(set(gaps)) < len(gaps):
         raise InputError("force: a gap is given twice", key="force", expected="one force at each")

@@ -1,7 +1,7 @@
-"""The way to constants that are far off: stretches that need not fit together yet.
+"""Approach phase of the motion fit: multiple shooting with penalised gaps between stretches.
 
-Gaps between the stretches are allowed, at a price that rises from step to step. So a wrong constant is
-corrected by what each stretch by itself shows, before errors can grow from contact to contact.
+Gaps between the stretches are allowed, with a penalty that rises from step to step. A wrong constant is thus
+corrected by what each stretch shows by itself, before errors can grow from contact to contact.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0
-"""Price of gaps at first: those of so many times the largest gap cost as much as all data together."""
+"""Initial scale of the gap penalty, in largest gaps: a gap of this size costs as much as all data."""
 _NARROW: Final = 0.001
-"""Gap, in strokes and typical speeds, from which on they can be closed at once."""
+"""Gap, in strokes and typical speeds, below which the gaps can be closed at once."""
 _RISE: Final = 0.3
 _LONGEST: Final = 0.3
-"""Largest change in one step: relative of a constant, of a state in strokes and typical speeds."""
+"""Largest change per step: relative for a constant, in strokes and typical speeds for a state."""
 _HALVINGS: Final = 6
 _TRIES: Final = 2
-"""Steps at one price."""
+"""Number of steps per value of the penalty."""
 
 
 class Prior(Declared, eq=False):
-    """What is known of the parameters beside the records: normal, (p - mean) with a covariance."""
+    """Gaussian prior of some parameters: mean and covariance."""
 
-    which: IntArray = part("numbers of the parameters, shape (k,)")
-    mean: FloatArray = part("SI, shape (k,)")
-    covariance: FloatArray = part("SI, shape (k, k)")
+    which: IntArray = part("indices of the parameters, shape (k,)")
+    mean: FloatArray = part("mean, SI, shape (k,)")
+    covariance: FloatArray = part("covariance, SI, shape (k, k)")
 
 
 class Priors:
-    """Several `Prior`, independent of each other, over their standard errors, parameters in their scales."""
+    """Several independent priors in whitened form, with the parameters in their scales."""
 
     def __init__(self, priors: Sequence[Prior], scales: FloatArray) -> None:
         self.scales = scales
@@ -54,14 +54,14 @@ class Priors:
             self._white.append((prior, np.linalg.inv(factor)))
 
     def residuals(self, values: FloatArray) -> list[FloatArray]:
-        """Return how far values, SI, are off what each prior says."""
+        """Return the whitened residuals of each prior at parameter values, SI."""
         return [
             white @ ((prior.mean - values[prior.which]) / self.scales[prior.which])
             for prior, white in self._white
         ]
 
     def rows(self, columns: int) -> list[FloatArray]:
-        """Return the rows of each prior in a linear problem, the parameters in its first columns."""
+        """Return the whitened rows of each prior, with the parameters in the first `columns` columns."""
         blocks = []
         for prior, white in self._white:
             row = np.zeros((len(prior.which), columns))
@@ -71,12 +71,12 @@ class Priors:
 
 
 def largest_gap(chains: Sequence[Chain], units: FloatArray) -> float:
-    """Return the largest gap, in strokes and typical speeds."""
+    """Return the largest gap of all chains, in strokes and typical speeds."""
     return max((float(np.abs(chain.gaps / units).max()) for chain in chains if chain.gaps.size), default=0.0)
 
 
 class Approach:
-    """Steps towards a minimum of data, priors and gaps; spikes of each shot do not count."""
+    """Damped Gauss-Newton minimisation of data, priors and gap penalty; spikes are excluded."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class Approach:
         self.keep = [(~rows).astype(np.float64) for rows in spikes]
 
     def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
-        """Return parameters, SI, and states at the joints from which a fit without gaps can begin."""
+        """Return parameters, SI, and joint states from which a fit with closed gaps can start."""
         values, states = values.copy(), list(states)
         chains = self.shooting.chains(values, states, derivatives=True)
         width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)
@@ -143,7 +143,7 @@ class Approach:
     def _step(
         self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float
     ) -> FloatArray:
-        """Return the step of Gauss and Newton, in scales of the parameters and units of the states."""
+        """Return the Gauss-Newton step, in scales of the parameters and units of the states."""
         count = len(values)
         size = count + sum(chain.gaps.size for chain in chains)
         units = self.shooting.units

@@ -1,11 +1,11 @@
-"""Least squares on chains of stretches: steps for the constants that also close the gaps at the joints.
+"""Constrained Gauss-Newton iteration on chains of stretches, and its diagnostics.
 
-Every step solves the linearised problem in which all gaps are closed; it is shortened until the data are met
-better or the gaps are smaller than at any step before (a filter: R. Fletcher and S. Leyffer, Math. Program.
-91 (2002) 239). Residuals are weighted by Huber's rule while the constants are wrong; near the solution
-outliers are left out.
+Every step solves the linearised problem in which all gaps between stretches are closed; it is shortened until
+the data misfit or the gap is smaller than at all earlier steps (a filter method: R. Fletcher and S. Leyffer,
+Math. Program. 91 (2002) 239). While the constants are far off, only spikes of the records are excluded; near
+the solution, outliers are excluded by their residuals.
 
-What records of motion can and cannot tell: degenerate constants, weak ones, further ones.
+Diagnostics: degenerate constants, weakly determined ones, and constants that could be fitted too.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray
 
 _DEGENERATE: Final = 1e5
-"""Condition number from which on difference quotients no longer tell the columns of a Jacobian apart."""
+"""Condition number above which difference quotients no longer separate the columns of a Jacobian."""
 _TIED: Final = 0.98
-"""Correlation of two constants that are hardly told apart."""
+"""Correlation above which two constants are hardly distinguished."""
 _WEAK: Final = 0.1
-"""Standard error of a constant, in units of its value, that is weakly determined."""
+"""Relative standard error above which a constant is weakly determined."""
 _SHARE: Final = 0.02
-"""Part of a constant in a direction, over the largest, from which on it is named."""
+"""Component of a constant in the degenerate direction, relative to the largest, above which it is named."""
 
 
 def condition_number(design: FloatArray) -> float:
-    """Return the condition number of a Jacobian with columns of unit length; infinite where one is 0."""
+    """Return the condition number of a Jacobian with normalised columns; infinite if a column is 0."""
     sizes = np.sqrt((design * design).sum(axis=0))
     if not sizes.all():
         return float("inf")
@@ -44,18 +44,18 @@ def condition_number(design: FloatArray) -> float:
 
 
 def singular(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return singular values, ascending, and right singular vectors as columns, of a tall matrix.
+    """Compute singular values, ascending, and right singular vectors as columns, of a tall matrix.
 
-    From its normal matrix, which is small: good where the condition number is not above 1e7.
+    The small normal matrix is used, which is accurate for condition numbers up to 1e7.
     """
     squares, vectors = np.linalg.eigh(matrix.T @ matrix)
     return np.sqrt(np.maximum(squares, 0.0)), vectors
 
 
 def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> None:
-    """Refuse constants that can change together without any change of the motion.
+    """Raise `InputError` if some constants can change together without changing the motion.
 
-    `where` names the files; the design is the Jacobian over the standard errors of the data, shape (m, p).
+    `where` names the files; `design` is the whitened Jacobian, shape (m, p).
     """
     sizes = np.sqrt((design * design).sum(axis=0))
     blind = [name for name, size in zip(names, sizes, strict=True) if size == 0.0]
@@ -84,7 +84,7 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
 
 
 def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatArray) -> list[str]:
-    """Return one sentence for each pair that is hardly told apart, and for each that is weak."""
+    """Return one sentence per highly correlated pair, and per weakly determined constant."""
     errors = np.sqrt(np.diag(covariance))
     sentences = []
     for i, name in enumerate(names):
@@ -101,7 +101,7 @@ def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatAr
 
 
 def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
-    """Return which constants are weakly determined."""
+    """Return the indices of the weakly determined constants."""
     errors = np.sqrt(np.diag(covariance))
     return [int(i) for i in np.flatnonzero(errors > _WEAK * np.abs(values))]
 
@@ -109,11 +109,11 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
 def would_be_found(
     design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
 ) -> list[tuple[str, float, float]]:
-    """Return what the records would say of further constants, one at a time, were they free too.
+    """Estimate what the records would say of further constants, one at a time, if they were free too.
 
-    `design`, shape (m, p), and `residuals` are over the standard errors of the data, as are `columns`, shape
-    (m, q), of the further constants per relative change. Returned are name, relative standard error, and
-    relative change that would fit best, of each.
+    `design`, shape (m, p), `residuals`, and `columns`, shape (m, q), the derivatives per relative change of
+    the further constants, are whitened by the standard errors of the data. Returned are, for each constant,
+    name, relative standard error, and best relative change.
     """
     basis, _r = np.linalg.qr(design)
     further = []
@@ -130,44 +130,42 @@ _FULL: Final = 0.4
 """Largest relative change of a constant in one step."""
 _SHORTEST: Final = 1e-3
 _EXACT: Final = 1e-11
-"""Relative change of all constants at which exact data are met."""
+"""Relative change of all constants below which exact data are fitted."""
 _NEAR, _DONE = 1.0, 1e-3
-"""Steps in standard errors at which outliers are left out, and at which the fit is done."""
+"""Steps, in standard errors, below which outliers are excluded, and below which the fit has converged."""
 _NARROW, _CLOSED = 1e-2, 1e-8
-"""Gaps in strokes and typical speeds at which outliers are left out, and at which the fit is done."""
+"""Gaps, in strokes and typical speeds, below which outliers are excluded, and the fit has converged."""
 _FLOOR: Final = 1e-7
-"""Noise in strokes below which no sensor is, so that nothing lies too far off."""
+"""Noise floor in strokes, below which nothing counts as an outlier."""
 _LEAST: Final = 1e-16
-"""Noise, m, by which exact data are weighted."""
+"""Noise, m, that weights exact data."""
 _REACH: Final = 3.0
 _POINTS: Final = 7
-"""How far a profile goes, in standard errors, and its points."""
+"""Extent of a profile, in standard errors, and number of its points."""
 _LOST: Final = 1e-7
-"""Singular values over the largest that rounding has lost."""
+"""Relative singular value below which rounding dominates."""
 _NO_MOTION: Final = "the hammer does not move so that the records could be compared with it"
 
 
 class Solution(Declared, eq=False):
-    """Where the fit ended."""
+    """Result of the iteration: parameters, covariance, states, residual scales and weights."""
 
     values: FloatArray = part("parameters, SI, shape (p,)")
-    covariance: FloatArray = part("SI, shape (p, p)")
+    covariance: FloatArray = part("covariance of the parameters, SI, shape (p, p)")
     states: list[FloatArray] = part("states at the joints of each shot")
-    shown: list[FloatArray] = part("the model of each record, m, shape (n,)")
+    shown: list[FloatArray] = part("modelled readings of each record, m, shape (n,)")
     by_parameter: list[FloatArray] = part(
-        "its derivatives with respect to the parameters in their scales, shape (n, p)"
+        "derivatives of the readings with respect to the parameters in their scales, shape (n, p)"
     )
-    outliers: list[BoolArray] = part("samples left out")
+    outliers: list[BoolArray] = part("masks of the excluded samples")
     scales: FloatArray = part("standard deviation of the residuals, m, shape (shots,)")
-    memories: FloatArray = part("factor by which their memory increases variances, shape (shots,)")
-    design: FloatArray = part(
-        "rows of data and prior over their standard errors, columns counted in the scales"
-    )
+    memories: FloatArray = part("variance factors due to autocorrelated residuals, shape (shots,)")
+    design: FloatArray = part("whitened rows of data and prior, with columns in the scales of the parameters")
     cost: float = part("weighted sum of squares, prior included")
 
 
 class GaussNewton:
-    """The fit of the parameters of a `Shooting`; a robust one weighs outliers down and leaves them out."""
+    """Fit of the parameters of a `Shooting`; a robust fit excludes outliers."""
 
     def __init__(self, shooting: Shooting, priors: Sequence[Prior], *, robust: bool) -> None:
         self.shooting = shooting
@@ -181,7 +179,7 @@ class GaussNewton:
         self.floor = _FLOOR * shooting.stroke
 
     def design(self, values: FloatArray, states: Sequence[FloatArray]) -> FloatArray:
-        """Return the rows of data and priors over their standard errors, shape (m, p), at some values."""
+        """Return the whitened Jacobian of data and priors, shape (m, p), at parameter values, SI."""
         chains = self.shooting.chains(values, states, derivatives=True)
         if chains is None:
             raise InputError(_NO_MOTION, key="motion")
@@ -195,13 +193,13 @@ class GaussNewton:
         held: BoolArray | None = None,
         noise: Solution | None = None,
     ) -> Solution:
-        """Find the parameters from values, SI, and states at the joints of each shot, each shape (j, 2).
+        """Fit the parameters from initial values, SI, and initial joint states of each shot, shape (j, 2).
 
-        Parameters that are held stay where they are. With the noise of a solution near by its outliers are
-        taken as known too.
+        Parameters in the mask `held` do not change. With `noise`, a nearby solution, its outliers and noise
+        scales are used.
         """
         scales = self.shooting.parameters.scales
-        # A profile begins where all is near.
+        # A profile starts near its solution.
         if noise is None:
             values, states = Approach(self.shooting, self.priors, self.spikes).run(values, states)
         free = np.ones(len(values), bool) if held is None else ~held
@@ -258,7 +256,7 @@ class GaussNewton:
         near: bool,
         noise: Solution | None = None,
     ) -> _Weighted:
-        """Return residuals and Jacobian of data and priors over their standard errors."""
+        """Return the whitened residuals and Jacobian of data and priors."""
         rows, residuals, outliers, scales, memories = [], [], [], [], []
         for shot, (x, (shown, jacobian, *_rest)) in enumerate(zip(self.data, parts, strict=True)):
             left = x - shown
@@ -267,7 +265,8 @@ class GaussNewton:
                 out, scale, memory = noise.outliers[shot], noise.scales[shot], noise.memories[shot]
             else:
                 if self.robust and not near:
-                    # A stretch that is not met yet is no outlier, only what stands out of the record itself.
+                    # Far from the solution a misfit is no outlier; only spikes of the record itself are
+                    # excluded.
                     out = self.spikes[shot]
                 scale = max(float(np.sqrt(np.mean(left[~out] ** 2))), _LEAST)
                 memory = memory_factor(np.where(out, 0.0, left)) if near else 1.0
@@ -285,7 +284,7 @@ class GaussNewton:
         )
 
     def _cost(self, values: FloatArray, chains: Sequence[Chain], here: _Weighted) -> float:
-        """Return the cost of data and prior at some values, with the scales of the step."""
+        """Return the cost of data and prior at parameter values, with the scales of the current step."""
         total = 0.0
         for shot, chain in enumerate(chains):
             left = self.data[shot] - self.shooting.shown(shot, chain.motion)
@@ -322,10 +321,10 @@ class GaussNewton:
         )
 
     def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
-        """Return how much worse the fit becomes where one parameter is held, and its 95 % interval.
+        """Compute the profile of one parameter and its 95 % interval.
 
-        The noise is taken as found at the solution, with so many degrees of freedom; where there is no fit,
-        or the constant would change its sign, the profile ends.
+        The noise is that of the solution, with the given degrees of freedom. The profile ends where no fit
+        converges or the parameter would change its sign.
         """
         error = float(np.sqrt(solution.covariance[which, which]))
         best = solution.values[which]
@@ -348,7 +347,7 @@ class GaussNewton:
                 values, states = other.values, other.states
         places = np.array(sorted(increases))
         increase = np.array([increases[place] for place in places])
-        # The root of the increase is nearly straight, and counts standard errors.
+        # The square root of the increase is nearly linear, in units of standard errors.
         roots, reach = np.sqrt(increase) * np.sign(places - best), student(degrees_of_freedom)
         low = float(np.interp(-reach, roots, places)) if roots[0] < -reach else -np.inf
         high = float(np.interp(reach, roots, places)) if roots[-1] > reach else np.inf
@@ -357,7 +356,7 @@ class GaussNewton:
 
 @dataclass(frozen=True, eq=False)
 class _Weighted:
-    """The linear problem at a step: rows over their standard errors."""
+    """The linear problem of a step: whitened rows and residuals, outliers and scales."""
 
     design: FloatArray
     residuals: FloatArray

@@ -1,9 +1,9 @@
-"""Constants from displacement records of single shots, by multiple shooting between contacts.
+"""Fit constants to displacement records of single shots, by multiple shooting between contacts.
 
-The records tell the mass and what the contacts do to the motion, given the static forces. A motion shows
-forces only over the mass: if the mass and all forces are multiplied by one number, no record changes.
+The records determine the mass and the effect of the contacts on the motion, for known static forces. Since a
+motion depends only on forces over mass, a common factor on mass and all forces leaves every record unchanged.
 
-What to say beside the constants that records of motion give: a test of the model, and what is odd.
+The result includes a test of the model, and remarks on records and constants.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from printhammer.identify.shots.shot import FEWEST, Pulse, Shot, fit_pulse, read
 from printhammer.support.arrays import FloatArray
 
 _REJECTED: Final = 0.01
-"""Probability below which the model is rejected."""
+"""Significance level below which the model is rejected."""
 _LARGER: Final = 1.1
-"""Factor by which the noise may exceed what a record shows of it: it is not known better."""
+"""Factor by which the noise may exceed the estimate from a record, which is no more accurate."""
 _DEGREES: Final = 0.22
-"""Degrees of freedom, a sample, of a noise from the median of third differences of white noise."""
+"""Degrees of freedom per sample of a noise estimate from the median of third differences."""
 _TOLD: Final = 0.05
-"""Relative standard error up to which a constant that was held is named as one that could be found."""
+"""Relative standard error up to which a held constant is reported as one that could be fitted."""
 _OFF: Final = 5.0
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
-    """Compare the residuals with the noise of the records themselves, with a margin for its error."""
+    """Test the residuals against the noise of the records themselves (F-test, with a margin)."""
     from scipy.stats import f
 
     p_value, worst = 1.0, ""
@@ -74,13 +74,13 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
                 f"the residuals of {shot.name} are {scale:.3g} m, its noise is {noise:.3g} m, and they"
                 f" are largest at {place:.4g} s (p = {tail:.2g} if the noise is {_LARGER:g} times that)"
             )
-    # The largest of several records counts.
+    # Bonferroni correction for the number of records.
     p_value = min(1.0, p_value * len(shots))
     return p_value, worst if p_value < _REJECTED else ""
 
 
 def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
-    """Say where a record does not rest where the hammer does."""
+    """Report records whose rest position differs from the hammer's."""
     sentences = []
     for shot, shown, scale in zip(shots, solution.shown, solution.scales, strict=True):
         before = shot.t < 0.0
@@ -97,7 +97,7 @@ def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 
 def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
-    """Say where residuals are not independent of each other."""
+    """Report records with autocorrelated residuals."""
     return [
         f"the residuals of {shot.name} depend on each other: {len(shot.t)} samples count as"
         f" {len(shot.t) / memory:.0f}"
@@ -107,7 +107,7 @@ def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 
 def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str) -> list[str]:
-    """Say which of the constants held the records could determine too, and which they contradict."""
+    """Report held constants that the records could determine, and those that they contradict."""
     sentences = [
         "a motion shows forces divided by the mass only: the mass is as sure as the forces taken as known"
     ]
@@ -161,7 +161,7 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
 
 _DAMPING: Final = "backstop.damping"
 _FIRST_GUESS: Final = 0.3
-"""Damping over stiffness to begin with where the hammer has none, s/m."""
+"""Initial guess of damping over stiffness if the hammer has no damping, s/m."""
 
 
 def fit_motion(
@@ -174,45 +174,46 @@ def fit_motion(
     columns: str | None = None,
     earlier: Sequence[Fit] = (),
 ) -> Fit:
-    """Fit the mass and what else displacement records of single shots tell.
+    """Fit the mass and other constants to displacement records of single shots.
 
-    Every record is cut in free flight between its contacts. Each stretch is integrated by itself, from a
-    state of its own; the constants are common, and at the solution each stretch begins where the one before
-    ends (`printhammer.identify.shots.shooting`). The sensor is a first-order low-pass with additive noise.
+    Every record is cut in free flight between its contacts. Each stretch is integrated separately from a
+    state of its own; the constants are common, and at the solution each stretch begins where the preceding
+    one ends (`printhammer.identify.shots.shooting`). The sensor is a first-order low-pass with additive
+    noise.
 
     Parameters
     ----------
     paths : sequence of path
-        Records with the columns ``time``, ``displacement`` and perhaps ``current``, units in the heading; one
-        shot a file, the firing at time 0, from rest.
+        Records with the columns ``time``, ``displacement`` and optionally ``current``, with units in the
+        heading; one shot from rest per file, fired at time 0.
     hammer : Hammer
-        Holds all constants that are not fitted, and is where the fit begins. Those that it knows with an
-        error, `Hammer.uncertainty`, are not exact but known with their covariance; the records improve them,
-        and they are among the constants found.
+        Hammer with all other constants and with the initial guesses. Constants with a stated uncertainty,
+        `Hammer.uncertainty`, have a Gaussian prior with their covariance; the records refine them, and they
+        are among the fitted constants.
     free : sequence of str, optional
         Keys of the constants to fit; by default the mass, and the damping of a Hertz backstop if a record
-        touches it.
+        touches the backstop.
     robust : bool, optional
-        Whether outliers are left out.
+        Whether to exclude outliers.
     columns : str, optional
-        What the columns of the table hold, such as "time=1, displacement=2*50 um/V"; by default what a file
-        beside it says, and else its heading; see `printhammer.support.tables.columns`.
+        Contents of the table's columns, such as "time=1, displacement=2*50 um/V"; by default as described in
+        a file beside the table, else by its heading; see `printhammer.support.tables.columns`.
     bandwidth : float, optional
-        Of the sensor (-3 dB), Hz; by default what a comment ``# bandwidth: 200 kHz`` of a record says, and
-        else unlimited. The column of currents is taken to come through a like sensor.
+        Bandwidth of the sensor (-3 dB), Hz; by default that of a comment ``# bandwidth: 200 kHz`` in the
+        record, else unlimited. The current probe is assumed to have the same bandwidth.
     earlier : sequence of Fit, optional
-        Fits that are put into the hammer first. Of a constant in several fits, the first counts.
+        Fits to apply to the hammer first. For a constant in several fits, the first one counts.
 
     Returns
     -------
     Fit
-        Of kind "motion"; abscissa and data are times, s, and displacements, m.
+        The fit, of kind "motion"; abscissa and data are times, s, and displacements, m.
 
     Raises
     ------
     InputError
-        A record cannot be used, misses the impact, or is too short or too coarse; the constants of the hammer
-        were fitted to it before; a constant cannot be found from it, or not be told apart from others.
+        A record is invalid, misses the impact, or is too short or too coarse; the hammer's constants were
+        already fitted to the record; or a constant is not determined, or not distinguishable from others.
     """
     if isinstance(paths, str) or not paths:
         raise InputError.of("paths", paths, "a sequence of at least one record")
@@ -246,7 +247,7 @@ def fit_motion(
 def _free_keys(
     hammer: Hammer, free: Sequence[str] | None, shots: Sequence[Shot], *, touched: bool
 ) -> tuple[str, ...]:
-    """Return the constants to fit, or say why one cannot be."""
+    """Return the keys of the constants to fit; raise `InputError` if one cannot be fitted."""
     hertz = hammer.backstop is not None and hammer.backstop.law == "hertz"
     if free is None:
         return ("mass", _DAMPING) if touched and hertz else ("mass",)
@@ -285,7 +286,7 @@ def _free_keys(
 
 
 def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
-    """Return the hammer with stiffness and damping of its backstop given as such where they are fitted."""
+    """Return the hammer with backstop stiffness and damping as explicit constants if these are fitted."""
     backstop = hammer.backstop
     changes: dict[str, float | None] = {}
     for key, name in (("backstop.stiffness", "k"), (_DAMPING, "l")):
@@ -307,14 +308,14 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
 
 
 def _known(hammer: Hammer, *, own_waveform: bool) -> Uncertainty:
-    """Return which constants that move the armature are known with an error, and how well."""
+    """Return the uncertainty of the constants that move the armature."""
     known = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
     idle = ("platen", "coil.") if own_waveform else ("platen", "coil.", "waveform.")
     return known.without([key for key in known.keys if key.startswith(idle)])
 
 
 def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
-    """Return the fingerprints of records; refuse one that the constants of the hammer come from already."""
+    """Return the fingerprints of records; raise `InputError` for one that the hammer was fitted to before."""
     prints = tuple(hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16] for path in paths)
     used = hammer.uncertainty.records if hammer.uncertainty is not None else ()
     for path, print_ in zip(paths, prints, strict=True):
@@ -329,7 +330,7 @@ def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
 
 
 def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], list[str]]:
-    """Return the current of each shot, None where the hammer's own waveform is taken, and what is odd."""
+    """Return the current of each shot, None for the hammer's own waveform, and remarks."""
     pulses: list[Pulse | None] = []
     for shot in shots:
         if shot.current is None:
@@ -353,7 +354,7 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
 def _assembled(
     hammer: Hammer, keys: tuple[str, ...], pulses: Sequence[Pulse | None], known: Uncertainty
 ) -> tuple[FloatArray, Parameters, list[Prior], list[Pulse | None]]:
-    """Return where to begin, the parameters, what is known of them, and the current of each shot."""
+    """Return initial guess, parameters, priors, and the current of each shot."""
     start = [hammer.constants[key].si for key in keys]
     priors: list[Prior] = []
     if known.keys:
@@ -369,7 +370,7 @@ def _assembled(
             continue
         fitted = [f"waveform.{name}" for name in pulse.names]
         if common and all(key in fitted for key in common):
-            # The constants are those of the hammer; the recorded current is one more witness of them.
+            # The waveform constants are the hammer's; the recorded current gives a prior on them.
             rows = [fitted.index(key) for key in common]
             priors.append(
                 Prior(
@@ -391,7 +392,7 @@ def _assembled(
 
 
 def _definite(covariance: FloatArray, values: FloatArray) -> FloatArray:
-    """Return a covariance with a little added, so that what is exactly known can be inverted."""
+    """Return a covariance with a small diagonal added, so that it can be inverted."""
     return covariance + np.diag((1e-12 * values) ** 2 + 1e-13 * covariance.diagonal())
 
 

@@ -1,10 +1,11 @@
-"""Multiple shooting: stretches of single shots, each from a state of its own, and how they fit together.
+"""Multiple shooting: each stretch of a single shot has its own initial state; gaps close at the solution.
 
 The model of a record is a chain of stretches. The first begins at rest at the firing, each other one in free
-flight with displacement and velocity as unknowns of their own; where one ends, the next must begin. Gaps are
-allowed while the constants are wrong, so that no error grows through more than one contact, and are closed at
-the solution. The unknown states are eliminated from the linearised conditions (H. G. Bock, in: Modelling of
-Chemical Reaction Systems, Springer 1981, 102), so that a step costs no more than one for the constants alone.
+flight with displacement and velocity as additional unknowns; at the solution each stretch begins where the
+preceding one ends. Gaps are allowed while the constants are wrong, so that no error grows through more than
+one contact. The unknown states are eliminated from the linearised conditions ("condensing": H. G. Bock, in:
+Modelling of Chemical Reaction Systems, Springer 1981, 102), so that a step costs no more than one for the
+constants alone.
 """
 
 from __future__ import annotations
@@ -25,21 +26,21 @@ from printhammer.run.ensemble import Ensemble
 from printhammer.support.arrays import FloatArray, IntArray
 
 _STEP: Final = 1e-7
-"""Change for a difference quotient: relative of a constant, of a state in strokes and typical speeds."""
+"""Finite-difference step: relative for a constant, in strokes and typical speeds for a state."""
 _FINEST: Final = 2e-6
-"""Longest time between the states through which a low-pass is followed, s."""
+"""Largest time step for the low-pass, s."""
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """What is fitted: constants of the hammer, and constants of the current of each shot."""
+    """Fitted parameters: constants of the hammer, and constants of the current of each shot."""
 
     keys: tuple[str, ...]
-    """Constants of the hammer."""
+    """Keys of the hammer's constants."""
     owners: tuple[int, ...]
-    """Of each further parameter the shot; those of one shot are the constants of its pulse."""
+    """Shot of each further parameter; those of one shot are the constants of its pulse."""
     scales: FloatArray
-    """Sizes in which all are counted, SI."""
+    """Scales of all parameters, SI."""
 
     @property
     def count(self) -> int:
@@ -47,31 +48,31 @@ class Parameters:
         return len(self.keys) + len(self.owners)
 
     def of_shot(self, shot: int) -> list[int]:
-        """Return the parameters of the current of a shot."""
+        """Return the indices of the current parameters of a shot."""
         return [len(self.keys) + i for i, owner in enumerate(self.owners) if owner == shot]
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """The stretches of one shot at some values of the parameters."""
+    """Stretches of one shot at some values of the parameters, with derivatives."""
 
     motion: FloatArray
-    """Displacement, m, and velocity, m/s, at the times of the grid. Shape (g, 2)."""
+    """Displacement, m, and velocity, m/s, at the grid times. Shape (g, 2)."""
     gaps: FloatArray
-    """End of each stretch less the beginning of the next, shape (j, 2)."""
+    """End of each stretch minus the beginning of the next, shape (j, 2)."""
     by_parameter: FloatArray
-    """Derivatives of the motion with respect to the parameters, counted in their scales; p = 0 if not asked
-    for. Shape (g, 2, p)."""
+    """Derivatives of the motion with respect to the parameters in their scales; p = 0 if not requested. Shape
+    (g, 2, p)."""
     by_state: FloatArray
-    """Derivatives with respect to the state at the beginning of the stretch. Shape (g, 2, 2)."""
+    """Derivatives of the motion with respect to the initial state of the stretch. Shape (g, 2, 2)."""
     end_by_parameter: FloatArray
     end_by_state: FloatArray
-    """Of the state at the end of each stretch but the last, shape (j, 2, p) and (j, 2, 2)."""
+    """Derivatives of the final state of each stretch but the last, shape (j, 2, p) and (j, 2, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Times of a shot: the grid, the rows of the samples in it, and the rows at which stretches begin."""
+    """Time grid of a shot, indices of the samples in it, and indices at which stretches begin."""
 
     grid: FloatArray
     samples: IntArray
@@ -81,7 +82,7 @@ class _Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One member of the ensemble: a stretch under some constants, from some state, at some times."""
+    """One member of the ensemble: a stretch with hammer, drive, initial state and output times."""
 
     hammer: Hammer
     drive: PulseTrain
@@ -92,8 +93,8 @@ class _Run:
 class Shooting:
     """Chains of stretches for several shots, integrated together.
 
-    Constants of the hammer that are not fitted stay as they are; where a pulse is None, its own waveform is
-    fired.
+    Constants of the hammer that are not fitted stay fixed; where a pulse is None, the hammer's own waveform
+    is fired.
     """
 
     def __init__(
@@ -109,18 +110,18 @@ class Shooting:
         self.units = np.array([self.stroke, speed])
         self.steps = _STEP * self.units
         waveforms = [hammer.waveform if pulse is None else pulse.waveform for pulse in pulses]
-        # Half as long again, as a fit may make a pulse longer.
+        # With a margin of 50 %, since a fit may make a pulse longer.
         self.lasting = [0.0 if each is None else 1.5 * each.support for each in waveforms]
 
     def hammer_at(self, values: FloatArray) -> Hammer:
-        """Return the hammer with other values of the constants fitted, SI."""
+        """Return the hammer with other values, SI, of the fitted constants."""
         changes = {key: float(value) for key, value in zip(self.parameters.keys, values, strict=False)}
         return self.hammer.replace(changes) if changes else self.hammer
 
     def _variants(
         self, values: FloatArray, derivatives: bool
     ) -> list[tuple[Hammer, float, list[PulseTrain]]]:
-        """Return hammer, rest state and drives at the values, and with each parameter changed a little."""
+        """Return hammer, rest state and drives at the values, and with each parameter perturbed."""
         parameters = self.parameters
         count = len(parameters.keys)
         variants = []
@@ -151,10 +152,10 @@ class Shooting:
     def chains(
         self, values: FloatArray, states: Sequence[FloatArray], *, derivatives: bool
     ) -> list[Chain] | None:
-        """Integrate all stretches; None where there is no such hammer, or a run does not come to its end.
+        """Integrate all stretches; return None for an invalid hammer or a failed simulation.
 
-        From values of the parameters, SI, and displacement, m, and velocity, m/s, at the joints of each shot,
-        each shape (j, 2).
+        The arguments are parameter values, SI, and displacement, m, and velocity, m/s, at the joints of each
+        shot, shape (j, 2).
         """
         try:
             variants = self._variants(values, derivatives)
@@ -187,7 +188,7 @@ class Shooting:
             )
         except InputError:
             return None
-        # So few runs are not worth another kernel.
+        # The ensemble is too small to be worth compiling a vectorised kernel.
         result = ensemble.run(strobes=[run.times for run in runs], engine="plain")
         if not result.ok.all() or result.strobes is None:
             return None
@@ -196,7 +197,7 @@ class Shooting:
         return [self._chain(shot, states[shot], table, where, count) for shot in range(len(self.shots))]
 
     def _acts(self, variant: int, shot: int, start: float) -> bool:
-        """Tell whether a changed parameter can change a stretch that begins at a time, s."""
+        """Whether a perturbed parameter affects a stretch that begins at a time, s."""
         number = variant - 1 - len(self.parameters.keys)
         return number < 0 or (self.parameters.owners[number] == shot and start <= self.lasting[shot])
 
@@ -230,15 +231,16 @@ class Shooting:
                 run = where.get((shot, stretch, -1 - which))
                 change = 0.0 if run is None else (table[run, :long] - base) / self.steps[which]
                 by_state[span, :, which] = change
-            # The joint itself belongs to the stretch that begins there.
+            # The joint itself belongs to the next stretch.
             ends[stretch] = motion[span][-1]
             ends_p[stretch], ends_s[stretch] = by_parameter[span][-1], by_state[span][-1]
         return Chain(motion, ends[:-1] - states, by_parameter, by_state, ends_p[:-1], ends_s[:-1])
 
     def shown(self, shot: int, motion: FloatArray) -> FloatArray:
-        """Return what the sensor shows at the samples of a shot, shape (n, ...); before the firing, at rest.
+        """Apply the sensor model; return readings at the samples of a shot, at rest before the firing.
 
-        Of displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...).
+        `motion` holds displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...); the
+        readings have the shape (n, ...).
         """
         plan = self.plans[shot]
         flat = motion.reshape(len(motion), 2, -1)
@@ -247,10 +249,10 @@ class Shooting:
         return out[rows].reshape(len(rows), *motion.shape[2:])
 
     def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
-        """Return what the sensor shows of a shot whose stretches are independent, and how that changes.
+        """Return readings and derivatives of a shot with independent stretches.
 
-        At the samples, shape (n,), and its derivatives with respect to the parameters, in their scales, and
-        to the states at the joints, in `units`, shape (n, p + 2 j).
+        The readings have the shape (n,), the derivatives with respect to the parameters, in their scales, and
+        to the states at the joints, in `units`, the shape (n, p + 2 j).
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]
@@ -267,12 +269,11 @@ class Shooting:
         return out[:, 0], out[:, 1:]
 
     def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Eliminate the states at the joints: the linear model of a shot in which no gap is left.
+        """Eliminate the states at the joints: linear model of a shot with closed gaps (condensing).
 
-        Returned are what the sensor would show if the gaps were closed and the parameters as they are, shape
-        (n,); how that changes with the parameters, counted in their scales, shape (n, p); the change of the
-        states at the joints that closes the gaps, shape (j, 2), and how it changes with the parameters, shape
-        (j, 2, p).
+        Returned are the readings with closed gaps at unchanged parameters, shape (n,); their derivatives with
+        respect to the parameters in their scales, shape (n, p); the change of the joint states that closes
+        the gaps, shape (j, 2), and its derivatives with respect to the parameters, shape (j, 2, p).
         """
         plan = self.plans[shot]
         count = chain.by_parameter.shape[2]

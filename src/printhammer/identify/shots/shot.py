@@ -1,9 +1,8 @@
-"""The displacement record of a single shot: read, its contacts found, and cut between them.
+"""Displacement record of a single shot: reading, detection of contacts, and division into stretches.
 
-The record is cut in free flight, midway between contacts. There displacement and velocity are read off by a
-local parabola; they are where the integration of a stretch begins.
-
-The current of a recorded shot: the waveform of the hammer fitted to it, or the record itself.
+The record is cut in free flight, midway between contacts, where a local parabola gives displacement and
+velocity as initial guesses for the integration of the next stretch. The current of the shot is the hammer's
+waveform fitted to the record, or the record itself.
 """
 
 from __future__ import annotations
@@ -30,66 +29,66 @@ from printhammer.units import from_si
 Surface = Literal["pack", "backstop"]
 
 FEWEST: Final = 5
-"""Samples in a contact below which a record is too coarse."""
+"""Smallest number of samples in a contact."""
 _CLEAR: Final = 0.005
-"""Distance from a surface, in strokes, at which a contact has clearly begun or ended."""
+"""Distance from a surface, in strokes, beyond which a contact has clearly begun or ended."""
 _WINDOW: Final = 15e-6
-"""Longest time over which samples are averaged to find contacts, s; contacts last longer."""
+"""Longest averaging time for the detection of contacts, s; contacts last longer."""
 
 
 class Touch(Declared):
-    """A contact as the record shows it."""
+    """A contact detected in a record."""
 
     surface: Surface = part('either "pack" or "backstop"')
-    first: int = part("row of the first sample in it")
-    last: int = part("row of the last sample in it")
+    first: int = part("index of its first sample")
+    last: int = part("index of its last sample")
 
     @property
     def count(self) -> int:
-        """Number of samples."""
+        """Number of samples in the contact."""
         return self.last - self.first + 1
 
 
 class Shot(Declared, eq=False):
-    """One record, ready to be fitted."""
+    """One record, with its contacts and joints."""
 
-    name: str = part("the file, as messages name it")
+    name: str = part("file name, for messages")
     t: FloatArray = part("times of the samples, s, ascending, 0 at the firing, shape (n,)")
     x: FloatArray = part("displacements, m, shape (n,)")
-    current: FloatArray | None = part("current, A, shape (n,), or None")
-    lines: IntArray = part("line of the file of each sample, shape (n,)")
-    bandwidth: float | None = scalar("Hz", "of the sensor", more="None for one without delay")
-    noise: float = part("of the displacement, m, from the differences of the samples")
-    touches: list[Touch] = part("contacts in order; the first is the rest at the backstop, if there is one")
-    joints: IntArray = part("rows at which the record is cut, shape (j,)")
+    current: FloatArray | None = part("current, A, shape (n,); None if not recorded")
+    lines: IntArray = part("line number of each sample in the file, shape (n,)")
+    bandwidth: float | None = scalar("Hz", "bandwidth of the sensor", more="None for unlimited")
+    noise: float = part("noise of the displacement, m, estimated from differences of the samples")
+    touches: list[Touch] = part("contacts in order; the first is the rest at the backstop, if recorded")
+    joints: IntArray = part("indices at which the record is cut, shape (j,)")
     states: FloatArray = part(
-        "displacement, m, and velocity, m/s, there, as the record shows them. Shape (j, 2)"
+        "displacement, m, and velocity, m/s, at the joints, estimated from the record. Shape (j, 2)"
     )
 
     def touching(self, surface: Surface) -> list[Touch]:
-        """Return the contacts with one surface, but for the rest at the beginning."""
+        """Return the contacts with one surface, except the rest at the start."""
         return [touch for touch in self.touches if touch.surface == surface and touch.first > 0]
 
 
 def read_shot(
     path: str | Path, hammer: Hammer, bandwidth: float | None = None, columns: str | None = None
 ) -> Shot:
-    """Read the record of a single shot and find its contacts.
+    """Read the record of a single shot and detect its contacts.
 
     Parameters
     ----------
     path : path
-        CSV file with the columns ``time``, ``displacement`` and perhaps ``current``, units in the heading.
+        CSV file with the columns ``time``, ``displacement`` and optionally ``current``, units in the heading.
     hammer : Hammer
-        Whose backstop and pack stand where contacts are to be found.
+        Hammer whose backstop and pack define the surfaces.
     bandwidth : float, optional
-        Of the sensor, Hz; by default what a comment ``# bandwidth: 200 kHz`` says, and else unlimited.
+        Bandwidth of the sensor, Hz; by default that of a comment ``# bandwidth: 200 kHz``, else unlimited.
 
     Raises
     ------
     InputError
-        The file is no such table, times do not ascend, the record begins too late or ends too early, misses
-        the impact, or has too few samples in it.
+        The file is invalid, times do not ascend, the record begins too late or ends too early, misses the
+        impact, or has too few samples in it.
     """
     table = read_table(path, {"time": "s", "displacement": "m"}, optional={"current": "A"}, columns=columns)
     name, t, x = str(table.path), table.values["time"], table.values["displacement"]
@@ -125,10 +124,10 @@ def read_shot(
 def find_touches(
     t: FloatArray, x: FloatArray, noise: float, hammer: Hammer
 ) -> tuple[list[Touch], FloatArray, float]:
-    """Return the contacts in a record, the smoothed record, and the distance that is clear of the noise, m.
+    """Detect contacts; return them, the smoothed record, and the distance clear of the noise, m.
 
-    A contact begins where the smoothed record crosses the surface, and counts if it goes clearly beyond; it
-    ends where the record crosses back, if it then goes clearly away.
+    A contact begins where the smoothed record crosses the surface, and counts if it then goes clearly beyond;
+    it ends where the record crosses back, if it then goes clearly away.
     """
     stroke = stroke_of(hammer, x)
     wanted = (noise / (0.25 * _CLEAR * stroke)) ** 2
@@ -145,7 +144,7 @@ def find_touches(
 
 
 def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
-    """Return the runs of samples behind a surface; crossings within the noise do not end them."""
+    """Return the intervals of samples beyond a surface; crossings within the noise do not end them."""
     touches: list[Touch] = []
     inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
     row = 0
@@ -168,7 +167,7 @@ def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
 def _check(
     name: str, t: FloatArray, smooth: FloatArray, clear: float, touches: list[Touch], hammer: Hammer
 ) -> None:
-    """Refuse a record from which nothing can be learnt."""
+    """Raise `InputError` for a record that does not cover the shot."""
     start = smooth[0] - hammer.position if hammer.position is not None else 0.0
     if start > clear:
         raise InputError(
@@ -205,7 +204,7 @@ def _check(
 
 
 def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> tuple[float, float]:
-    """Return displacement and velocity at a sample, from a parabola about it."""
+    """Estimate displacement and velocity at a sample from a robust local parabola."""
     rows = slice(max(row - reach, 0), row + reach + 1)
     s = t[rows] - t[row]
     scale = float(np.abs(s).max())
@@ -220,7 +219,7 @@ def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> 
 
 
 def stroke_of(hammer: Hammer, x: FloatArray) -> float:
-    """Return the way from backstop to pack, m; without them, how far a record goes."""
+    """Return the distance from backstop to pack, m; without them, the range of a record."""
     if hammer.position is not None and hammer.front is not None:
         return hammer.front - hammer.position
     return float(np.ptp(x)) or 1e-4
@@ -243,25 +242,25 @@ def _um(metres: float) -> str:
 
 
 _FLOOR: Final = 1e-9
-"""Noise, in units of the amplitude, below which a record counts as exact."""
+"""Noise, relative to the amplitude, below which a record counts as exact."""
 _POOR: Final = 1e-3
-"""Residuals, in units of the amplitude, that do not matter."""
+"""Residuals, relative to the amplitude, that are always acceptable."""
 _LARGER: Final = 1.2
-"""Residuals, in units of the noise, with which a shape does not describe a current."""
+"""Residuals, relative to the noise, above which a waveform does not describe a current."""
 _INTERVALS: Final = 200
-"""Most pieces of a waveform that is taken from the record."""
+"""Largest number of segments of a waveform taken from the record."""
 
 
 class Pulse(Declared, eq=False):
-    """The waveform of one shot, and how well it is known."""
+    """Waveform of one shot, with the uncertainty of its constants."""
 
-    waveform: Waveform = part("at the values found")
+    waveform: Waveform = part("waveform at the estimated values")
     names: tuple[str, ...] = part(
-        'constants that are uncertain; "scale" for the size of a waveform taken from the record'
+        'uncertain constants; "scale" for the size of a waveform taken from the record'
     )
-    values: FloatArray = part("their values, SI, shape (n,)")
-    covariance: FloatArray = part("of these, shape (n, n)")
-    note: str = part("what is odd; may be empty", default="")
+    values: FloatArray = part("estimated values of these constants, SI, shape (n,)")
+    covariance: FloatArray = part("covariance of these constants, shape (n, n)")
+    note: str = part("remark; may be empty", default="")
 
     def changed(self, values: Sequence[float]) -> Waveform:
         """Return the waveform with other values of its constants."""
@@ -271,17 +270,17 @@ class Pulse(Declared, eq=False):
         return type(self.waveform)(**{**self.waveform.model_dump(), **new})
 
     def at(self, values: Sequence[float]) -> Pulse:
-        """Return the waveform at other values of its constants, as one that is known exactly."""
+        """Return the pulse at other values of its constants, without uncertainty."""
         waveform = self.changed(values) if self.names else self.waveform
         return Pulse(waveform, (), np.zeros(0), np.zeros((0, 0)))
 
 
 def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform | None, tau: float) -> Pulse:
-    """Fit the constants of a waveform to a recorded current, or take the record as the waveform.
+    """Fit the constants of a waveform to a recorded current, or use the record as the waveform.
 
-    The record has times, s, ascending, of which the firing is 0, and currents, A, both of shape (n,); the
-    waveform has constants near which to look, and `tau` is the time constant of the sensor, s. Messages begin
-    with `where`.
+    `t` are ascending times, s, with the firing at 0, and `current` the readings, A, both of shape (n,);
+    `waveform` gives the initial guess, and `tau` is the time constant of the sensor, s. Messages begin with
+    `where`.
     """
     noise = noise_of_record(current)
     top = float(np.percentile(np.abs(current[t >= 0.0]), 98.0)) if (t >= 0.0).any() else 0.0
@@ -308,12 +307,12 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
 def _fitted(
     t: FloatArray, current: FloatArray, waveform: Waveform, tau: float, top: float
 ) -> tuple[Pulse, float]:
-    """Return the pulse, and the size of the residuals, A."""
+    """Return the fitted pulse, and the RMS residual, A."""
     from scipy.optimize import least_squares
 
     names = tuple(name for name in quantities(type(waveform)) if getattr(waveform, name))
     base = waveform.model_dump()
-    # A logarithm keeps times positive, whatever the fit tries.
+    # Logarithms keep the times positive during the fit.
     sign = 1.0 if current[np.argmax(np.abs(current))] > 0.0 else -1.0
 
     def made(logs: FloatArray) -> Waveform:
@@ -331,7 +330,7 @@ def _fitted(
     def residuals(logs: FloatArray) -> FloatArray:
         return np.where(used, shown(logs) - current, 0.0) / top
 
-    # As the noise is not known before, the soft loss begins where residuals are a hundredth of the pulse.
+    # The noise is unknown beforehand, so the soft loss begins at residuals of 1 % of the pulse.
     rough = (least_squares(residuals, start, loss="soft_l1", f_scale=0.01) for start in starts)
     best: Any = min(rough, key=lambda solution: solution.cost)
     used = ~outliers_of(shown(best.x) - current, _FLOOR * top)
@@ -346,7 +345,7 @@ def _fitted(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Return where to begin: at the constants given, and with height and width as they look in the record."""
+    """Return two starts: the given constants, and those with height and width estimated from the record."""
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top
@@ -355,7 +354,7 @@ def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: f
 
 
 def _recorded(t: FloatArray, current: FloatArray, noise: float, note: str) -> Pulse:
-    """Return the record itself, averaged over short bins, as a waveform."""
+    """Return the record, averaged over short bins, as a waveform."""
     after = np.flatnonzero(t >= 0.0)
     each = max(1, -(-len(after) // _INTERVALS))
     bins = [after[i : i + each] for i in range(0, len(after), each)]
@@ -363,6 +362,6 @@ def _recorded(t: FloatArray, current: FloatArray, noise: float, note: str) -> Pu
     values = np.array([current[rows].mean() for rows in bins])
     scale = robust_scale(current) or 1.0
     waveform = Sampled.from_samples(times, values, interpolation="linear")
-    # What noise does to the impulse of the current, which is what moves the armature.
+    # Error of the impulse of the current due to noise; the impulse is what moves the armature.
     error = noise / scale / np.sqrt(len(after))
     return Pulse(waveform, ("scale",), np.ones(1), np.array([[max(error, _FLOOR) ** 2]]), note)

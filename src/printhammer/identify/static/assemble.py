@@ -1,6 +1,7 @@
-"""From a solution of least squares to the result that a user sees.
+"""Build fit results from least-squares solutions, and test the residuals.
 
-What residuals say of a law: a test against richer laws, a runs test, constants that go together.
+The tests compare the law with richer laws and look for runs in the residuals; inseparable constants are
+named.
 """
 
 from __future__ import annotations
@@ -29,35 +30,34 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray, IntArray
 
 LEVEL: Final = 0.01
-"""A law is said to be rejected where its data have less than this probability."""
+"""Significance level below which a law is rejected."""
 
 _RUNS: Final = (
     "residuals of neighbours go together: the data bend another way than the law, or the sensor is slow"
 )
 _COPY: Final = 1e-6
-"""Singular value of a Jacobian with columns of unit length below which a term is a copy of others."""
+"""Singular value of a normalised Jacobian below which a term is collinear with others."""
 
 _TOGETHER: Final = "the rows left out follow one another: there the data leave the law"
 
 _HARD_TO_TELL: Final = 30.0
-"""Condition number from which on it is said which constants go together."""
+"""Condition number above which inseparable constants are named."""
 
 
 def judge(
     solution: Solution, terms: Mapping[str, FloatArray], abscissa: FloatArray, series: IntArray
 ) -> tuple[float, str]:
-    """Test a law against ones with one more term each, its residuals and the rows left out for runs.
+    """Test a law against laws with one more term, and its residuals and outliers for runs.
 
-    A term is added to the linearised, weighted fit, and Student's t tells whether it is needed, with errors
-    and degrees of freedom as those of the fit. Two tests look at residuals in the order of the abscissa,
-    series by series: the runs of their signs, and von Neumann's ratio. A third one asks whether rows left out
-    follow one another more than single wrong readings do. The least probability counts once for each test
-    (Bonferroni).
+    Each term is added to the linearised, weighted fit, and a t-test, with errors and degrees of freedom as in
+    the fit, tells whether it is significant. Two tests examine the residuals in the order of the abscissa,
+    series by series: the runs of their signs, and von Neumann's ratio. A third test asks whether the excluded
+    rows are more consecutive than random gross errors would be. The smallest p-value is corrected for the
+    number of tests (Bonferroni).
 
-    Terms are what the law lacks, in the unit of the data, by what their need would mean; they, abscissa and
-    series have the shape (m,) of the data. Returned are the probability of so much against the law if it
-    holds, NaN where the data are exact or too few, and what speaks most against it, empty unless it is
-    rejected.
+    `terms` maps the meaning of a missing term to its values, in the unit of the data; terms, abscissa and
+    series have the shape (m,) of the data. Returned are the corrected p-value, NaN if the data are exact or
+    too few, and the meaning of the smallest one, empty unless the law is rejected.
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""
@@ -75,7 +75,7 @@ def judge(
 
 
 def need(solution: Solution, term: FloatArray) -> float:
-    """Return the probability that a law in need of no term asks for as much of it; NaN for a copy."""
+    """Return the p-value of one additional term in the linearised fit; NaN if it is collinear."""
     from scipy.stats import t
 
     root = np.sqrt(solution.variance[solution.used])
@@ -94,10 +94,10 @@ def need(solution: Solution, term: FloatArray) -> float:
 
 
 def runs_p_value(values: FloatArray) -> float:
-    """Test whether the signs of residuals, in their order, come in too few or too many runs.
+    """Return the p-value of the Wald-Wolfowitz runs test on the signs of ordered residuals.
 
-    The probability of a number of runs as far from the expected one is by the normal distribution of that
-    number (A. Wald and J. Wolfowitz, Ann. Math. Statist. 11 (1940) 147); NaN for fewer than 8 of either sign.
+    The number of runs is compared with its normal approximation, two-sided
+    (A. Wald and J. Wolfowitz, Ann. Math. Statist. 11 (1940) 147); NaN for fewer than 8 of either sign.
     """
     from scipy.stats import norm
 
@@ -113,10 +113,10 @@ def runs_p_value(values: FloatArray) -> float:
 
 
 def ratio_p_value(values: FloatArray) -> float:
-    """Return the probability that independent residuals of one size differ as little from their neighbours.
+    """Return the p-value of von Neumann's ratio against positive serial correlation.
 
-    The mean squared difference of neighbours over the mean square is nearly normal with the mean 2 and the
-    variance 4 (n - 2) / (n^2 - 1) (J. von Neumann, Ann. Math. Statist. 12 (1941) 367); NaN for fewer than 8.
+    The mean squared difference of neighbours over the mean square is nearly normal with mean 2 and variance
+    4 (n - 2) / (n^2 - 1) (J. von Neumann, Ann. Math. Statist. 12 (1941) 367); NaN for fewer than 8 values.
     """
     from scipy.stats import norm
 
@@ -129,10 +129,11 @@ def ratio_p_value(values: FloatArray) -> float:
 
 
 def stretch_p_value(signs: FloatArray) -> float:
-    """Bound the probability that rows which are wrong by chance follow one another as those left out do.
+    """Bound the probability that random gross errors are as consecutive as the excluded rows.
 
-    `signs` are those of the residuals, 0 for rows used. A stretch of k rows of one sign begins at any of n
-    places with the probability (1/2)^(k - 1) q^k, with q the fraction left out. NaN where no two follow.
+    `signs` are those of the residuals, 0 for used rows. A stretch of k excluded rows of one sign begins at
+    any of n places with probability (1/2)^(k - 1) q^k, with q the fraction excluded. NaN without two
+    consecutive rows.
     """
     longest = length = 0
     for before, here in zip([0.0, *signs.tolist()], signs.tolist(), strict=False):
@@ -145,10 +146,10 @@ def stretch_p_value(signs: FloatArray) -> float:
 
 
 def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
-    """Say which parameters the data hardly tell apart; nothing where the condition number is small.
+    """Describe the parameters that the data hardly distinguish; empty at a small condition number.
 
-    A sentence has the parameters whose common change the data resist least; one with an empty name is of no
-    interest.
+    The sentence names the parameters with large components in the weakest direction; parameters with an empty
+    name are skipped.
     """
     if solution.condition_number < _HARD_TO_TELL:
         return []
@@ -164,25 +165,25 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
 
 
 _WEAK: Final = 0.1
-"""Relative standard error from which on a constant gets a profile."""
+"""Relative standard error above which a constant gets a profile."""
 
 _GRID: Final = 25
 
 _COARSE: Final = 1e-8
-"""Relative tolerance of the descents of a profile."""
+"""Relative tolerance of the iterations of a profile."""
 
 
 class Data(Declared, eq=False):
-    """The data of a fit and where they were measured."""
+    """Data of a fit with their abscissa, series and origin."""
 
-    files: tuple[Path, ...] = part("where they come from")
+    files: tuple[Path, ...] = part("files of the data")
     kind: str = part('one of "magnet", "solenoid", "spring", "pack" and "backstop"')
-    abscissa: FloatArray = part("SI, shape (m,)")
-    values: FloatArray = part("SI, shape (m,)")
-    axes: tuple[tuple[str, str], tuple[str, str]] = part("names and SI units")
-    series: IntArray = part("place in `series_names`, shape (m,)")
-    series_names: tuple[str, ...] = part("for the legend")
-    lines: IntArray = part("lines of the files, shape (m,)")
+    abscissa: FloatArray = part("abscissa, SI, shape (m,)")
+    values: FloatArray = part("data, SI, shape (m,)")
+    axes: tuple[tuple[str, str], tuple[str, str]] = part("names and SI units of abscissa and data")
+    series: IntArray = part("index in `series_names`, shape (m,)")
+    series_names: tuple[str, ...] = part("names of the series, for the legend")
+    lines: IntArray = part("line numbers in the files, shape (m,)")
 
 
 def solved(data: Data, law: Law, start: FloatArray | Parameters, *, robust: bool) -> Solution:
@@ -191,7 +192,7 @@ def solved(data: Data, law: Law, start: FloatArray | Parameters, *, robust: bool
     Raises
     ------
     InputError
-        No parameters come near the data; names the line that lies farthest off.
+        No parameters come near the data; the message names the line that is farthest off.
     """
     try:
         return solve(law, data.values, start, robust=robust)
@@ -221,17 +222,17 @@ def assemble(
     p_value: float = math.nan,
     notes: Sequence[str] = (),
 ) -> Fit:
-    """Make the result of a fit, with intervals, and profiles of weak constants by the law.
+    """Build the result of a fit, with intervals, and with profiles of weakly determined constants.
 
-    Of each parameter key, SI unit, and whether a hammer file has it; an empty key stands for one that is of
-    no interest. `remedies` say by key what to measure to find a constant that has to be positive. `given`,
-    `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
+    `parameters` gives for each parameter its key, its SI unit, and whether a hammer file has it; an empty key
+    marks a nuisance parameter. `remedies` say, by key, what to measure to find a constant that must be
+    positive. `given`, `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
 
     Raises
     ------
     InputError
-        The 95 % interval of a constant that has to be positive reaches zero; says what is missing. Of a law
-        that the data reject, only that is said.
+        The 95 % interval of a constant that must be positive reaches zero, unless the law is rejected; the
+        message says what to measure.
     """
     kept = [k for k, (key, _unit, _in_file) in enumerate(parameters) if key and solution.free[k]]
     errors = solution.standard_errors
@@ -303,9 +304,9 @@ def assemble(
 
 
 def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profile:
-    """Hold one parameter at values about the best one and fit the others again.
+    """Compute the profile of one parameter: hold it at values about the best one, and refit the others.
 
-    The values go up to four standard errors away, within the bounds; rows and weights are as in the fit.
+    The values extend to four standard errors, within the bounds; rows and weights are those of the fit.
     """
     used, space = solution.used, replace(solution.parameters, tolerance=_COARSE)
     root = np.sqrt(solution.variance[used])
@@ -333,7 +334,7 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
 
 def _crossing(values: FloatArray, increase: FloatArray, level: float, never: float) -> float:
-    """Return where a profile first reaches a level, by straight lines between its roots."""
+    """Locate where a profile first reaches a level, by linear interpolation of its square root."""
     above = np.flatnonzero(increase >= level)
     if not above.size:
         return never
@@ -344,7 +345,7 @@ def _crossing(values: FloatArray, increase: FloatArray, level: float, never: flo
 
 
 def enough(data: Data, needed: int, what: str) -> None:
-    """Refuse data with fewer rows than a fit needs."""
+    """Raise `InputError` for data with fewer rows than a fit needs, or without a nonzero value."""
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
         raise InputError(

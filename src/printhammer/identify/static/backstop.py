@@ -1,17 +1,15 @@
-"""The backstop from the geometry of its bodies and from rebounds: k and l of equations (6) and (7).
+"""Fit the backstop: k from the geometry of its bodies, l/k from rebounds; equations (6) and (7).
 
-Radii, Young's moduli and Poisson ratios give k (Hertz). Rebound speeds against impact speeds give l/k, by
-the exact restitution law of `printhammer.identify.static.backstop`, whatever mass and stiffness; both
-together give l.
+Radii, Young's moduli and Poisson ratios give k (Hertz). Rebound speeds over impact speeds give l/k by the
+exact restitution law, which holds for any mass and stiffness; both together give l.
 
 Data: the columns ``impact speed`` and ``rebound speed``, both positive.
 
-The exact restitution of a free Hertz contact with the loss of equation (7), as a law to be fitted.
+The restitution law of a free Hertz contact with the loss of equation (7):
 
-    z - ln(1 + z) = -(y + ln(1 - y)),      z = (l/k) v_in,  y = (l/k) v_out
+  z - ln(1 + z) = -(y + ln(1 - y)),      z = (l/k) v_in,  y = (l/k) v_out
 
-Source: divide m v dv = -(k - l v) delta^1.5 dx by (k - l v) and integrate both ways; it holds at any mass and
-stiffness.
+Source: divide m v dv = -(k - l v) delta^1.5 dx by (k - l v) and integrate over both directions.
 """
 
 from __future__ import annotations
@@ -33,10 +31,10 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
 
 _SERIES: Final = (1.0, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225)
-"""y / z in powers of z, from the law by comparing coefficients."""
+"""Coefficients of y / z in powers of z, from the law by comparison of coefficients."""
 
 _SMALL: Final = 0.02
-"""Below this the series is exact to rounding, while the logarithms cancel."""
+"""Largest |z| at which the series is used: it is exact to rounding, whereas the logarithms cancel."""
 
 
 def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -46,7 +44,8 @@ def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     small = np.abs(z) < _SMALL
     wide = np.where(small, 1.0, z)
-    # With y = 1 - exp(-t) the right side is t - (1 - exp(-t)), convex: Newton's steps stay on one side.
+    # With y = 1 - exp(-t) the right side is t - (1 - exp(-t)), convex, so Newton's method converges
+    # monotonically.
     wanted = wide - np.log1p(wide)
     t = np.sign(wide) * np.sqrt(2.0 * wanted) + np.maximum(np.sign(wide), 0.0) * wanted
     for _ in range(50):
@@ -62,7 +61,7 @@ def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class RestitutionLaw:
-    """Rebound speed against impact speed, m/s, positive, shape (m,); p = [l/k]."""
+    """Rebound speed over impact speed, m/s, positive, shape (m,); p = [l/k]."""
 
     def __init__(self, speed: FloatArray) -> None:
         self.speed = speed
@@ -72,11 +71,11 @@ class RestitutionLaw:
         return self.speed * rebound(self._z(p))[0]
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives by l/k."""
+        """Return the derivatives with respect to l/k."""
         return (self.speed**2 * rebound(self._z(p))[1])[:, None]
 
     def spread(self, p: FloatArray) -> FloatArray:
-        """Return the components of the variance, absolute and in proportion, with the effect of both speeds.
+        """Return the variance components: absolute and proportional errors of both speeds.
 
         An error of the impact speed acts through the slope d(v_out)/d(v_in) = e + z de/dz.
         """
@@ -87,31 +86,31 @@ class RestitutionLaw:
         return np.column_stack([np.ones_like(z), squares, both])
 
     def _z(self, p: FloatArray) -> FloatArray:
-        # A step of the fit may not leave the values for which the law has a logarithm.
+        # Keeps an iterate within the domain of the logarithm.
         z: FloatArray = np.maximum(p[0] * self.speed, -0.9)
         return z
 
 
 RATIO: Final = "backstop.damping / backstop.stiffness"
-"""Key of l/k, s/m."""
+"""Key of l/k, whose unit is s/m."""
 
 _ROWS: Final = 6
 _SPAN: Final = 1.5
-"""Ratio of the largest to the least impact speed that shows how the restitution depends on the speed."""
+"""Smallest ratio of largest to smallest impact speed at which the law can be tested."""
 
 _AXES: Final = (("impact speed", "m/s"), ("rebound speed", "m/s"))
 
 
 @dataclass(frozen=True)
 class Stiffness:
-    """A Hertz stiffness k and where it comes from."""
+    """A Hertz stiffness k with its standard error and origin."""
 
     value: float
-    """k, N/m^1.5."""
+    """Stiffness k, N/m^1.5."""
     standard_error: float = 0.0
-    """The same unit; 0 where it is not known."""
+    """Standard error, in the same unit; 0 if unknown."""
     how: str = ""
-    """For the source of the constant; empty where the stiffness is taken as known, and not a result."""
+    """Source text of the constant; empty if the stiffness is taken as known and is not a result."""
 
     @classmethod
     def from_bodies(
@@ -120,16 +119,17 @@ class Stiffness:
         moduli: Sequence[tuple[float, float]],
         ratios: Sequence[tuple[float, float]],
     ) -> Stiffness:
-        """Return the stiffness of two bodies after Hertz, with the error of first order that follows.
+        """Compute the Hertz stiffness of two bodies, with its standard error to first order.
 
         Parameters
         ----------
         radii : sequence of tuple
-            Radius and its standard error, m, of the armature and, unless it is flat, of the backstop.
+            Radius and its standard error, m, of the armature and, unless the backstop is flat, of the
+            backstop.
         moduli : sequence of tuple
-            Young's moduli of both and their standard errors, Pa.
+            Young's moduli of both bodies and their standard errors, Pa.
         ratios : sequence of tuple
-            Poisson ratios of both and their standard errors.
+            Poisson ratios of both bodies and their standard errors.
         """
         for name, pairs, counts in (
             ("radius", radii, (1, 2)),
@@ -168,7 +168,7 @@ def fit_backstop(
     robust: bool = True,
     columns: str | None = None,
 ) -> Fit:
-    """Find l/k from rebounds, "backstop.stiffness" from the bodies, and "backstop.damping" with both.
+    """Fit l/k to rebounds, compute "backstop.stiffness" from the bodies, and "backstop.damping" from both.
 
     The table has the columns ``impact speed`` and ``rebound speed``; a stiffness k that is a float, N/m^1.5,
     is taken as known. See `printhammer.identify.fitting.fit`.
@@ -176,8 +176,8 @@ def fit_backstop(
     Raises
     ------
     InputError
-        Neither is given, the table cannot be used or is too small, or its rebounds are faster than their
-        impacts.
+        Neither a table nor a stiffness is stated, the table is invalid or too small, or its rebounds are
+        faster than its impacts.
     """
     k = Stiffness(float(stiffness)) if isinstance(stiffness, (int, float)) else stiffness
     if path is None:
@@ -234,7 +234,7 @@ def fit_backstop(
 
 
 def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
-    """Say how the rebounds differ from the law."""
+    """Describe how the rebounds deviate from the law."""
     used = solution.used
     share = (back / speed)[used]
     constant = float(np.median(share))
@@ -251,7 +251,7 @@ def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
 
 
 def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
-    """Return the fit with k, and with l of k and l/k."""
+    """Return the fit with k added, and with l from k and l/k."""
     from dataclasses import replace
 
     ratio = fit[RATIO]
@@ -267,7 +267,7 @@ def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
     damping = FittedConstant(
         "backstop.damping", value, error, (value - half, value + half), "N s/m^2.5", how=how
     )
-    # What is known of k and of l/k has nothing in common; l follows from both.
+    # The errors of k and of l/k are independent; l follows from both.
     slopes = {constant.key: (0.0, 1.0), damping.key: (k.value, ratio.value)}
     constants = {RATIO: ratio, constant.key: constant, damping.key: damping}
     given = dict(fit.given)
@@ -279,12 +279,12 @@ def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
 
 
 def _constant(k: Stiffness) -> FittedConstant:
-    # Errors of bodies are given, not estimated from few data: the normal distribution.
+    # The errors of the bodies are stated, not estimated from few data, so the distribution is normal.
     return FittedConstant.of("backstop.stiffness", k.value, k.standard_error, math.inf, "N/m^1.5", how=k.how)
 
 
 def _of_bodies(k: Stiffness) -> Fit:
-    """Return a fit without data."""
+    """Return a result without data, for a stiffness from the bodies alone."""
     none = np.empty(0)
     whole = np.empty(0, dtype=np.int64)
     return Fit(

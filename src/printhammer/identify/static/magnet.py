@@ -1,11 +1,9 @@
-"""The magnet from forces against displacement and current: F0, Am and Bm of equation (3).
+"""Fit the magnet to forces over displacement and current: F0, Am and Bm of equation (3).
 
-    F(x, I) = F0 - (Am - Bm I)^2 / sqrt(x) + Bs - (Bs / As)(x - b)
+  F(x, I) = F0 - (Am - Bm I)^2 / sqrt(x) + Bs - (Bs / As)(x - b)
 
 Data: the columns ``displacement``, ``current``, ``force``, the static force of magnet and spring together,
-positive toward the paper; and, to tell both apart, a table of the spring alone.
-
-The force of magnet and spring together, equations (3) and (4), as a law to be fitted.
+positive toward the paper; and, to separate both, a table of the spring alone.
 """
 
 from __future__ import annotations
@@ -28,8 +26,8 @@ class TotalLaw:
     """Force of magnet and spring at measured displacements, m, and currents, A, shape (m,).
 
     With the position b of the backstop, m, p = [F0, Am, Bm, Bs, As]; without it p = [C, Am, Bm, K] and the
-    force is C - K x - (Am - Bm I)^2 / sqrt(x). A current that is NaN says that there is no magnet. `zero` is
-    what the sensor shows at x = 0, m; None where it is fitted too, and then it is the last of p.
+    force is C - K x - (Am - Bm I)^2 / sqrt(x). A NaN current marks a row without the magnet. `zero` is the
+    sensor reading at x = 0, m; with None it is fitted, as the last element of p.
     """
 
     def __init__(
@@ -52,7 +50,7 @@ class TotalLaw:
         return force
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives by the parameters."""
+        """Return the derivatives with respect to the parameters."""
         x, magnet = self._place(p), self.magnet.astype(np.float64)
         left = p[1] - p[2] * self.current
         pull = [-2.0 * left / np.sqrt(x) * magnet, 2.0 * left * self.current / np.sqrt(x) * magnet]
@@ -66,17 +64,17 @@ class TotalLaw:
         return np.column_stack(columns)
 
     def spread(self, p: FloatArray) -> FloatArray:
-        """Return the components of the variance: force with and without magnet, displacement, current."""
+        """Return the variance components: force with and without magnet, displacement, current."""
         magnet = self.magnet.astype(np.float64)
         by_current = 2.0 * p[2] * (p[1] - p[2] * self.current) / np.sqrt(self._place(p)) * magnet
         return np.column_stack([magnet, 1.0 - magnet, (self._slope(p) * magnet) ** 2, by_current**2])
 
     def at(self, p: FloatArray, x: FloatArray, current: FloatArray) -> FloatArray:
-        """Return the force at displacements in m, from x = 0, and currents."""
+        """Return the force at displacements measured from x = 0, m, and currents, A."""
         return TotalLaw(x, current, self.position, 0.0).value(p)
 
     def richer(self, p: FloatArray, *, by_current: bool) -> dict[str, FloatArray]:
-        """Return terms that equation (3) lacks, by what they would mean."""
+        """Return terms that equation (3) lacks, by the meaning of each."""
         x, magnet, current = self._place(p), self.magnet.astype(np.float64), self.current
         place = "the pull does not follow the inverse root of the displacement"
         square = "the pull does not follow the square of Am - Bm I"
@@ -87,7 +85,7 @@ class TotalLaw:
 
     def _place(self, p: FloatArray) -> FloatArray:
         zero = p[-1] if self.zero is None else self.zero
-        # A step of the fit may not take the nearest row beyond the place where the law ends.
+        # An iterate may not move the nearest row beyond x = 0, where the law is singular.
         place: FloatArray = np.maximum(self.x - zero, 1e-3 * self.x.min())
         return place
 
@@ -99,14 +97,14 @@ class TotalLaw:
 
 
 def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
-    """Return C, Am, Bm and K to begin with, from a fit that is linear in Am^2, Am Bm and Bm^2.
+    """Return initial guesses of C, Am, Bm and K, from a fit that is linear in Am^2, Am Bm and Bm^2.
 
-    `levels` is the number of different currents, 0 for very many, `zero` what the sensor shows at x = 0, m.
+    `levels` is the number of distinct currents, 0 for a continuum; `zero` is the sensor reading at x = 0, m.
 
     Raises
     ------
     InputError
-        The force does not behave as one of a magnet whose pull a current weakens.
+        The forces do not show a magnet whose pull is weakened by a current.
     """
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     root = 1.0 / np.sqrt(x - zero)
@@ -137,7 +135,7 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
 
 
 def _least_absolute(columns: FloatArray, data: FloatArray) -> FloatArray:
-    """Return the coefficients with the least sum of absolute residuals, which outliers hardly move."""
+    """Minimise the sum of absolute residuals by iteratively reweighted least squares; robust to outliers."""
     length = np.linalg.norm(columns, axis=0)
     rows = columns / length
     scaled = np.linalg.lstsq(rows, data, rcond=None)[0]
@@ -150,10 +148,10 @@ def _least_absolute(columns: FloatArray, data: FloatArray) -> FloatArray:
 
 
 _SPARE: Final = 4
-"""Rows more than parameters, for the errors and the test of the law."""
+"""Smallest number of rows in excess of parameters, for the errors and the test of the law; arbitrary."""
 
 _LEVELS: Final = 12
-"""Currents that are shown one by one; of more, all are one series."""
+"""Largest number of distinct currents shown as separate series."""
 
 _COMBINED: Final = "magnet.F0 + spring.Bs (1 + b / spring.As)"
 _SLOPE: Final = "spring.Bs / spring.As"
@@ -169,19 +167,19 @@ def fit_magnet(
     robust: bool = True,
     columns: str | None = None,
 ) -> Fit:
-    """Fit the magnet, and with it the spring.
+    """Fit the magnet, together with the spring.
 
     The table has the columns ``displacement``, ``current`` and ``force``, of magnet and spring together;
-    `spring` is one of the spring alone, without currents, which needs the position b of the backstop, m.
-    `zero` is what the displacement sensor shows at x = 0, m; None to fit it. Found are "magnet.F0",
-    "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As"; without a table of the spring only "magnet.Am",
+    `spring` is a table of the spring alone, without currents, which requires the position b of the backstop,
+    m. `zero` is the sensor reading at x = 0, m; None to fit it. The result has the constants "magnet.F0",
+    "magnet.Am", "magnet.Bm", "spring.Bs" and "spring.As"; without a table of the spring, only "magnet.Am",
     "magnet.Bm" and the two combinations that the forces determine. See `printhammer.identify.fitting.fit`.
 
     Raises
     ------
     InputError
-        A table cannot be used or is too small, its force never releases the armature, or a constant is not
-        told from zero.
+        A table is invalid or too small, its force never releases the armature, or a constant cannot be
+        distinguished from zero.
     """
     table = read_table(path, {"displacement": "m", "current": "A", "force": "N"}, columns=columns)
     alone = None if spring is None else read_table(spring, {"displacement": "m", "force": "N"})
@@ -194,7 +192,7 @@ def fit_magnet(
         )
     data = _data(table, alone)
     x = data.abscissa
-    # NaN where there is no magnet.
+    # NaN marks the rows without the magnet.
     current = np.concatenate([table.values["current"], np.full(0 if alone is None else len(alone), math.nan)])
     law = TotalLaw(x, current, position if alone is not None else None, zero)
     enough(data, law.parameters + _SPARE, "the constants of the magnet and their errors")
@@ -249,7 +247,7 @@ def _data(table: Readings, alone: Readings | None) -> Data:
 
 
 def _check(table: Readings, alone: Readings | None, zero: float, position: float | None) -> int:
-    """Refuse a table that allows no fit; return the number of different currents, 0 for very many."""
+    """Check that a table allows a fit; return the number of distinct currents, 0 for a continuum."""
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     low = int(np.argmin(x))
     if x[low] <= zero:
@@ -296,7 +294,7 @@ def _never(table: Readings, place: float, force: float) -> str:
 def _releases(
     table: Readings, law: TotalLaw, p: FloatArray, zero: float | None, position: float | None
 ) -> None:
-    """Refuse constants with which the force never becomes positive where the armature rests."""
+    """Raise `InputError` if no measured current makes the force positive at the rest position."""
     offset = float(p[-1]) if zero is None else zero
     place = float(table.values["displacement"].min()) - offset if position is None else position
     currents = np.unique(table.values["current"])
@@ -335,7 +333,7 @@ def _indistinct(with_spring: bool, levels: int) -> list[str]:
 
 
 def clusters(values: FloatArray) -> int:
-    """Count the groups into which values fall, with gaps of a twentieth of their span; 0 for a continuum."""
+    """Count the clusters of values, separated by gaps of 5 % of their span; 0 for a continuum."""
     if float(np.ptp(values)) <= 1e-3 * float(np.abs(values).max()):
         return 1
     groups = 1 + int(group_of(values).max())
@@ -343,7 +341,7 @@ def clusters(values: FloatArray) -> int:
 
 
 def group_of(values: FloatArray) -> IntArray:
-    """Return to which of these groups each value belongs, from 0 for the least."""
+    """Return the index of the cluster of each value, in ascending order of the clusters."""
     order = np.argsort(values, kind="stable")
     apart = np.diff(values[order]) > 0.05 * float(np.ptp(values))
     group = np.empty(len(values), dtype=np.int64)

@@ -1,14 +1,12 @@
-"""The pack from its force against indentation: the stiffness AiEp of equation (5), the exponents if asked.
+"""Fit the pack to its force over indentation: the stiffness AiEp of equation (5), optionally the exponents.
 
-    loading    F = S r^p                    r = indentation / d,  p = 2.7,  q = 11
-    unloading  F = S rho^(p - q) r^q        rho = r at the turning point
+  loading    F = S r^p                    r = indentation / d,  p = 2.7,  q = 11
+  unloading  F = S rho^(p - q) r^q        rho = r at the turning point
 
-Data: the columns ``indentation`` from the front of the pack, ``force`` as a magnitude, and ``branch``,
-"loading" or "unloading"; rows in the order measured. Without ``branch`` it follows from the sense of the
-indentation. The turning point of each cycle is fitted with the constants, not read off: the unloading force
-depends on its 8.3th power, and the largest indentation measured is too large by the noise.
-
-Load cycles of a pack: which rows are loading, which unloading, and whether the force grows as it must.
+Data: the columns ``indentation`` from the front of the pack, ``force`` as a magnitude, and ``branch``, with
+the words "loading" or "unloading"; rows in the order of measurement. Without ``branch``, the direction of the
+indentation decides. The turning point of each cycle is fitted too, not read off: the unloading force depends
+on its 8.3th power, and the largest measured indentation is biased upward by noise.
 """
 
 from __future__ import annotations
@@ -29,24 +27,24 @@ from printhammer.support.tables.readings import Readings, read_table
 from printhammer.units import from_si
 
 _TURN: Final = 0.05
-"""Part of the largest indentation by which it has to turn back before the sense counts as changed."""
+"""Reversal of the indentation, as a fraction of its largest, that counts as a change of direction."""
 
 _FALL: Final = 0.05
-"""Part of the largest force by which loading may fall before it counts as falling."""
+"""Fall of the loading force, as a fraction of the largest, that counts as a decrease."""
 
 
 class Cycles(Declared, eq=False):
     """Branch and load cycle of each row."""
 
     unloading: BoolArray = part("whether a row is on the unloading branch, shape (m,)")
-    cycle: IntArray = part("number of the load cycle, from 0, shape (m,)")
-    unloaded: IntArray = part("cycles with rows of unloading inside the pack, ascending")
+    cycle: IntArray = part("index of the load cycle, shape (m,)")
+    unloaded: IntArray = part("indices of the cycles with unloading rows inside the pack, ascending")
 
 
 def cycles_of(table: Readings) -> Cycles:
-    """Divide a table into load cycles; each run of loading rows begins a new one.
+    """Divide a table into load cycles; each sequence of loading rows begins a new cycle.
 
-    Without the column ``branch`` the sense of the indentation decides.
+    Without the column ``branch``, the direction of the indentation separates loading from unloading.
     """
     depth = table.values["indentation"]
     words = table.words.get("branch")
@@ -54,7 +52,7 @@ def cycles_of(table: Readings) -> Cycles:
     cycle = np.zeros(len(depth), dtype=np.int64)
     deepest = depth[0]
     for k in range(1, len(depth)):
-        # A run of loading alone that starts over is a cycle too.
+        # A loading sequence that starts over without unloading is a new cycle too.
         over = not unloading[k] and depth[k] < depth[k - 1] - 0.5 * deepest
         new = (unloading[k - 1] and not unloading[k]) or (over and not unloading[k - 1])
         cycle[k] = cycle[k - 1] + new
@@ -63,7 +61,7 @@ def cycles_of(table: Readings) -> Cycles:
 
 
 def _by_sense(depth: FloatArray) -> BoolArray:
-    """Return which rows come after a largest indentation and before the next smallest one."""
+    """Mask of the rows between a local maximum of the indentation and the next minimum."""
     unloading = np.zeros(len(depth), dtype=bool)
     least = _TURN * float(np.ptp(depth))
     extreme, falling = 0, False
@@ -72,7 +70,7 @@ def _by_sense(depth: FloatArray) -> BoolArray:
         if (ahead <= 0.0) if falling else (ahead >= 0.0):
             extreme = k
         elif abs(ahead) > least:
-            # What lies between the extreme and here already went the other way.
+            # The rows since the extreme already belong to the new direction.
             unloading[extreme + 1 : k + 1] = not falling
             extreme, falling = k, not falling
         unloading[k] = falling
@@ -80,13 +78,13 @@ def _by_sense(depth: FloatArray) -> BoolArray:
 
 
 def check_loading(table: Readings, cycles: Cycles) -> None:
-    """Refuse a loading branch that is none.
+    """Raise `InputError` for an implausible loading branch.
 
     Raises
     ------
     InputError
-        In some cycle the indentation does not grow on the loading branch, or the force falls by more than
-        noise explains.
+        In a cycle, the indentation does not grow on the loading branch, or the force falls by more than noise
+        explains.
     """
     depth, force = table.values["indentation"], table.values["force"]
     for cycle in np.unique(cycles.cycle):
@@ -106,7 +104,7 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 expected="one that grows",
             )
         order = rows[np.argsort(depth[rows], kind="stable")]
-        # Running medians, of as many values as there are enough for, pass single outliers over.
+        # Running medians, as wide as the number of rows allows, suppress single outliers.
         width = 5 if len(order) >= 9 else 3 if len(order) >= 5 else 1
         padded = np.pad(force[order], width // 2, mode="edge")
         smooth = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
@@ -134,17 +132,17 @@ LOADING, UNLOADING = 2.7, 11.0
 _SPARE: Final = 4
 _LOADING_ROWS: Final = 4
 _MEETS: Final = 0.02
-"""Part of the largest indentation by which the branches may meet elsewhere without a word."""
+"""Offset of a turning point, as a fraction of the largest indentation, below which no remark is made."""
 
 _FAR: Final = 1.0
-"""Logarithm of how far from the largest indentation they may meet at all."""
+"""Largest absolute logarithm of fitted over measured turning point."""
 
 
 class PackLaw:
-    """Equation (5) at measured indentations over the thickness of the pack, r, shape (m,).
+    """Equation (5) at measured indentations relative to the thickness of the pack, r, shape (m,).
 
-    p = [S, ln rho of each cycle with unloading rows], and the two exponents at its end if they are fitted. An
-    error of the indentation has its slope over the thickness, m.
+    p = [S, ln rho of each cycle with unloading rows], followed by the two exponents if they are fitted.
+    `thickness`, m, converts an error of the indentation to an error of r.
     """
 
     def __init__(self, r: FloatArray, cycles: Cycles, exponents: bool, thickness: float) -> None:
@@ -166,7 +164,7 @@ class PackLaw:
         return np.where(self.inside, p[0] * np.exp(power), 0.0)
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return its derivatives by the parameters."""
+        """Return the derivatives with respect to the parameters."""
         force, (low, high) = self.value(p), self.exponents(p)
         columns = [force / p[0]]
         for k in range(len(self.turns)):
@@ -177,13 +175,13 @@ class PackLaw:
         return np.column_stack(columns)
 
     def by_exponents(self, p: FloatArray) -> list[FloatArray]:
-        """Return the derivatives of the force by the two exponents."""
+        """Return the derivatives of the force with respect to the two exponents."""
         force, out = self.value(p), self.cycles.unloading
         depth = p[1 + self.column] if len(self.turns) else np.zeros_like(force)
         return [np.where(out, depth, self.log_r) * force, np.where(out, (self.log_r - depth) * force, 0.0)]
 
     def spread(self, p: FloatArray) -> FloatArray:
-        """Return the components of the variance: force, force in proportion, indentation."""
+        """Return the variance components: absolute force, proportional force, indentation."""
         force, (low, high) = self.value(p), self.exponents(p)
         steep = np.where(self.cycles.unloading, high, low) / (np.exp(self.log_r) * self.thickness)
         return np.column_stack([np.ones_like(force), force**2, (steep * force) ** 2])
@@ -201,16 +199,15 @@ def fit_pack(
     robust: bool = True,
     columns: str | None = None,
 ) -> Fit:
-    """Fit "pack.stiffness" to a table with the columns ``indentation``, ``force`` and perhaps ``branch``.
+    """Fit "pack.stiffness" to a table with the columns ``indentation``, ``force`` and optionally ``branch``.
 
-    The thickness d of the pack, platen less front, is in m. With `exponents` those of loading and unloading
-    are fitted too, instead of 2.7 and 11. See `printhammer.identify.fitting.fit`.
+    `thickness` is the thickness d of the pack, platen minus front, m. With `exponents`, those of loading and
+    unloading are fitted too, instead of 2.7 and 11. See `printhammer.identify.fitting.fit`.
 
     Raises
     ------
     InputError
-        The table cannot be used or is too small, a branch is missing, or the force falls on the loading
-        branch.
+        The table is invalid or too small, a branch is missing, or the force falls on the loading branch.
     """
     if not thickness > 0.0:
         raise InputError(
@@ -263,7 +260,7 @@ def fit_pack(
 
 
 def _start(law: PackLaw, table: Readings) -> FloatArray:
-    """Return the parameters to begin with; refuse too few or negative forces of loading in the pack."""
+    """Return the initial guess; raise `InputError` for too few or negative loading forces in the pack."""
     force, cycles = table.values["force"], law.cycles
     rows = np.flatnonzero(law.inside & ~cycles.unloading)
     if len(rows) < _LOADING_ROWS:
@@ -287,7 +284,7 @@ def _start(law: PackLaw, table: Readings) -> FloatArray:
 
 
 def _check_turns(law: PackLaw, table: Readings, solution: Solution) -> None:
-    """Refuse a load cycle whose branches meet nowhere near what was measured."""
+    """Raise `InputError` for a load cycle whose branches meet far from the measured turning point."""
     for turn, meeting in zip(law.turns, solution.p[1:], strict=False):
         rows = np.flatnonzero(law.inside & (law.cycles.cycle == turn))
         if abs(meeting - law.log_r[rows].max()) > _FAR:
@@ -303,7 +300,7 @@ def _check_turns(law: PackLaw, table: Readings, solution: Solution) -> None:
 
 
 def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
-    """Test the exponents of equation (5); return the probability, and why they are rejected."""
+    """Test the exponents of equation (5); return the p-value, and the reason of a rejection."""
     out = bool(len(law.turns))
     terms = dict(zip("pq", law.by_exponents(solution.p)[: 1 + out], strict=False))
     p_value, why = judge(solution, terms, data.abscissa, data.series)
@@ -323,7 +320,7 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
 
 
 def _notes(law: PackLaw, table: Readings, solution: Solution) -> list[str]:
-    """Say what is missing, and where the branches meet elsewhere than at the largest indentation."""
+    """List remarks: missing unloading rows, and turning points away from the largest indentation."""
     if not len(law.turns):
         return ["without rows of unloading the hysteresis of the pack is taken from equation (5), not tested"]
     sentences = []

@@ -1,9 +1,9 @@
-"""The magnetic circuit of a solenoid from forces and inductances against its gap: the law `reluctance`.
+"""Fit the magnetic circuit of a solenoid, the law `reluctance`, to forces and inductances over its gap.
 
-Data: the columns ``gap``, ``force``, the magnitude of the pull, and ``inductance`` or ``linkage``, perhaps
-``current``; a static measurement or field computation. Force and linkage at one current tell the saturation:
-without it, the force is that current's square times half the slope of the inductance. Both are fitted by
-their logarithms, so that each row counts by its relative error.
+Data: the columns ``gap``, ``force``, the magnitude of the pull, and ``inductance`` or ``linkage``, optionally
+``current``; from a static measurement or a field computation. Force and linkage at one current determine the
+saturation: without saturation, the force is half the square of the current times the slope of the inductance.
+Both are fitted in logarithms, so that each row counts by its relative error.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ CONSTANTS: Final = {
     "leakage": "H",
     "leakage_reach": "m",
 }
-"""What is fitted, with its SI unit."""
+"""Fitted constants and their SI units."""
 
 _REACH: Final = 1e3
-"""Factor by which constants may go away from those that the fit begins with."""
+"""Largest factor between a fitted constant and its initial guess; arbitrary."""
 
 _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
-"""Constants whose effect vanishes where they are large; of the others, where they are small."""
+"""Constants whose effect vanishes when they are large, as that of the others when they are small."""
 
 _FACTOR: Final = 4.0
-"""Factor between force and slope of the inductance that no saturation explains; a pound-force is 4.4 N."""
+"""Factor between force and slope of the inductance beyond saturation; a pound-force is 4.4 N."""
 
 _SPARE: Final = 4
-"""Rows more than parameters, for the errors."""
+"""Smallest number of rows in excess of parameters, for the errors; arbitrary."""
 
 _STARTS: Final = 8
-"""Places from which the best constants are sought; the first is an estimate, the others scatter about it."""
+"""Number of starts of the multi-start search; the first is an estimate, the others scatter about it."""
 
 
 def fit_solenoid(
@@ -58,16 +58,16 @@ def fit_solenoid(
     robust: bool = True,
     columns: str | None = None,
 ) -> Fit:
-    """Fit the law `reluctance` to a table of one coil of a number of turns.
+    """Fit the law `reluctance` to a table of one coil with a given number of turns.
 
-    The current, A, is that of all rows where the table has no column of it. What is fitted are the
-    `CONSTANTS`, as of a magnet that pulls toward the paper and is closed at 0; a gap does not tell where
-    that is. Options of all fits are described with `printhammer.identify.fitting.fit`.
+    `current`, A, applies to all rows of a table without that column. The `CONSTANTS` are fitted for a magnet
+    that pulls toward the paper and is closed at 0; a table over the gap does not determine that position.
+    Common options are described with `printhammer.identify.fitting.fit`.
 
     Raises
     ------
     InputError
-        The table cannot be used, is too small, or has neither inductances nor linkages.
+        The table is invalid, is too small, or has neither inductances nor linkages.
     """
     more = {"current": "A", "inductance": "H", "linkage": "Wb", "armature flux": "Wb"}
     table = read_table(path, {"gap": "m", "force": "N"}, optional=more, columns=columns)
@@ -123,7 +123,7 @@ def fit_solenoid(
     law = CircuitLaw(gap, currents, turns)
     start = _start(law, gap, force, linkage, data.values)
     least, most = start / _REACH, start * _REACH
-    # Without fringe, iron or an end of the leakage, where the data show none.
+    # Values without fringe, iron or a limit of the leakage, for constants that the data do not show.
     rest = np.where([name in _ABSENT_HIGH for name in CONSTANTS], most, least)
     space = Parameters.of(start, low=least, high=most, size=0.0, rest=rest)
     solution = solved(data, law, space, robust=robust)
@@ -143,10 +143,10 @@ def fit_solenoid(
 def _check_factor(
     path: Path, gap: FloatArray, current: FloatArray, force: FloatArray, linkage: FloatArray
 ) -> None:
-    """Refuse forces that are far from what the inductances at the same currents ask for.
+    """Raise `InputError` if the forces are far from the slope of the inductance at the same currents.
 
-    Between neighbouring gaps the force is i^2 / 2 times the chord of the inductance; where the inductance
-    falls as the inverse of the gap, their geometric mean is that exactly.
+    Between neighbouring gaps the force is i^2 / 2 times the difference quotient of the inductance; for an
+    inductance inversely proportional to the gap, the geometric mean of the two forces equals it exactly.
     """
     order = np.lexsort((gap, current))
     g, i, f, inductance = gap[order], current[order], force[order], (linkage / current)[order]
@@ -168,7 +168,7 @@ def _check_factor(
 
 
 class CircuitLaw:
-    """Logarithms of force and linkage at gaps, m, and currents, A, shape (2 m,); p are the `CONSTANTS`."""
+    """Logarithms of force and linkage at gaps, m, and currents, A, shape (2 m,); p holds the `CONSTANTS`."""
 
     def __init__(self, gap: FloatArray, current: FloatArray, turns: float) -> None:
         self.turns = turns
@@ -186,7 +186,7 @@ class CircuitLaw:
         return logarithms
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives by the parameters, by central differences."""
+        """Return the derivatives with respect to the parameters, by central differences."""
         steps = 1e-5 * p
         columns = [
             (self.value(p + step) - self.value(p - step)) / (2.0 * size)
@@ -195,14 +195,14 @@ class CircuitLaw:
         return np.column_stack(columns)
 
     def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return the components of the variance: the relative errors of force and of linkage."""
+        """Return the variance components: the relative errors of force and of linkage."""
         return np.repeat(np.eye(2), len(self.rows), axis=0)
 
 
 def _start(
     law: CircuitLaw, gap: FloatArray, force: FloatArray, linkage: FloatArray, data: FloatArray
 ) -> FloatArray:
-    """Return constants near the best ones: the best of several descents in their logarithms."""
+    """Return an initial guess: the best of several least-squares searches in the logarithms."""
     from scipy.optimize import least_squares
 
     current = np.array([row[1] for row in law.rows])

@@ -1,8 +1,8 @@
-"""The spring from its force against displacement: Bs and As of equation (4).
+"""Fit the spring to its force over displacement: Bs and As of equation (4).
 
     F = Bs - (Bs / As)(x - b)
 
-Data: the columns ``displacement``, ``force``, the spring alone, positive toward the paper.
+Data: the columns ``displacement`` and ``force`` of the spring alone, positive toward the paper.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ class SpringLaw:
         return np.asarray(p[0] * (1.0 - self.travel / p[1]))
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return its derivatives by Bs and As."""
+        """Return the derivatives with respect to Bs and As."""
         return np.column_stack([1.0 - self.travel / p[1], p[0] * self.travel / (p[1] * p[1])])
 
     def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return one component: where the slope is the same, an error in x only adds to that in the force."""
+        """Return one variance component: on a line, an error in x only adds to the error in the force."""
         return np.ones((len(self.travel), 1))
 
 
 def fit_spring(path: str | Path, *, position: float, robust: bool = True, columns: str | None = None) -> Fit:
     """Fit "spring.Bs" and "spring.As" to a table with the columns ``displacement`` and ``force``.
 
-    The position b of the backstop is in m; options of all fits are described with
+    `position` is the position b of the backstop, m; common options are described with
     `printhammer.identify.fitting.fit`.
 
     Raises
     ------
     InputError
-        The table cannot be used, is too small, or its force does not fall along a positive line.
+        The table is invalid, is too small, or its force does not fall linearly from a positive value.
     """
     table = read_table(path, {"displacement": "m", "force": "N"}, columns=columns)
     x, force = table.values["displacement"], table.values["force"]
@@ -89,7 +89,7 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True, column
 
 
 def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
-    """Return Bs and As of a line that half of the rows may lie off."""
+    """Return initial guesses of Bs and As by the Theil-Sen estimator, robust to outliers."""
     from scipy.stats import theilslopes
 
     slope, height = (float(part) for part in theilslopes(force, travel)[:2])
