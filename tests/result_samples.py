@@ -78,6 +78,10 @@ def learning(hammer: Hammer) -> Result:
         limits=Limits(),
         dots=np.array([0, 25]),
         learned=np.array([False, True]),
+        misfit=np.array([np.nan, 1.1]),
+        multiplier=np.array([np.nan, 0.7]),
+        expected=np.array([np.nan, 0.9]),
+        certainty=np.array([np.nan, 0.6]),
         slot=np.array([192, 194, 195]),
         force_deviation=off,
         arrival_deviation=1e-4 * off,
@@ -86,6 +90,8 @@ def learning(hammer: Hammer) -> Result:
         believed=np.array([2e-3]),
         uncertainty=np.array([1e-5]),
         contraction=np.array([0.98]),
+        offset=2e-5,
+        offset_uncertainty=1e-6,
         seed=1,
     )
 

@@ -1,10 +1,11 @@
 """Measure what each way to drive prints on hammers nobody has measured, and what learning adds.
 
 Run it with ``.venv/bin/python docs/measure/learning.py``. It draws hammers from the variability of a
-production, and counts the dots of the de Bruijn cycle of order 8 within limits at parts of the nominal
-hammer's open-loop safe rate: open loop, table and robust table, each with the hammer's own pulse and with a
-fast switch, and what is learned after some dots from times of impact with 5 us of noise, and with forces to 3
-% as well: all units at 1.5 times, a fifth of them elsewhere. It takes an hour on two cores.
+production, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots within limits at
+parts of the nominal hammer's open-loop safe rate: open loop, table and robust table, each with the hammer's
+own pulse and with a fast switch, and what is learned after some dots from times of impact with 5 us of noise,
+and with forces to 3 % as well: all units at 1.5 times, a fifth of them elsewhere. It takes an hour on two
+cores.
 
 ``--units N`` draws another number, ``--feedback N`` lets feedback print a cycle of order 6 on as many of
 them. ``--sensors`` tries other sensors instead, ``--tolerance`` other variabilities, ``--drivers`` other
@@ -29,7 +30,7 @@ import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.plant import driver_of
-from printhammer.control.learning.law import LearningLaw
+from printhammer.control.learning.law import PRINTED, LearningLaw
 from printhammer.control.learning.learn import calibrate
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.sensor import ImpactSensor
@@ -78,14 +79,13 @@ ROOMS = (
     "printing/rates",
     "support/threads",
 )
-CYCLE = slots_of(cycle_with_lead_in())
 
 
 def shares(units: list[ph.Hammer], single: object, rate: float, way: Strategy) -> np.ndarray:
-    """Return the share of the dots of the cycle within limits, for each unit."""
+    """Return the share of the dots of cycle and rows within limits, for each unit."""
     trial = attempt(
         [Case(unit, single, rate) for unit in units],
-        [CYCLE],
+        [PRINTED],
         way,
         limits=Limits(),
         tolerance=DISPLAY_TOLERANCE,
@@ -119,8 +119,7 @@ def learned(law: LearningLaw, units: list[ph.Hammer], sensor: ImpactSensor) -> d
 def learned_by(units: list[ph.Hammer]) -> dict[int, np.ndarray]:
     """Return the same for some of the units."""
     stages = calibrate(SHARED["law"], units, SHARED["sensor"])[1]
-    printed = np.asarray(CYCLE) >= LEAD_IN
-    return {stage.dots: stage.cycle.good[:, printed].mean(axis=1) for stage in stages}
+    return {stage.dots: stage.good.mean(axis=1) for stage in stages}
 
 
 def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:

@@ -1,9 +1,9 @@
 """Measure what hammers behind a rail learn, from their coil alone and from a microphone.
 
 Run it with ``.venv/bin/python docs/measure/learning_rail.py``. It draws units of the paper's hammer behind a
-rail of 100 V, and counts the dots of the de Bruijn cycle of order 8 within limits, at parts of the open-loop
-safe rate of the hammer with its current; ``--wire`` takes the wire of a dot-matrix head that is shipped, at
-1200 Hz. It takes some minutes; ``--units N`` draws another number.
+rail of 100 V, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots within limits,
+at parts of the open-loop safe rate of the hammer with its current; ``--wire`` takes the wire of a dot-matrix
+head that is shipped, at 1200 Hz. It takes some minutes; ``--units N`` draws another number.
 """
 
 import argparse
@@ -12,12 +12,13 @@ import numpy as np
 from measured import MOTION, Cell, Column, write
 
 import printhammer as ph
+from printhammer.control.learning.law import PRINTED
 from printhammer.control.learning.learn import calibrate
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.table.drive import LARGEST_CURRENT
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import LEAD_IN
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
@@ -34,7 +35,6 @@ MEMBERS = 150
 NOISE = "50 mV"
 COIL = {"resistance": 28.6, "inductance": "6.547 mH"}
 RAIL = {"shape": "rail", "voltage": 100.0, "width": "177.24 us", "decay_resistance": "159.1 ohm"}
-CYCLE = slots_of(cycle_with_lead_in())
 ROOMS = (
     *MOTION,
     "derivatives",
@@ -55,18 +55,18 @@ def printed(
 ) -> list[tuple[str, np.ndarray]]:
     """Return ways to drive and the share of dots within limits, of each unit: open loop, table, learned."""
     rows: list[tuple[str, np.ndarray]] = []
-    judged, single = np.asarray(CYCLE) >= LEAD_IN, nominal(hammer, tolerance=DISPLAY_TOLERANCE)
+    single = nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     for name, sensor in sensors.items():
         law, table = law_for(
             hammer, rate, driver="own", sensor=sensor, members=MEMBERS, history=1, largest_current=bound
         )
         for stage in calibrate(law, units, sensor)[1]:
-            good = stage.cycle.good[:, judged].mean(axis=1)
+            good = stage.good.mean(axis=1)
             if not stage.dots and not rows:
                 rows.append(("open loop", good))
                 trial = attempt(
                     [Case(unit, single, rate) for unit in units],
-                    [CYCLE],
+                    [PRINTED],
                     table.strategy(hammer),
                     limits=Limits(),
                     tolerance=DISPLAY_TOLERANCE,

@@ -11,7 +11,6 @@ times of impact and forces, and with feedback. It takes some twenty minutes on o
 import argparse
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
@@ -20,10 +19,10 @@ import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.plant import driver_of
-from printhammer.control.learning.learn import calibrate
+from printhammer.control.learning.learn import calibrate, table_of
 from printhammer.control.learning.preparation import law_for
 from printhammer.control.learning.sensor import ImpactSensor
-from printhammer.control.table.drive import COLUMNS, driven_by, with_pulse
+from printhammer.control.table.drive import driven_by, with_pulse
 from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import OpenLoop, Strategy
 from printhammer.printing.rates.variability import Variability
@@ -77,11 +76,8 @@ def learned(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, paper: ph.Pa
     """Return the table that each unit learns from times of impact and forces on the paper."""
     sensor = sensor_on(paper)
     law, base = law_for(hammer, rate, sensor=sensor, members=400)
-    tables = []
-    for learner in calibrate(law, units, sensor)[0]:
-        entries = {key: row[np.newaxis] for key, row in zip(COLUMNS, learner.printed, strict=True)}
-        tables.append(replace(base, **entries).fired_by("switch", hammer))
-    return [table.strategy(hammer) for table in tables]
+    learners = calibrate(law, units, sensor)[0]
+    return [table_of(learner, base, "switch", hammer).strategy(hammer) for learner in learners]
 
 
 def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:

@@ -67,6 +67,17 @@ def test_one_reading_that_is_wrong_counts_for_little() -> None:
     assert belief.mean == pytest.approx(truth, abs=0.03)
 
 
+def test_what_is_left_of_readings_is_their_misfit() -> None:
+    """About 1 where the law holds and the noise is as stated; outliers count five times their deviation."""
+    truth = np.array([0.5, -1.0, 0.2, 0.8])
+    noise = 0.01 * np.random.default_rng(2).standard_normal(12)
+    holds = believed(linear, evidence(linear(truth[None])[0] + noise, 0.01), [np.zeros(SIZE)]).modes[0]
+    assert 0.4 < holds.misfit < 1.5
+    # Alternating errors of 0.2 are not in the span of four slopes.
+    other = linear(truth[None])[0] + 0.2 * (-1.0) ** np.arange(12)
+    assert believed(linear, evidence(other, 0.01), [np.zeros(SIZE)]).modes[0].misfit > 3.0
+
+
 def test_readings_that_bend_are_followed_from_level_to_level() -> None:
     truth = np.array([0.9, -1.1, 0.4, -0.6])
     value = bent(truth[None])[0]

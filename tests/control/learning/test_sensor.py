@@ -34,6 +34,10 @@ def test_gain_missed_and_false_impacts() -> None:
     assert not (time > 241e-6).any()
 
 
+def test_a_delay_is_the_same_for_every_dot() -> None:
+    assert ph.ImpactSensor(noise=0.0, delay=30e-6).read(FLIGHT, FORCE, 0, 0).time == pytest.approx(270e-6)
+
+
 def test_noise_depends_on_seed_unit_and_run_only() -> None:
     sensor = ph.ImpactSensor()
     first = sensor.read(FLIGHT, FORCE, 3, 4).time
@@ -55,6 +59,7 @@ def test_noise_depends_on_seed_unit_and_run_only() -> None:
         ("colour", 1.0),
         ("gain", -1.0),
         ("missed", 1.5),
+        ("delay", float("inf")),
     ],
 )
 def test_bad_numbers_are_refused(key: str, value: float) -> None:

@@ -196,6 +196,7 @@ _PANEL: Final = "The sensor"
     },
     out=opt.results("Dots printed at each stage"),
     table=opt.files("Learned compensation table (.csv, .json, .h, ...).", *opt.DATA, ".h", pictures=False),
+    believed=opt.file("Hammer file with the estimated constants, for `printhammer feedback`.", ".toml"),
 )
 def learn(
     job: Job,
@@ -219,6 +220,18 @@ def learn(
         "Correlation of the noise of successive dots (default: 0).", panel=_PANEL
     ),
     gain: float | None = opt.number("Scale error of the sensor (default: 0).", panel=_PANEL),
+    offset: float | None = opt.quantity(
+        "s",
+        "TIME",
+        "Constant error of the sensor's times, unknown to the learner (default: 0).",
+        panel=_PANEL,
+    ),
+    offset_spread: float | None = opt.quantity(
+        "s",
+        "TIME",
+        "Standard deviation of that error over units (default: 0); the learner assumes at least 25 us.",
+        panel=_PANEL,
+    ),
     missed: float | None = opt.number(
         "Fraction of impacts that the sensor misses (default: 0).", panel=_PANEL
     ),
@@ -228,26 +241,49 @@ def learn(
 ) -> Answer:
     """Learn the compensation table of a unit from the impact times of its test lines.
 
-    The exit status is 1 if dots of the last line exceed the limits.
+    The exit status is 1 if, by the readings, the unit probably prints dots beyond the limits in the end.
     """
+    import numpy as np
+
     from printhammer.control.learning.learn import learn as learned
     from printhammer.control.learning.sensor import ImpactSensor
     from printhammer.hammer.hammer import load
 
-    readings = opt.given(noise=noise, force=force_noise, colour=colour, gain=gain, missed=missed, false=false)
+    readings = opt.given(
+        noise=noise,
+        force=force_noise,
+        colour=colour,
+        gain=gain,
+        missed=missed,
+        false=false,
+        delay=offset,
+        offset=offset_spread,
+    )
     if signal is not None:
-        opt.refuse({"noise": noise}, "none beside --signal, which has --signal-noise")
+        own = {"noise": noise, "offset-spread": offset_spread}
+        opt.refuse(own, "none beside --signal, which has --signal-noise")
         readings |= _from_coil(job, hammer, signal, signal_noise)
     else:
         opt.refuse({"signal-noise": signal_noise}, "none without --signal")
     driven = None if unit is None else load(unit)
     with job.counting("learning") as tell:
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
-    share = 100.0 * result.share[-1]
-    complaint = f"{share:.1f} % of the dots are within limits in the end"
+    likely = 100.0 * result.certainty[-1]
+    if np.isnan(likely):
+        complaint = f"no hammer of the production explains the readings: misfit {result.misfit[-1]:.2f}"
+    else:
+        complaint = f"{likely:.0f} % of the likely units print every dot within limits in the end"
+
+    def believed(path: Path) -> None:
+        result.believed_hammer.save(path)
+
     return Answer(
         render(result.summary(), units),
-        files={"out": Content.of(result), "table": Content.of(result.table)},
+        files={
+            "out": Content.of(result),
+            "table": Content.of(result.table),
+            "believed": Content(believed),
+        },
         complaints=[] if result.passed else [complaint],
     )
 

@@ -39,6 +39,7 @@ _FINE: Final = 0.01  # Of those that say how well constants are known: what expl
 _ITERATIONS: Final = 10  # At most, at a level
 _STILL: Final = 0.03  # Step at which a level is over, in standard deviations
 _GAIN: Final = 0.01  # Of the objective, below which a step is none
+_OUTLIER: Final = 5.0  # Standard deviations beyond which what is left of a reading counts as this
 _EXPLAINED: Final = 2.0  # Mean square of what is left of readings, in variances, that explains them
 
 
@@ -64,6 +65,7 @@ class Mode:
     predicted: FloatArray  # Readings of a unit with these constants, (readings,)
     level: float  # At which the readings are explained
     objective: float  # Less the logarithm of the probability density, but for a constant
+    misfit: float = 0.0  # RMS of what is left of the readings, in standard deviations of their noise
 
     def apart(self, other: Mode) -> float:
         """Return how far another mode is off, in standard deviations of this one."""
@@ -155,7 +157,19 @@ def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> 
     # What is not explained is as much of a reason to doubt as noise is.
     covariance = np.asarray(max(misfit, 1.0) * np.linalg.inv(normal), np.float64)
     finest = _objective(place.constants[None], place.shown[None], evidence.value, evidence.at(LEVELS[-1]))
-    return Mode(place.constants, covariance, place.shown, level, float(finest[0]))
+    left = _left(place.shown, evidence)
+    return Mode(place.constants, covariance, place.shown, level, float(finest[0]), left)
+
+
+def _left(shown: FloatArray, evidence: Evidence) -> float:
+    """Return the RMS of what is left of readings, in standard deviations, outliers cut off.
+
+    A dot that is seen and not predicted is an outlier.
+    """
+    seen = np.isfinite(evidence.value)
+    rest = np.abs((evidence.value - shown) / evidence.noise)[seen]
+    each = np.minimum(np.nan_to_num(rest, nan=_OUTLIER), _OUTLIER)
+    return float(np.sqrt(np.mean(each**2))) if each.size else 0.0
 
 
 def _look(constants: FloatArray, shown: FloatArray) -> Search[_Place]:

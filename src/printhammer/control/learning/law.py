@@ -44,10 +44,12 @@ from printhammer.control.table.drive import (
 )
 from printhammer.control.table.task import Task
 from printhammer.control.table.tuning import tune
+from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
+from printhammer.printing.dots.long_patterns import STEPS, row_of_dots
 from printhammer.printing.dots.nominal import nominal
-from printhammer.printing.dots.strategy import LEAD_IN, cycle_with_lead_in, slots_of
+from printhammer.printing.dots.strategy import LEAD_IN, SLOTS, cycle_with_lead_in, slots_of
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 from printhammer.support.threads import together
 
@@ -63,6 +65,13 @@ _LEAST_BRAKE: Final = 0.05  # Least width of a brake pulse, likewise
 ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
+class OpenLoop(NamedTuple):
+    """A pulse that is fired at every slot: its settings (4, entries), and its waveform."""
+
+    settings: FloatArray
+    pulse: Waveform
+
+
 @dataclass(frozen=True)
 class Adjustable:
     """The entries of a table that are learned: advance, width, and brake where there is one.
@@ -74,6 +83,8 @@ class Adjustable:
     task: Task
     rate: float
     base: FloatArray
+    own: OpenLoop | None = None
+    """The open loop of the hammer's own pulse; None if the pulse of the task is that, or it has no width."""
 
     @cached_property
     def inputs(self) -> IntArray:
@@ -89,6 +100,12 @@ class Adjustable:
         settings = np.zeros_like(self.base)
         settings[WIDTH] = self.task.width
         return settings
+
+    @property
+    def loops(self) -> list[OpenLoop]:
+        """The open loops that there are: that of the pulse of the task, and of the hammer's own."""
+        plain = OpenLoop(self.open_loop, self.task.pulse)
+        return [plain] if self.own is None else [plain, self.own]
 
     def limited(self, before: FloatArray, change: FloatArray) -> FloatArray:
         """Return corrections (inputs,) after a change, such that the settings keep to all bounds."""
@@ -153,19 +170,42 @@ _GAIN: Final = 0.02  # Least share of the dots that the table gains in the mean 
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 """Slots of the line that corrections are tried on, on hammers that are believed in: the cycle of order 6."""
 
-PRINTED: Final = slots_of(cycle_with_lead_in())
-"""Slots of the cycle on which tables are judged."""
+
+def _judged_slots() -> tuple[int, ...]:
+    """Return the slots of the cycle with its lead-in and, each from rest, of the rows of dots."""
+    slots = slots_of(cycle_with_lead_in())
+    for step in STEPS:
+        slots += tuple(slots[-1] + 1 + SLOTS + slot for slot in row_of_dots(step))
+    return slots
+
+
+PRINTED: Final = _judged_slots()
+"""Slots on which tables are judged: the cycle after its lead-in, and rows of 200 slots, each from rest."""
+
+JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
+"""Mask of the dots that count, (dots,)."""
+
+IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
+"""Mask of the dots of the cycle among these, (counted dots,)."""
+
+
+class Verdict(NamedTuple):
+    """Comparison of a table with the open loops on the hammers believed in."""
+
+    gains: bool  # Whether the table is better than both open loops
+    loop: OpenLoop  # The better one of these
+    multiplier: float  # Largest absolute multiplier of rows printed with the table; NaN if no row is periodic
+    expected: float  # Mean fraction of dots within limits, with what is handed out
+    certainty: float  # Fraction of the hammers that print every dot within limits with it
 
 
 class Update(NamedTuple):
-    """What comes of a stage."""
+    """Result of a stage."""
 
     corrections: FloatArray  # (inputs,)
     contraction: float  # Largest eigenvalue of Q - L (G + a (G' - G))
-    gains: bool  # Whether the table is handed out
-    left: (
-        float  # What dots are off by in the end, on the hammers believed in: squares, in parts of the limits
-    )
+    verdict: Verdict
+    left: float  # Deviations that remain on the hammers believed in, squared, as fractions of the limits
 
 
 class _Unit(NamedTuple):
@@ -191,6 +231,7 @@ class LearningLaw:
     shown: tuple[Surrogate, ...]
     rows: FloatArray  # Constants of simulated hammers, (members, size): where a search may begin
     seen: FloatArray  # Their readings, (members, readings)
+    first: OpenLoop  # The better open loop in the mean over the production
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
         """Return what is done after a stage; asks for what the hammers believed in print.
@@ -228,8 +269,8 @@ class LearningLaw:
             # The table that learning starts from may lead to where what was learned does not.
             other = yield from self._followed(unit, 0.0 * corrections)
             left, found = min((left, found), other, key=lambda end: end[0])
-        gains = yield from self._gains(alike, found)
-        return Update(found, contraction, gains, left)
+        verdict = yield from self._compared(alike, found)
+        return Update(found, contraction, verdict, left)
 
     def started_anew(self, belief: Belief) -> LearningLaw | None:
         """Return the same law, starting from a table that is tuned for the hammer believed in.
@@ -311,23 +352,43 @@ class LearningLaw:
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
 
-    def _gains(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[bool]:
-        """Return whether probable hammers print more dots with the table, and none, but for doubt, fewer."""
-        press = self.production.press(alike)
-        plain, table = yield from together(
-            [
-                order_good(press, [settings] * len(alike))
-                for settings in (self.entries.open_loop, self.entries.settings(corrections))
-            ]
+    def _compared(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
+        """Compare a table with the open loops on probable hammers.
+
+        The table gains if these print more dots with it than in either open loop, and none of them, but for
+        doubt, prints fewer, or has a row in which errors grow from dot to dot.
+        """
+        press, settings = self.production.press(alike), self.entries.settings(corrections)
+        table = yield from order_good(press, [settings] * len(alike))
+        better, others = yield from better_loop(press, self.entries)
+        growth = press.multipliers(settings)
+        edge = table.mean(axis=1) - np.max([each.mean(axis=1) for each in others], axis=0)
+        harmless = bool(
+            np.quantile(edge, self.doubt) >= 0.0
+            and np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0
         )
-        edge = table.mean(axis=1) - plain.mean(axis=1)
-        return bool(np.quantile(edge, self.doubt) >= 0.0 and edge.mean() >= _GAIN)
+        gains = harmless and float(table.mean() - others[better].mean()) >= _GAIN
+        good = table if gains else others[better]
+        every = float(good.all(axis=1).mean())
+        loop = self.entries.loops[better]
+        return Verdict(gains, loop, float(np.fmax.reduce(growth)), float(good.mean()), every)
 
 
-def order_good(press: Press, settings: Sequence[FloatArray]) -> Printing[BoolArray]:
-    """Return which dots of the cycle are within limits, (M, dots), those of the lead-in left out."""
-    _dots, judgement = yield from press.order_line(settings, PRINTED)
-    return np.asarray(judgement.good[:, np.asarray(PRINTED) >= LEAD_IN])
+def better_loop(press: Press, entries: Adjustable) -> Printing[tuple[int, list[BoolArray]]]:
+    """Return the index of the open loop with more good dots, and the good dots of each, as `order_good`."""
+    count = len(press.hammers)
+    good = yield from together(
+        [order_good(press, [loop.settings] * count, [loop.pulse] * count) for loop in entries.loops]
+    )
+    return int(np.argmax([each.mean() for each in good])), good
+
+
+def order_good(
+    press: Press, settings: Sequence[FloatArray], pulses: Sequence[Waveform] | None = None
+) -> Printing[BoolArray]:
+    """Return which dots of `PRINTED` are within limits, (M, dots), those of the lead-in left out."""
+    _dots, judgement = yield from press.order_line(settings, PRINTED, pulses)
+    return np.asarray(judgement.good[:, JUDGED])
 
 
 def _badness(off: FloatArray) -> float:

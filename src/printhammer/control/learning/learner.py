@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from printhammer.control.learning.belief import Belief, Evidence, believe
-from printhammer.control.learning.law import BAD, RUNS, LearningLaw
+from printhammer.control.learning.law import BAD, RUNS, LearningLaw, Verdict
 from printhammer.control.learning.lines import LINE
 from printhammer.control.learning.sensor import Readings
 from printhammer.support.arrays import FloatArray
@@ -16,12 +16,18 @@ from printhammer.support.threads import translated
 
 if TYPE_CHECKING:
     from printhammer.control.learning.lines import Printing
+    from printhammer.drive.waveforms.shapes import Waveform
 
 # How well the laws of the model hold, a standard deviation in parts of the limits
 _FLOOR: Final = 0.01
 _STARTS: Final = 6  # Number of simulated hammers from which searches begin
 _OUTLIER: Final = 6.0  # Standard deviations from the median beyond which a reading is left out
 _FEWEST: Final = 3  # Readings of which the median says something
+MISFIT: Final = 2.0
+"""Largest misfit with which a table is handed out: RMS of the residuals, in standard deviations of the noise.
+
+Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the sensor."""
+
 _STARTED: Final = 2  # How often, at most, a table is tuned for the hammer believed in
 
 
@@ -35,9 +41,10 @@ class Mean(NamedTuple):
 class Learner:
     """Calibrates the table of one unit from run to run, by a law.
 
-    What is handed out is the open loop before the first stage is over, and wherever hammers that explain the
-    readings as well speak against the table: more of them than the doubt that is allowed would print fewer
-    dots within limits with it, or there is next to nothing to gain.
+    The better open loop is handed out until the first stage is over, and wherever no hammer of the production
+    explains the readings, or likely hammers speak against the table: more of them than the doubt that is
+    allowed would print fewer dots within limits with it than in an open loop, or a row in which errors grow,
+    or the gain is next to nothing.
 
     Parameters
     ----------
@@ -51,7 +58,7 @@ class Learner:
         self.corrections = np.zeros(law.entries.inputs.shape[1])
         self.belief: Belief | None = None
         self.contractions: list[float] = []
-        self._gains = False
+        self.verdict = _unknown(law)
         self._started = 0
         self._ladders: list[FloatArray] = []
         self._line: list[FloatArray] = []
@@ -70,13 +77,23 @@ class Learner:
 
     @property
     def learned(self) -> bool:
-        """Whether what is handed out for printing is the table that is learned, and not the open loop."""
-        return self._gains
+        """Whether the learned table is handed out for printing, and not an open loop."""
+        return self.verdict.gains
 
     @property
     def printed(self) -> FloatArray:
         """What is handed out for printing, shape (4, entries)."""
-        return self.settings if self.learned else self.law.entries.open_loop
+        return self.settings if self.learned else self.verdict.loop.settings
+
+    @property
+    def pulse(self) -> Waveform:
+        """The pulse that it is printed with."""
+        return self.law.entries.task.pulse if self.learned else self.verdict.loop.pulse
+
+    @property
+    def misfit(self) -> float:
+        """RMS of the residuals of the readings, in standard deviations; NaN before there are readings."""
+        return float("nan") if self.belief is None else self.belief.modes[0].misfit
 
     def see(self, ladder: Readings, line: Readings) -> None:
         """Take in the readings of a run: of the dots of the ladder, and of the line."""
@@ -117,7 +134,10 @@ class Learner:
                 again = yield from other.update(self.belief, fresh, unexplained)
                 if again.left < update.left:
                     self.law, update = other, again
-        self.corrections, self._gains = update.corrections, update.gains
+        self.corrections, self.verdict = update.corrections, update.verdict
+        if self.misfit > MISFIT:
+            # A belief that does not explain the readings says nothing of the unit.
+            self.verdict = _unknown(law)
         self.contractions.append(update.contraction)
         self._line = []
         self.stage += 1
@@ -158,6 +178,11 @@ def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
     count = known.sum(axis=0)
     total = np.where(known, values, 0.0).sum(axis=0)
     return Mean(np.where(count > 0, total / np.maximum(count, 1), np.nan), count.astype(np.float64))
+
+
+def _unknown(law: LearningLaw) -> Verdict:
+    """Return the verdict on a unit of which nothing is known: the better open loop of the production."""
+    return Verdict(False, law.first, *[float("nan")] * 3)
 
 
 def _unexplained(rest: FloatArray, noise: FloatArray) -> FloatArray:

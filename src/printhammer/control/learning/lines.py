@@ -27,6 +27,8 @@ import numpy as np
 from printhammer.control.pulses import of_width
 from printhammer.control.table.drive import Settings, pulses_of, sequence
 from printhammer.control.table.task import Task
+from printhammer.derivatives.rows import DOTS as ROW_DOTS
+from printhammer.derivatives.rows import row_multipliers
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.shapes import Waveform
@@ -144,6 +146,7 @@ def choose(
     force: Surrogate,
     rows: FloatArray,
     noise: float,
+    offset: float,
 ) -> list[Rung]:
     """Return the rungs of a ladder, `DOTS` dots in all.
 
@@ -157,15 +160,18 @@ def choose(
         How the force of the single pulse does.
     rows
         The constants of the members, in standard deviations, (members, constants).
-    noise
-        Standard deviation of one reading of a time, in parts of the limit.
+    noise, offset
+        Standard deviations of one reading of a time, and of the offset of all, as fractions of the limit.
     """
     points, variance = rows[:_POINTS], noise**2 / _RUNS
-    wanted = force.gradient(points)
+    wanted = np.pad(force.gradient(points), ((0, 0), (0, 1)))
+    same = np.full((len(points), 1), offset)
 
     def information(readings: Sequence[Surrogate]) -> FloatArray:
         # What is not smooth in the constants counts as noise: it cannot be followed far.
-        slopes = [each.gradient(points) / np.sqrt(variance + each.rest**2) for each in readings]
+        slopes = [
+            np.hstack([each.gradient(points), same]) / np.sqrt(variance + each.rest**2) for each in readings
+        ]
         return np.asarray(np.einsum("rpi,rpj->pij", slopes, slopes)) if slopes else np.zeros(())
 
     def unknown(known: FloatArray) -> float:
@@ -176,7 +182,7 @@ def choose(
     for rung, shown in times.items():
         if rung == Rung(1.0) or np.isfinite(shown).all(axis=1).mean() >= _SEEN:
             offered[rung] = information([Surrogate.of(rows, column) for column in shown.T])
-    known = np.eye(rows.shape[1]) + information(line)
+    known = np.eye(rows.shape[1] + 1) + information(line)
     chosen: list[Rung] = []
     left = DOTS
     while left:
@@ -193,6 +199,7 @@ def choose(
 
 
 _MOST: Final = 4096  # Hammers in an ensemble
+_STEPS: Final = (1, 2)  # Slots from dot to dot of the rows of which multipliers are computed
 
 LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 """Slots of the test line: the de Bruijn cycle of order 5, in which every history of two gaps occurs."""
@@ -225,9 +232,31 @@ class Press:
         """Return flight times, s, and forces in parts of the nominal one, of the dots of rungs, (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
-    def line(self, settings: Sequence[FloatArray], slots: Sequence[int] = LINE) -> tuple[DotTable, Judgement]:
-        """Print a line, each hammer with its settings (4, entries); return dots, and how far off they are."""
-        return printed(self.order_line(settings, slots), self.task)
+    def line(
+        self,
+        settings: Sequence[FloatArray],
+        slots: Sequence[int] = LINE,
+        pulses: Sequence[Waveform] | None = None,
+    ) -> tuple[DotTable, Judgement]:
+        """Print a line, each hammer with its settings (4, entries); return dots, and how far off they are.
+
+        The pulses are those of the task unless each hammer gets its own.
+        """
+        return printed(self.order_line(settings, slots, pulses), self.task)
+
+    def multipliers(self, settings: FloatArray) -> FloatArray:
+        """Compute the multipliers of rows printed with settings (4, entries), for each hammer, (M,).
+
+        That is the largest absolute value of rows with a dot in every slot, and in every second one; see
+        `printhammer.derivatives.rows.row_multipliers`. NaN if neither row is a periodic orbit.
+        """
+        task, count, drives = self.task, len(self.hammers), []
+        for step in _STEPS:
+            slots = range(0, step * ROW_DOTS, step)
+            made = pulses_of(Settings(*settings), task.gaps, task.reach, slots, self.rate)
+            drives += [sequence(made, task.pulse, {})] * count
+        growth = row_multipliers(list(self.hammers) * len(_STEPS), drives, task.effort)
+        return np.asarray(np.fmax.reduce(np.abs(growth).reshape(len(_STEPS), count)))
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
         """Return what `ladder` returns; asks for it to be printed."""
@@ -251,18 +280,23 @@ class Press:
         return times, forces
 
     def order_line(
-        self, settings: Sequence[FloatArray], slots: Sequence[int] = LINE
+        self,
+        settings: Sequence[FloatArray],
+        slots: Sequence[int] = LINE,
+        pulses: Sequence[Waveform] | None = None,
     ) -> Printing[tuple[DotTable, Judgement]]:
         """Return what `line` returns; asks for it to be printed."""
         task, due = self.task, slot_times(slots, self.rate)
-        known: dict[tuple[float, float, float], Waveform] = {}
-        drives: dict[int, PulseSequence] = {}
-        for own in settings:
-            if id(own) not in drives:
-                pulses = pulses_of(Settings(*own), task.gaps, task.reach, slots, self.rate)
-                drives[id(own)] = sequence(pulses, task.pulse, known)
+        fired = [task.pulse] * len(settings) if pulses is None else pulses
+        known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}
+        keys = [(id(own), id(pulse)) for own, pulse in zip(settings, fired, strict=True)]
+        drives: dict[tuple[int, int], PulseSequence] = {}
+        for key, own, pulse in zip(keys, settings, fired, strict=True):
+            if key not in drives:
+                made = pulses_of(Settings(*own), task.gaps, task.reach, slots, self.rate)
+                drives[key] = sequence(made, pulse, known[id(pulse)])
         end = float(due[-1]) + task.window
-        ((dots, ok),) = yield [Order(self.hammers, [drives[id(own)] for own in settings], end)]
+        ((dots, ok),) = yield [Order(self.hammers, [drives[key] for key in keys], end)]
         shape = len(self.hammers), len(slots)
         wanted, times = np.ones(shape, np.bool_), np.broadcast_to(due, shape)
         return dots, judge(dots, wanted, times, task.single.nominal, task.limits, ok)

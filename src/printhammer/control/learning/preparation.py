@@ -7,7 +7,7 @@ from typing import Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.law import Adjustable, LearningLaw
+from printhammer.control.learning.law import ADVANCE, WIDTH, Adjustable, LearningLaw, OpenLoop, better_loop
 from printhammer.control.learning.lines import Rung, Surrogate, candidates, choose, printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
@@ -18,15 +18,18 @@ from printhammer.control.table.tuning import tune
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
+from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.effort import Effort
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
+from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import together
 
 FORGETTING: Final = 0.02  # By default
 DOUBT: Final = 0.0  # By default
 MEMBERS: Final = 400
 """Number of simulated hammers on which a ladder is chosen."""
+_FEW: Final = 24  # Number of these on which open loops are compared
 
 
 def law_for(
@@ -80,7 +83,8 @@ def law_for(
     )
     base = np.array([getattr(table, name)[0] for name in COLUMNS])
     production = Production(task, rate, spread, ImpactSensor() if sensor is None else sensor)
-    law = _law(production, Adjustable(task, rate, base), members, seed, forgetting, doubt)
+    entries = Adjustable(task, rate, base, _own_loop(hammer, task, base) if driver != "own" else None)
+    law = _law(production, entries, members, seed, forgetting, doubt)
     report()
     return law, table
 
@@ -105,6 +109,7 @@ def _law(
             Surrogate.of(own, press.ladder([Rung(1.0)])[1][:, 0]),
             own,
             float(production.noise[0]),
+            production.offset / task.limits.arrival,
         )
     )
     rows = np.zeros((members, production.size))
@@ -112,4 +117,18 @@ def _law(
     both = np.concatenate([np.stack(press.ladder(rungs)) / limits, lines], axis=2)[: production.measured]
     seen = np.concatenate(list(both), axis=1)
     shown = tuple(Surrogate.of(own, each) for each in seen.T)
-    return LearningLaw(entries, production, forgetting, doubt, seed, rungs, shown, rows, seen)
+    few = production.press([hammer for _row, hammer in drawn[:_FEW]])
+    first = entries.loops[printed(better_loop(few, entries), task)[0]]
+    return LearningLaw(entries, production, forgetting, doubt, seed, rungs, shown, rows, seen, first)
+
+
+def _own_loop(hammer: Hammer, task: Task, base: FloatArray) -> OpenLoop | None:
+    """Return the open loop of the hammer's own pulse, which arrives when that of the driver does."""
+    pulse: Any = hammer.waveform
+    if not isinstance(getattr(pulse, "width", None), float):
+        return None
+    settings = np.zeros_like(base)
+    settings[WIDTH] = pulse.width
+    alone = nominal(hammer, tolerance=DISPLAY_TOLERANCE).flight_time
+    settings[ADVANCE] = alone - task.single.nominal.flight_time
+    return OpenLoop(settings, pulse)

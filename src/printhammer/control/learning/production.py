@@ -23,15 +23,20 @@ if TYPE_CHECKING:
     from printhammer.control.learning.lines import Printing
 
 SCALE: Final = 0.01
-"""Standard deviation that the scale of a sensor is taken to be off by, relative."""
+"""Standard deviation of the gain error of a sensor, relative: its prior."""
+
+OFFSET: Final = 25e-6
+"""Standard deviation of the offset of a sensor's times, s: its prior, unless the sensor states a larger one.
+
+Sound takes 20 us for 7 mm of air before a microphone."""
 
 
 @dataclass(frozen=True)
 class Production:
     """Hammers by their constants, in standard deviations, and what a sensor shows of them.
 
-    A row of constants is followed by what a sensor itself may be off by, in standard deviations too: the
-    scale of its times, that of its forces where it has any, and the offset of its times where it has one.
+    A row of constants is followed by the errors of the sensor itself, in standard deviations too: the gain of
+    its times, that of its forces if it has any, and the offset of its times.
     """
 
     task: Task
@@ -52,7 +57,12 @@ class Production:
     @property
     def size(self) -> int:
         """Length of a row."""
-        return self.constants + 1 + (self.sensor.force is not None) + (self.sensor.offset > 0.0)
+        return self.constants + self.measured + 1
+
+    @property
+    def offset(self) -> float:
+        """Standard deviation of the offset of the sensor's times, s."""
+        return max(self.sensor.offset, OFFSET)
 
     @property
     def measured(self) -> int:
@@ -97,8 +107,7 @@ class Production:
         shown /= np.array([limits.arrival, limits.force])[:, None]
         own = rows[:, self.constants :]
         shown[:, : self.measured] *= 1.0 + SCALE * own[:, : self.measured, None]
-        if self.sensor.offset:
-            shown[:, 0] += self.sensor.offset / limits.arrival * own[:, -1:]
+        shown[:, 0] += self.offset / limits.arrival * own[:, -1:]
         return np.asarray(shown[:, : self.measured].reshape(len(rows), -1))
 
 

@@ -35,6 +35,9 @@ class ImpactSensor(Declared):
     missed: float = part("share of the impacts that are not seen", default=0.0)
     false: float = part("share of the impacts before which something else is taken for one", default=0.0)
     seed: int = part("of the noise", default=0)
+    delay: float = scalar(
+        "s", "constant error of the time of impact, which the learner has to find", default=0.0
+    )
     offset: float = scalar(
         "s", "standard deviation over units of an error that is the same for every dot of a unit", default=0.0
     )
@@ -50,6 +53,10 @@ class ImpactSensor(Declared):
                 raise InputError.of(
                     name, value, f"a number not below 0{limit}", file="sensor", said=" is expected to be"
                 )
+        if not math.isfinite(self.delay):
+            raise InputError.of(
+                "delay", self.delay, "a finite number", file="sensor", said=" is expected to be"
+            )
         if not (math.isfinite(self.gain) and self.gain > -1.0):
             raise InputError.of(
                 "gain", self.gain, "a number above -1", file="sensor", said=" is expected to be"
@@ -62,7 +69,7 @@ class ImpactSensor(Declared):
     def read(self, flight: FloatArray, force: FloatArray, unit: int, run: int) -> Readings:
         """Return what is shown of dots (N,) by their true flight times, s, and forces; NaN if lost."""
         rng = np.random.default_rng((self.seed, unit, run))
-        time = (1.0 + self.gain) * flight + self.noise * self._noise(rng, flight.size)
+        time = (1.0 + self.gain) * flight + self.delay + self.noise * self._noise(rng, flight.size)
         if self.offset:
             time = time + self.offset * np.random.default_rng((self.seed, unit)).standard_normal()
         early = rng.random(flight.size) < self.false
