@@ -15,7 +15,7 @@ import printhammer as ph
 from printhammer.control.learning.law import PRINTED
 from printhammer.control.learning.learn import calibrate
 from printhammer.control.learning.preparation import law_for
-from printhammer.control.table.drive import LARGEST_CURRENT
+from printhammer.control.pulses import LARGEST_CURRENT
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.dots.strategy import LEAD_IN

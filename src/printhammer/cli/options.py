@@ -271,10 +271,10 @@ def given(**options: Any) -> dict[str, Any]:
     return {name: value for name, value in options.items() if value is not None}
 
 
-def need_one(options: Mapping[str, object], example: str) -> None:
+def need_one(options: Mapping[str, object], example: Callable[[], str]) -> None:
     """Require exactly one of `period` and `rate`."""
     if (options.get("period") is None) == (options.get("rate") is None):
-        raise InputError(f"--period and --rate: expected one of them, such as {example}", key="--period")
+        raise InputError(f"--period and --rate: expected one of them, such as {example()}", key="--period")
 
 
 def refuse(options: Mapping[str, object], expected: str) -> None:

@@ -354,14 +354,34 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
     return [f"{len(failed)} of {total or len(every)} runs ended early: {kinds}"] if failed else []
 
 
+def period_text(hammer: Hammer, period: float) -> str:
+    """Return a time between firings, s, of the paper's hammer as text for a device, scaled to its pulse."""
+    from printhammer.run.window import time_scale
+
+    return f"{1e3 * period * time_scale(hammer):.4g} ms"
+
+
+def rate_text(hammer: Hammer, rate: float) -> str:
+    """Return a rate, Hz, of the paper's hammer as text for a device, scaled to its pulse."""
+    from printhammer.run.window import scaled_rate
+
+    return f"{scaled_rate(hammer, rate):.4g} Hz"
+
+
 def firing_of(
-    job: Job, hammer: Hammer, passed: dict[str, Any], example: str = "", *, timed: bool = True
+    job: Job,
+    hammer: Hammer,
+    passed: dict[str, Any],
+    period: float = 1.1e-3,
+    more: str = "",
+    *,
+    timed: bool = True,
 ) -> Firing:
     """Extract the firing options from `passed`, as keywords of `Regime.of`.
 
     If `timed`, exactly one of period and rate is required; a drive file may replace both: an endless force,
-    or pulses at a constant rate. Raises InputError for a hammer without a waveform, any other drive file, or
-    superfluous options.
+    or pulses at a constant rate. The example in a message is a `period`, s, scaled to the device. Raises
+    InputError for a hammer without a waveform, any other drive file, or superfluous options.
     """
     file: Path | None = passed.pop("drive", None)
     train = {name: passed.pop(name, None) for name in ("period", "rate", "overlap")}
@@ -374,7 +394,7 @@ def firing_of(
                 expected="one, or --drive FILE",
             )
         if timed:
-            opt.need_one(train, f"{example}, or --drive FILE")
+            opt.need_one(train, lambda: f"--period {period_text(hammer, period)!r}, or --drive FILE{more}")
         firing: Firing = opt.given(**train)  # type: ignore[assignment]
         return firing
     from printhammer.drive.file import load_drive

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from printhammer.control.pulses import of_width
+from printhammer.control.pulses import current_bound, of_width
 from printhammer.control.table.compensation import CompensationTable, TableStrategy, checked_tick, mixed
 from printhammer.control.table.drive import (
     COLUMNS,
-    LARGEST_CURRENT,
     Settings,
     driven_by,
     of_force,
@@ -24,7 +23,7 @@ from printhammer.control.table.drive import (
 from printhammer.control.table.formats import HEAD, OPTIONAL
 from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
 from printhammer.control.table.tuning import tune
-from printhammer.drive.input import read_number, read_positive
+from printhammer.drive.input import read_number
 from printhammer.errors import InputError, located
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.nominal import nominal
@@ -212,7 +211,7 @@ def tune_along(
     *,
     rate: float | str,
     driver: str = "own",
-    largest_current: float | str = LARGEST_CURRENT,
+    largest_current: float | str | None = None,
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> AxisTables:
@@ -237,7 +236,7 @@ def tune_along(
     places = tuple(read_number(value, AXES[axis].unit, axis) for value in values)
     if len(places) < 2 or any(second <= first for first, second in pairwise(places)):
         raise InputError.of(axis, list(values), "two values or more that ascend")
-    largest = read_positive(largest_current, "A", "largest_current")
+    largest = current_bound(hammer, largest_current)
     design = driven_by(hammer, driver, largest)
     known, own = nominal(design, tolerance=DISPLAY_TOLERANCE), nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     fired = []

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from printhammer.drive.input import read_positive
 from printhammer.drive.trains import PulseTrain
 from printhammer.drive.waveforms.base import Waveform
 from printhammer.errors import InputError
@@ -21,9 +22,30 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.run.simulate import simulate
 from printhammer.support.arrays import FloatArray
 
+LARGEST_CURRENT: Final = 2.0  # Default current limit of a print hammer, A
+WIDEST: Final = 2.0  # Largest width of a pulse, as a multiple of the hammer's own
+# Fraction of the current limit reserved for the tail of a brake pulse
+MARGIN: Final = 1e-3
 _SAMPLES: Final = 4001
 _SPAN: Final = 2.0  # Length of the first simulation, in pulse widths
 _DOUBLINGS: Final = 6
+
+
+def current_bound(hammer: Hammer, largest: float | str | None = None) -> float:
+    """Return a bound on the current, A, from a number, a text with a unit or, for None, the device.
+
+    That of a device is 2 A or, if that is more, what its own pulse reaches at the largest width, rounded up
+    to 0.1 A.
+    """
+    if largest is not None:
+        return read_positive(largest, "A", "largest_current")
+    pulse: Any = hammer.waveform
+    if pulse is None or pulse.quantity == "force":
+        return LARGEST_CURRENT
+    width = getattr(pulse, "width", None)
+    if pulse.replaces and isinstance(width, float):
+        pulse = of_width(pulse, WIDEST * width)
+    return max(LARGEST_CURRENT, math.ceil(10.0 * peak_current(hammer, pulse) / (1.0 - MARGIN)) / 10.0)
 
 
 def peak_current(hammer: Hammer, pulse: Waveform) -> float:

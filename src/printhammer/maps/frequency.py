@@ -23,17 +23,17 @@ from printhammer.results import Facts, Summary
 from printhammer.results.provenance import provenance
 from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import waveform_of
-from printhammer.run.window import CYCLE, wait_of
+from printhammer.run.window import CYCLE, scaled_rate, wait_of
 from printhammer.support.arrays import FloatArray
 
 if TYPE_CHECKING:
     import xarray as xr
 
 LOWEST: Final = 500.0
-"""Default lowest rate of a map, Hz, as in Figs. 8 and 9."""
+"""Default lowest rate of a map of the paper's hammer, Hz, as in Figs. 8 and 9."""
 
 HIGHEST: Final = 2000.0
-"""Default highest rate of a map, Hz, as in Figs. 8 and 9."""
+"""Default highest rate of a map of the paper's hammer, Hz, as in Figs. 8 and 9."""
 
 RATES: Final = 512
 """Default number of rates of a map; arbitrary."""
@@ -67,7 +67,8 @@ def frequency_map(
     hammer : Hammer
         The hammer.
     rates : array, optional
-        Firing rates, Hz or text with units, ascending; by default 512 from 500 Hz to 2 kHz.
+        Firing rates, Hz or text with units, ascending; by default 512 from 500 Hz to 2 kHz for a
+        flight time of 0.28 ms, lower for a slower device, see `printhammer.run.window.time_scale`.
     pulses : int, optional
         Number of firings at each rate.
     times : array or int, optional
@@ -90,7 +91,7 @@ def frequency_map(
     from printhammer.run.ensemble import Ensemble
 
     fired = waveform_of(hammer, waveform)
-    grid = _rates(rates)
+    grid = _rates(default_rates(hammer, fired) if rates is None else rates)
     count = read_count(pulses, "pulses")
     moments = _times(times, (count - 1) / float(grid[0]) + tail_of(hammer, fired))
     if grid.size * moments.size > MOST_CELLS:
@@ -203,9 +204,13 @@ def _spacing(times: FloatArray) -> float:
     return float(np.median(np.diff(times))) if times.size > 1 else np.inf
 
 
-def _rates(rates: npt.ArrayLike | None) -> FloatArray:
-    if rates is None:
-        return np.linspace(LOWEST, HIGHEST, RATES)
+def default_rates(hammer: Hammer, waveform: Waveform | None = None, count: int = RATES) -> FloatArray:
+    """Return the default rates of a map of a device, Hz."""
+    lowest, highest = (scaled_rate(hammer, rate, waveform) for rate in (LOWEST, HIGHEST))
+    return np.linspace(lowest, highest, count)
+
+
+def _rates(rates: npt.ArrayLike) -> FloatArray:
     grid = np.atleast_1d(read_array(rates, "rates", "numbers, Hz", "Hz"))
     if grid.ndim != 1 or grid.size == 0:
         raise InputError(

@@ -4,6 +4,9 @@ A single pulse from rest shows how slow a device is. The window starts at 4 ms a
 doubled until it holds `FLIGHTS` flight times of the single pulse and ends with the armature at rest. The last
 dot of a run is then complete, including its extra contacts. The window of the paper's hammer, with a flight
 time of 0.28 ms, is 4 ms. For many devices, see `printhammer.run.waits`.
+
+The same pulse gives the time scale of a device, by which the default rates and times of all verbs, those of
+the paper's hammer, are multiplied.
 """
 
 from __future__ import annotations
@@ -33,7 +36,18 @@ TOLERANCE: Final = 5e-7  # The result depends on thresholds only
 MOST_STEPS: Final = 500_000
 _MOST_KEPT: Final = 512
 
-_known: dict[tuple[str, str], float] = {}
+_FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s
+# Pulses that cover more than this fraction of a period at the default rates would run into each other.
+_ON: Final = 0.5
+
+_known: dict[tuple[str, str], Window] = {}
+
+
+class Window(NamedTuple):
+    """Window of a device under a waveform, and the flight time of its single pulse."""
+
+    wait: float  # From the last firing to the end of a run, s
+    flight: float  # s, NaN without a dot
 
 
 class Single(NamedTuple):
@@ -57,16 +71,42 @@ def least_wait(waveform: Waveform) -> float:
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
     """Return the time from the last firing to the end of a run, s; by default for the hammer's waveform."""
     pulse = hammer.waveform if waveform is None else waveform
-    if pulse is None:
-        return CYCLE
+    return CYCLE if pulse is None else _window_of(hammer, pulse).wait
+
+
+def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
+    """Return by which factor a device is slower than the paper's hammer: 1, 2, 5, 10, 20, ...
+
+    The larger one of the flight time of a single pulse and half the width of the pulse, normalised by the
+    flight time of the paper's hammer, 0.28 ms, and rounded on a logarithmic scale; 1 for an endless drive.
+    """
+    pulse = hammer.waveform if waveform is None else waveform
+    if pulse is None or not math.isfinite(pulse.support):
+        return 1.0
+    flight = _window_of(hammer, pulse).flight
+    busy = max(0.0 if math.isnan(flight) else flight, _ON * float(getattr(pulse, "width", pulse.support)))
+    decade = 10.0 ** math.floor(math.log10(busy / _FLIGHT))
+    return min(
+        (step * decade for step in (1.0, 2.0, 5.0, 10.0)),
+        key=lambda factor: abs(math.log(busy / (_FLIGHT * factor))),
+    )
+
+
+def scaled_rate(hammer: Hammer, rate: float, waveform: Waveform | None = None) -> float:
+    """Return the rate, Hz, of a device that corresponds to a rate of the paper's hammer."""
+    return rate / time_scale(hammer, waveform)
+
+
+def _window_of(hammer: Hammer, pulse: Waveform) -> Window:
+    """Return the window of a device, from the cache if its single pulse was run before."""
     if not has_window(hammer, pulse):
-        return least_wait(pulse)
+        return Window(least_wait(pulse), math.nan)
     drive = PulseTrain(pulse)
     key = hammer.fingerprint, drive.fingerprint
-    wait = _known.get(key)
-    if wait is None:
+    window = _known.get(key)
+    if window is None:
         wait, last = least_wait(pulse), math.nan
-        while not is_enough(hammer, _single(hammer, drive, wait), wait):
+        while not is_enough(hammer, seen := _single(hammer, drive, wait), wait):
             last = last_wait(hammer, pulse) if math.isnan(last) else last
             if wait >= last:
                 break
@@ -74,8 +114,8 @@ def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
         # Threads share the cache: emptying it leaves the windows that others return as they are.
         if len(_known) >= _MOST_KEPT:
             _known.clear()
-        _known[key] = wait
-    return wait
+        window = _known[key] = Window(wait, seen.flight)
+    return window
 
 
 def end_of(hammer: Hammer, drive: Drive) -> float:

@@ -20,7 +20,7 @@ MIDDLE = 1870.0
 def tuned(halvings: int) -> CompensationTable:
     """Tune a table over these rates, halved so often wherever it is not perfect."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tuning, "_all_rates", lambda _single: GRID)
+        patch.setattr(tuning, "_all_rates", lambda _single, _scale: GRID)
         patch.setattr(tuning, "HALVINGS", halvings)
         patch.setattr(tuning, "BETWEEN", 0.0)
         return ph.tune(quick(), history=1)

@@ -41,6 +41,7 @@ from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.regime import waveform_of
 from printhammer.run.simulate import simulate
+from printhammer.run.window import time_scale
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
 TAIL: Final = 1e-3
@@ -193,10 +194,10 @@ class TwoPulseDrive(Drive):
 def quench_map(
     hammer: Hammer,
     *,
-    gaps: Range = ("0.5 ms", "0.9 ms", 128),
+    gaps: Range | None = None,
     widths: Range | None = None,
     waveform: Waveform | None = None,
-    tail: float | str = TAIL,
+    tail: float | str | None = None,
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> QuenchMap:
@@ -208,14 +209,16 @@ def quench_map(
         A hammer with a pack.
     gaps : tuple, optional
         Least and largest time between the two firings, s, or text with a unit, and number of times, the two
-        ends among them.
+        ends among them; by default 128 from 0.5 to 0.9 ms, multiplied by
+        `printhammer.run.window.time_scale` of the device.
     widths : tuple, optional
         Likewise for the width of the second pulse; by default 128 from half to one and a half times that of
         the first.
     waveform : Waveform, optional
         The first pulse; by default the waveform of the hammer. It needs a width.
     tail : float or str, optional
-        Time after the second firing within which a dot counts as the second one, s, or text with a unit.
+        Time after the second firing within which a dot counts as the second one, s, or text with a unit;
+        by default 1 ms, multiplied likewise.
 
     Returns
     -------
@@ -232,12 +235,13 @@ def quench_map(
         raise InputError(
             f"the hammer {hammer.name!r} has no pack", key="pack", expected="one that a dot is made on"
         )
-    times = read_axis(gaps, "gaps", "s")
+    scale = time_scale(hammer, pulse)
+    times = read_axis((0.5e-3 * scale, 0.9e-3 * scale, 128) if gaps is None else gaps, "gaps", "s")
     wide = read_axis((0.5 * width, 1.5 * width, 128) if widths is None else widths, "widths", "s")
     for name, axis in (("gaps", times), ("widths", wide)):
         if not axis[0] > 0.0:
             raise InputError(f"{name}: {axis[0]:.9g} s", key=name, expected="times above 0 s")
-    wait = read_positive(tail, "s", "tail")
+    wait = TAIL * scale if tail is None else read_positive(tail, "s", "tail")
     check_cells(times.size, wide.size)
     alone = simulate(
         hammer, PulseTrain(pulse), duration=pulse.support + wait, tolerance=effort.tolerance
@@ -302,7 +306,8 @@ def _piece(
         every = [drive.with_firings(times) for times in firings for drive in drives]
     ends = np.repeat(begin + gaps + tail, len(drives))
     span = float(gaps[-1] - gaps[0]) + tail
-    grid = begin + float(gaps[0]) + np.linspace(0.0, span, max(4, math.ceil(span / _SPACING) + 1))
+    step = _SPACING * max(1.0, tail / TAIL)
+    grid = begin + float(gaps[0]) + np.linspace(0.0, span, max(4, math.ceil(span / step) + 1))
     result = Ensemble(hammer, every, ends, starts=begin, tolerance=effort.tolerance).run(
         dots=True, times=grid, **effort.running
     )

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
-from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, verb
+from printhammer.cli.runner import Answer, Content, Job, ended_early, firing_of, period_text, verb
 from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.run.regime import Firing
 
-_RANGE: Final = ("0.8 ms", "1.35 ms")
-_PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms)"
+_RANGE: Final = (0.8e-3, 1.35e-3)  # Of the paper's hammer, s
+_PARAMETER: Final = "Parameter (default: period from 0.8 ms to 1.35 ms; longer for a slow device)"
 _of = partial(opt.text, panel=_PARAMETER)
 
 
@@ -75,7 +75,7 @@ def bifurcation(
             f"--period and --rate: expected none of them where the {parameter} is changed", key="--period"
         )
     passed |= {"period": period, "rate": rate}
-    firing = firing_of(job, hammer, passed, "--period '1.05 ms'", timed=not timed)
+    firing = firing_of(job, hammer, passed, 1.05e-3, timed=not timed)
     if timed and "drive" not in firing:
         firing["period"] = None
     axis = _axis(hammer, parameter, (lowest, highest), values, firing)
@@ -110,13 +110,15 @@ def _axis(
 
     timed = parameter in ("period", "rate")
     forced = firing.get("drive") is not None
-    at_first: Firing = {**firing, "period": _RANGE[0]} if timed and not forced else firing
+    at_first: Firing = (
+        {**firing, "period": period_text(hammer, _RANGE[0])} if timed and not forced else firing
+    )
     regime = Regime.of(hammer, **at_first)
     regime.value(parameter)
     unit = regime.quantity(parameter).si
     first, last = ends
     if parameter == "period" and not forced:
-        first, last = first or _RANGE[0], last or _RANGE[1]
+        first, last = (end or period_text(hammer, of) for end, of in zip(ends, _RANGE, strict=True))
     if first is None or last is None:
         raise InputError(f"--from and --to: expected both of them for {parameter}, in {unit}", key="--from")
     low, high = (read_number(end, unit, name) for end, name in ((first, "--from"), (last, "--to")))
@@ -152,13 +154,17 @@ _count = partial(opt.whole, panel=_BASINS)
         ),
         "firings": _count("Number of firings in a round (default: 200)."),
         "rounds": _count("Maximum number of rounds for a cell (default: 20)."),
-        "gaps": opt.span("Times between the two firings (default: '0.5 ms, 0.9 ms, 128').", panel=_QUENCH),
+        "gaps": opt.span(
+            "Times between the two firings (default: '0.5 ms, 0.9 ms, 128'; longer for a slow device).",
+            panel=_QUENCH,
+        ),
         "widths": opt.span(
             "Widths of the second pulse (default: 128 from 0.5 to 1.5 times the first).", panel=_QUENCH
         ),
         "tail": opt.text(
             "TIME",
-            "Time after the second firing within which its dot has to come (default: 1 ms).",
+            "Time after the second firing within which its dot has to come"
+            " (default: 1 ms; longer for a slow device).",
             panel=_QUENCH,
         ),
         "tolerance": opt.TOLERANCE,
@@ -191,7 +197,7 @@ def basins(
         opt.refuse({**of_basins, **more, "box": box, "saddles": saddles}, "none beside --quench")
     else:
         opt.refuse(of_quench, "--quench beside it")
-        firing = firing_of(job, hammer, passed, "--period '1.05 ms', or --quench")
+        firing = firing_of(job, hammer, passed, 1.05e-3, ", or --quench")
     if saddles is not None:
         read_count(saddles, "saddles")
     with job.counting("cells") as tell:

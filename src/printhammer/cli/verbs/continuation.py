@@ -111,7 +111,7 @@ def continue_(
     if regimes and parameter != "rate":
         raise InputError(f"--parameter {parameter}: expected 'rate' with --regimes", key="--parameter")
     passed |= {"period": period, "rate": rate}
-    firing = firing_of(job, hammer, passed, "--period '1.3 ms'", timed=not regimes)
+    firing = firing_of(job, hammer, passed, 1.3e-3, timed=not regimes)
     ends = None if second is None else both(second_from, second_to, "--second-from", "--second-to", second)
     interrupted = False
     try:
@@ -244,7 +244,7 @@ def curve(
     bounds = both(second_from, second_to, "--second-from", "--second-to", second)
     most = passed.pop("most")
     passed |= {"period": period, "rate": rate}
-    firing = firing_of(job, hammer, passed, "--rate '745 Hz'")
+    firing = firing_of(job, hammer, passed, 1.34e-3)
     chosen: dict[str, Any] = {"event": event, "grid": (grid, grid), "most": most}
     if start is not None:
         if (firings, state) != (None, None):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
-from printhammer.cli.runner import Answer, Content, Job, verb
+from printhammer.cli.runner import Answer, Content, Job, rate_text, verb
 from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
@@ -27,7 +27,9 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
             "Lowest peak force of a dot, as a fraction of the single pulse's (default: 0.9).",
             flag="--least-force",
         ),
-        "largest": opt.text("CURRENT", "Limit on the magnitude of the current, e.g. '2 A'.", default="2 A"),
+        "largest": opt.text(
+            "CURRENT", "Limit on the magnitude of the current (default: 2 A, or what the own pulse reaches)."
+        ),
         "slew": opt.number(
             "Limit on the slope of the current, A/s (default: steepest rise of the hammer's waveform).",
             metavar="A/S",
@@ -42,7 +44,9 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
 def energy(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    rate: str = opt.text("RATE", "Dots per second, e.g. '1.2 kHz'.", default="1 kHz"),
+    rate: str | None = opt.text(
+        "RATE", "Dots per second, e.g. '1.2 kHz' (default: 1 kHz; lower for a slow device)."
+    ),
     rates: list[float] | None = opt.rates_between(
         "Rates of several bursts, instead of --rate, e.g. '600 Hz, 1.8 kHz, 7'.", _MOST_RATES
     ),
@@ -82,7 +86,7 @@ def energy(
             complaints=[complaint] if missing else [],
         )
     with job.counting("dots planned") as tell:
-        result = least_work(hammer, rate, progress=tell, **passed)
+        result = least_work(hammer, rate or rate_text(hammer, 1000.0), progress=tell, **passed)
     shown = render(result.summary(), units)
     if supply:
         shown += ["", *render(result.under_supply().summary(result.count), units)]
@@ -98,7 +102,9 @@ def energy(
     "feedback",
     "printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png",
     {
-        "current": opt.text("CURRENT", "Limit on the magnitude of the current, e.g. '2 A'.", default="2 A"),
+        "current": opt.text(
+            "CURRENT", "Limit on the magnitude of the current (default: 2 A, or what the own pulse reaches)."
+        ),
         "edge": opt.text(
             "TIME", "Time constant of the driver (default: decay time of the hammer's waveform)."
         ),
@@ -115,7 +121,7 @@ def energy(
 def feedback(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    rate: str = opt.text("RATE", "Dot slots per second.", default="1.6 kHz"),
+    rate: str | None = opt.text("RATE", "Dot slots per second (default: 1.6 kHz; lower for a slow device)."),
     noise: float | None = opt.number(
         "Standard deviation of a sample, as a fraction of the travel to the pack (default: 0.01)."
     ),
@@ -154,7 +160,9 @@ def feedback(
     sensor = PositionSensor(**opt.given(noise=noise, delay=delay, interval=interval, step=step, seed=seed))
     driven = perturbed(hammer, change)
     with job.counting("tables, closed loops") as tell:
-        result = compared(hammer, rate, driven=driven, sensor=sensor, progress=tell, **passed)
+        result = compared(
+            hammer, rate or rate_text(hammer, 1600.0), driven=driven, sensor=sensor, progress=tell, **passed
+        )
     bad, patterns = int((~result.passed[-1]).sum()), result.passed.shape[1]
     complaint = f"{bad} of {patterns} patterns are not printed within limits with feedback"
     return Answer(

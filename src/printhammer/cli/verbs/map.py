@@ -38,10 +38,20 @@ def map_(
     job: Job,
     hammer: Hammer = opt.FIRED,
     lowest: float | None = opt.quantity(
-        "Hz", "RATE", "Lowest rate (default: 500 Hz).", flag="--from", panel=_BURST, positive=True
+        "Hz",
+        "RATE",
+        "Lowest rate (default: 500 Hz; lower for a slow device).",
+        flag="--from",
+        panel=_BURST,
+        positive=True,
     ),
     highest: float | None = opt.quantity(
-        "Hz", "RATE", "Highest rate (default: 2 kHz).", flag="--to", panel=_BURST, positive=True
+        "Hz",
+        "RATE",
+        "Highest rate (default: 2 kHz; lower for a slow device).",
+        flag="--to",
+        panel=_BURST,
+        positive=True,
     ),
     rates: int | None = _count("Number of rates (default: 512)."),
     times: int | None = _count("Number of sampling times (default: 512)."),
@@ -68,7 +78,7 @@ def map_(
     if columns is not None and measured is None:
         raise InputError(f"--columns {columns} is given", key="--columns", expected="it with --measured only")
     beside = None if measured is None else load_measured_map(measured, columns=columns)
-    grid, moments = _axes(beside, lowest, highest, rates, times)
+    grid, moments = _axes(hammer, beside, lowest, highest, rates, times)
     with job.counting("rates") as tell:
         chart = frequency_map(hammer, grid, times=moments, progress=tell, **passed)
     return Answer(
@@ -95,12 +105,17 @@ def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -
 
 
 def _axes(
-    beside: xr.Dataset | None, low: float | None, high: float | None, rates: int | None, times: int | None
+    hammer: Hammer,
+    beside: xr.Dataset | None,
+    low: float | None,
+    high: float | None,
+    rates: int | None,
+    times: int | None,
 ) -> tuple[FloatArray, FloatArray | int]:
     """Return the rates, Hz, and the times, s, or their number; a measured map supplies the defaults."""
     import numpy as np
 
-    from printhammer.maps.frequency import HIGHEST, LOWEST, MOST_CELLS, RATES, TIMES
+    from printhammer.maps.frequency import MOST_CELLS, RATES, TIMES, default_rates
 
     moments: FloatArray | int = TIMES if times is None else times
     if beside is not None and times is None:
@@ -114,7 +129,9 @@ def _axes(
             )
     if beside is not None and low is None and high is None and rates is None:
         return beside["rate"].values, moments
-    low, high = LOWEST if low is None else low, HIGHEST if high is None else high
+    if low is None or high is None:
+        lowest, highest = default_rates(hammer, count=2).tolist()
+        low, high = lowest if low is None else low, highest if high is None else high
     count = RATES if rates is None else rates
     if not 1 <= count <= MOST_CELLS:
         raise InputError(f"--rates {count}: expected a whole number from 1 to {MOST_CELLS}", key="--rates")

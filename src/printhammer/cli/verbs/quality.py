@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
-from printhammer.cli.runner import Answer, Content, Job, ended_early, verb
+from printhammer.cli.runner import Answer, Content, Job, ended_early, rate_text, verb
 from printhammer.cli.screen import render
 from printhammer.errors import InputError
 
@@ -115,9 +115,16 @@ def quality(
     arrival_limit: float | None = opt.quantity(
         "s", "TIME", "Limit on the arrival deviation, e.g. 50us, instead of that of --limits.", panel=_GRID
     ),
-    first: str | None = _grid("RATE", "Lowest rate of the grid (default: 100 Hz)."),
-    last: str | None = _grid("RATE", "Highest rate of the grid (default: 4 kHz)."),
-    step: str | None = _grid("RATE", "Spacing of the grid (default: 5 Hz; 25 Hz for several hammers)."),
+    extra_contacts: int | None = opt.whole(
+        "Number of extra pack contacts allowed beyond those of the single pulse, as of bounces on a stop"
+        " (default: 0).",
+        panel=_GRID,
+    ),
+    first: str | None = _grid("RATE", "Lowest rate of the grid (default: 100 Hz; lower for a slow device)."),
+    last: str | None = _grid("RATE", "Highest rate of the grid (default: 4 kHz; lower for a slow device)."),
+    step: str | None = _grid(
+        "RATE", "Spacing of the grid (default: 5 Hz, or 25 Hz for several hammers; less for a slow device)."
+    ),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
@@ -140,12 +147,15 @@ def quality(
     _only(task, {*of_report, *of_drive, *of_grid, *of_draw, *opt.given(current=current, threads=threads)})
     if task == "report" and rate is None:
         raise InputError(
-            "--rate: expected slots per second, such as --rate 900Hz, or --safe-rate", key="--rate"
+            f"--rate: expected slots per second, such as --rate {rate_text(hammer, 900.0)!r}, or --safe-rate",
+            key="--rate",
         )
     if pattern is not None and pulses is not None:
         raise InputError("--pattern and --pulses: expected one of them", key="--pattern")
     share = None if force_limit is None else opt.read_share(force_limit, "--force-limit")
-    bounds = replace(limits_named(limits), **opt.given(force=share, arrival=arrival_limit))
+    bounds = replace(
+        limits_named(limits), **opt.given(force=share, arrival=arrival_limit, extra_contacts=extra_contacts)
+    )
     strategy, loaded_table = chosen_strategy(job, hammer, table, feedback, serial)
     common: dict[str, Any] = {"limits": bounds, **opt.given(tolerance=tolerance), **strategy}
     many: dict[str, Any] = {**common, **of_grid, "threads": threads}
@@ -300,7 +310,11 @@ def print_(
     from printhammer.printing.page.pattern import BITMAPS
 
     if rate is None:
-        raise InputError("--rate is missing", key="--rate", expected="slots per second such as '1.2 kHz'")
+        raise InputError(
+            "--rate is missing",
+            key="--rate",
+            expected=f"slots per second such as {rate_text(hammer, 1200.0)!r}",
+        )
     often = read_positive(rate, "Hz", "--rate")
     if not job.outputs:
         *pages, last = (Path(name) for name in _USUAL)

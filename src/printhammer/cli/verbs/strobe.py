@@ -38,7 +38,7 @@ def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **pa
     """
     from printhammer.chaos import strobe as points_of
 
-    firing = firing_of(job, hammer, passed, "--period '1.10 ms'")
+    firing = firing_of(job, hammer, passed)
     result = points_of(hammer, **firing, **passed)
     drive = result.drive
     return Answer(
@@ -74,7 +74,7 @@ def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **pa
     """
     from printhammer.chaos.orbits.search import orbits as search
 
-    firing = firing_of(job, hammer, passed, "--period '1.05 ms'")
+    firing = firing_of(job, hammer, passed, 1.05e-3)
     with job.counting("orbits", remaining=False) as tell:
         result = search(hammer, progress=tell, **firing, **passed)
     regime = result.regime

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.cli import options as opt
 from printhammer.cli.options import Units
-from printhammer.cli.runner import Answer, Content, Job, check_endings, verb
+from printhammer.cli.runner import Answer, Content, Job, check_endings, rate_text, verb
 from printhammer.cli.screen import render
-from printhammer.errors import InputError
+from printhammer.errors import InputError, PrinthammerError
 
 if TYPE_CHECKING:
     from printhammer.control.table.compensation import CompensationTable
@@ -32,7 +32,9 @@ def tuned_along(
     axis, values = _read(along)
     if "rate" not in options or "rates" in options:
         raise InputError(
-            "--along is given without --rate", key="--along", expected="one rate, such as --rate 1.3kHz"
+            "--along is given without --rate",
+            key="--along",
+            expected=f"one rate, such as --rate {rate_text(hammer, 1300.0)!r}",
         )
     check_endings(job.wanted["out"], (*opt.DATA, ".h"), "--out")
     with job.counting("tuning") as tell:
@@ -82,7 +84,9 @@ _MOST_RATES: Final = 2000  # Largest number of rates; arbitrary
             "Driver of the coil: the hammer's own pulse (own) or a fast unipolar switch.",
             default="own",
         ),
-        "largest_current": opt.text("CURRENT", "Limit on the current.", default="2 A"),
+        "largest_current": opt.text(
+            "CURRENT", "Limit on the current (default: 2 A, or what the own pulse reaches)."
+        ),
     },
     out=opt.results("Compensation table", ".h"),
     report=opt.files(
@@ -141,8 +145,12 @@ def tune(
     files = {"out": Content(partial(save_table, made, header), made.plot)}
     if not judge:
         return Answer(files=files)
-    with job.counting("judging") as tell:
-        report = judge_table(hammer, made, progress=tell, **options)
+    try:
+        with job.counting("judging") as tell:
+            report = judge_table(hammer, made, progress=tell, **options)
+    except PrinthammerError as error:
+        # Hours of tuning are in the table: it is written whatever the judge says.
+        return Answer(files=files, complaints=[f"the table is not judged: {error}"])
     files["report"] = Content.of(report)
     good = report.passed[1, 0]
     off = ", ".join(f"{each:g} Hz" for each in report.rates[~good].tolist())
@@ -169,11 +177,11 @@ _PANEL: Final = "The sensor"
     "learn",
     "printhammer learn hendriks-1983 --rate 1.275kHz --force-noise 0.03 --serial A17 --table learned.json",
     {
-        "rate": opt.text("RATE", "Dot slots per second, e.g. 1.275kHz.", default="1.275 kHz"),
+        "rate": opt.text("RATE", "Dot slots per second (default: 1.275 kHz; lower for a slow device)."),
         "driver": opt.choice(
             "own|switch",
-            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar switch.",
-            default="switch",
+            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar switch (default: switch, or"
+            " own if the hammer has a driver).",
         ),
         "history": opt.whole("Number of preceding gaps that index an entry, 1 to 4.", default=2),
         "reach": opt.whole(
@@ -191,7 +199,9 @@ _PANEL: Final = "The sensor"
         "seed": opt.whole(
             "Seed for the simulated hammers, and for the test unit if --unit is not given.", default=1983
         ),
-        "largest_current": opt.text("CURRENT", "Limit on the current.", default="2 A"),
+        "largest_current": opt.text(
+            "CURRENT", "Limit on the current (default: 2 A, or what the own pulse reaches)."
+        ),
         "threads": opt.THREADS,
     },
     out=opt.results("Dots printed at each stage"),
@@ -247,7 +257,9 @@ def learn(
 
     from printhammer.control.learning.learn import learn as learned
     from printhammer.control.learning.sensor import ImpactSensor
+    from printhammer.control.pulses import current_bound
     from printhammer.hammer.hammer import load
+    from printhammer.printing.dots.nominal import pulse_of
 
     readings = opt.given(
         noise=noise,
@@ -266,6 +278,9 @@ def learn(
     else:
         opt.refuse({"signal-noise": signal_noise}, "none without --signal")
     driven = None if unit is None else load(unit)
+    passed.setdefault("rate", rate_text(hammer, 1275.0))
+    passed.setdefault("largest_current", current_bound(hammer))
+    passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")
     with job.counting("learning") as tell:
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
     likely = 100.0 * result.certainty[-1]

@@ -19,8 +19,9 @@ import numpy.typing as npt
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
 from printhammer.control.feedback.controller import Controller
 from printhammer.control.feedback.estimator.sensor import PositionSensor
-from printhammer.control.feedback.plant import LARGEST_CURRENT, Driver, driver_of
+from printhammer.control.feedback.plant import Driver, driver_of
 from printhammer.control.feedback.policy import OFFSETS, STEPS
+from printhammer.control.pulses import current_bound
 from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
@@ -157,7 +158,7 @@ def feedback(
     *,
     driven: Hammer | None = None,
     sensor: PositionSensor | None = None,
-    current: float | str = LARGEST_CURRENT,
+    current: float | str | None = None,
     edge: float | str | None = None,
     limits: Limits | None = None,
     beside: Sequence[Strategy] = (),
@@ -178,7 +179,8 @@ def feedback(
     sensor : PositionSensor, optional
         Sensor of the controller; by default with 1 % noise and 20 us delay.
     current : float or str, optional
-        Current limit of the driver, of either sign, A.
+        Current limit of the driver, of either sign, A; by default 2 A, or the peak of the hammer's own
+        pulse if it is larger.
     edge : float or str, optional
         Time constant of the driver, s; by default the decay time constant of the hammer's own waveform.
     limits
@@ -196,7 +198,7 @@ def feedback(
     """
     slot_rate = read_positive(rate, "Hz", "rate")
     time_constant = None if edge is None else read_positive(edge, "s", "edge")
-    driver = driver_of(hammer, read_positive(current, "A", "current"), time_constant)
+    driver = driver_of(hammer, current_bound(hammer, current), time_constant)
     position_sensor = PositionSensor() if sensor is None else sensor
     bounds = Limits() if limits is None else limits
     actual = hammer if driven is None else driven

@@ -125,7 +125,7 @@ def driver_of(hammer: Hammer, current: float = LARGEST_CURRENT, edge: float | No
             f"{hammer.path}: the waveform is a {pulse.quantity}",
             file=hammer.path,
             key="waveform",
-            expected="a current, which the loop switches",
+            expected="a current: the loop switches a current on and off, and a driver of the coil sets none",
         )
     own = max(float(getattr(pulse, "decay", STANDARD)), FASTEST)
     return Driver(current, own if edge is None else edge)

@@ -18,8 +18,9 @@ from printhammer.control.learning.learner import Learner
 from printhammer.control.learning.lines import DOTS, LINE, Press, printed
 from printhammer.control.learning.preparation import DOUBT, FORGETTING, MEMBERS, law_for
 from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.pulses import LARGEST_CURRENT
 from printhammer.control.table.compensation import CompensationTable
-from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, with_pulse
+from printhammer.control.table.drive import COLUMNS, with_pulse
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer

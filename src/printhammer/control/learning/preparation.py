@@ -11,8 +11,9 @@ from printhammer.control.learning.law import ADVANCE, WIDTH, Adjustable, Learnin
 from printhammer.control.learning.lines import Rung, Surrogate, candidates, choose, printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
+from printhammer.control.pulses import LARGEST_CURRENT
 from printhammer.control.table.compensation import CompensationTable
-from printhammer.control.table.drive import COLUMNS, LARGEST_CURRENT, clearance, driven_by, print_pulse
+from printhammer.control.table.drive import COLUMNS, clearance, driven_by, print_pulse
 from printhammer.control.table.task import Task, single_of
 from printhammer.control.table.tuning import tune
 from printhammer.errors import InputError

@@ -23,7 +23,7 @@ from printhammer.control.least_work.bound import Bound, bound
 from printhammer.control.least_work.pulses import PulsePlan
 from printhammer.control.least_work.search import LANDING, LEAD, NodePlan
 from printhammer.control.least_work.slot import CoilForce, Task
-from printhammer.control.pulses import steepest_rise
+from printhammer.control.pulses import current_bound, steepest_rise
 from printhammer.drive.input import read_count, read_number, read_positive
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.trains import PulseTrain
@@ -353,7 +353,7 @@ def least_work(
     *,
     dots: SupportsIndex = 8,
     force: float = FORCE,
-    largest: float | str = 2.0,
+    largest: float | str | None = None,
     slew: float | None = None,
     least: Least = "positive work",
     shape: Shape = "free",
@@ -376,7 +376,7 @@ def least_work(
     force : float, optional
         Least force of a dot, relative to the single pulse.
     largest : float or str, optional
-        Current limit of either sign, A, or text with a unit.
+        Current limit of either sign, A, or text with a unit; by default 2 A or the peak of the own pulse.
     slew : float, optional
         Slope limit of the current, A/s; by default the steepest rise of the hammer's waveform.
     least : str, optional
@@ -402,7 +402,7 @@ def least_work(
     count = read_count(dots, "dots")
     if count > MOST_DOTS:
         raise InputError.of("dots", count, f"at most {MOST_DOTS}", written=str(count))
-    share, top = read_positive(force, "1", "force"), read_positive(largest, "A", "largest")
+    share = read_positive(force, "1", "force")
     if share > 2.0:
         raise InputError.of("force", share, "at most 2 times that of the single pulse")
     if least not in LEASTS:
@@ -424,8 +424,9 @@ def least_work(
             f"{hammer.path}: the waveform is a {waveform.quantity}",
             file=hammer.path,
             key="waveform",
-            expected="a current, which is sought",
+            expected="a current: the burst is planned in currents, which a driver of the coil does not set",
         )
+    top = current_bound(hammer, largest)
     steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
     if shape == "pulses":
         steepest = math.inf

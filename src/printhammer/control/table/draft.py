@@ -28,7 +28,7 @@ from printhammer.control.table.drive import (
     shared_numbers,
 )
 from printhammer.control.table.task import Task
-from printhammer.control.table.ways import solve
+from printhammer.control.table.ways import LONGEST_STEP, solve
 from printhammer.derivatives.rows import DOTS, row_multipliers
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
@@ -282,9 +282,10 @@ def _solve(draft: Draft, cells: Cells, *, dense: bool) -> None:
     draft.timing[:, rows, columns] = solve(
         measure,
         draft.timing[:, rows, columns].T,
-        steps=(_STEP, _STEP),
+        steps=(_STEP * task.scale, _STEP * task.scale),
         good=GOOD,
         least=LEAST_OF_WIDEST * task.widest,
         most=task.widest,
         bounded=bounded,
+        longest=LONGEST_STEP * task.scale,
     ).T

@@ -20,7 +20,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from printhammer.control.pulses import fading_current, of_width, peak_current, widest
+from printhammer.control.pulses import MARGIN, WIDEST, fading_current, of_width, peak_current, widest
 from printhammer.drive.sequence import PulseSequence
 from printhammer.drive.waveforms.drivers import PeakAndHold, Rail
 from printhammer.drive.waveforms.shapes import Chain, Rectangle, Waveform
@@ -113,10 +113,6 @@ def pattern_of(history: Sequence[int], before: Sequence[int] = ()) -> tuple[int,
     return tuple(itertools.accumulate(reversed(gaps), initial=0))
 
 
-WIDEST: Final = 2.0  # Largest width of a pulse, as a multiple of the hammer's own
-LARGEST_CURRENT: Final = 2.0  # Default current limit, A
-# Fraction of the current limit reserved for the tail of a brake pulse
-MARGIN: Final = 1e-3
 ROUNDING: Final = 1e-9  # Relative rounding tolerance of a bound
 _HALVINGS: Final = 50  # Bisections of a width: about the number of bits in a double
 _FEWER: Final = 12  # Bisections of a width for a driver, each of which needs a simulation
@@ -175,7 +171,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
             f"{hammer.path}: the waveform peaks at {peak:.4g} A",
             file=hammer.path,
             key="waveform",
-            expected=f"at most {largest:g} A",
+            expected=f"at most {largest:g} A, or a larger largest_current (--largest-current)",
         )
     bound = max(peak, largest * (1.0 - MARGIN))
     halvings = _HALVINGS if pulse.quantity == "current" else _FEWER

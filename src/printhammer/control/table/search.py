@@ -15,6 +15,8 @@ the neighbouring nodes; (3) where the best cost is poor, also try brake pulses b
 choose one candidate per period by dynamic programming (a Viterbi recursion; R. Bellman, *Dynamic Programming*
 (1957)) with a penalty for changing the branch between neighbouring periods, where the table cannot be
 interpolated. A solution that no grid cell comes near is missed.
+
+The times below are those of the paper's hammer; they are multiplied by the time scale of the device.
 """
 
 from __future__ import annotations
@@ -72,7 +74,7 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
 
     Returns the periods at which a candidate exists, and the chosen candidate of each.
     """
-    nodes = spaced(periods, SPACING)
+    nodes = spaced(periods, SPACING * task.scale)
     known = []
     for node in nodes:
         known.append(searched(task, node))
@@ -89,7 +91,9 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
     there = [group for group in groups if group.size]
     every = joined(there)
     ends = np.cumsum([group.size for group in there])
-    best = every.take(_path(every, np.split(np.arange(every.size), ends[:-1]) if there else []))
+    best = every.take(
+        _path(every, np.split(np.arange(every.size), ends[:-1]) if there else [], JUMP * task.scale)
+    )
     return best.period, best
 
 
@@ -119,7 +123,8 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
     least = [group.cost.min(initial=np.inf) for group in groups]
     # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected.
     hope = [row for row, cost in enumerate(least) if not cost <= BAD and cost <= _FAR]
-    nodes = spaced(periods[hope], _CLOSE)
+    close, shifts = _CLOSE * task.scale, [later * task.scale for later in _LATER]
+    nodes = spaced(periods[hope], close)
     begin, narrowest = task.brake_from, _LEAST_BRAKE * task.width
     closer = []
     for node in nodes:
@@ -127,9 +132,15 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
         known = known.take(known.brake > 0.0)
         known = known.take(np.argsort(known.cost, kind="stable")[:_KEPT])
         cells = [
-            (node, max(begin, delay + later), min(max(brake * wider, narrowest), task.widest), fired, width)
+            (
+                node,
+                max(begin, delay + later * task.scale),
+                min(max(brake * wider, narrowest), task.widest),
+                fired,
+                width,
+            )
             for _period, delay, brake, fired, width, _cost in zip(*(v.tolist() for v in known), strict=True)
-            for later in _LATER
+            for later in shifts
             for wider in _WIDER
         ]
         closer.append(_kept(task, solved(task, ways_of(cells))))
@@ -137,7 +148,7 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
     tried = []
     for row in hope:
         period = float(periods[row])
-        near = [ways for node, ways in zip(nodes, closer, strict=True) if abs(node - period) <= _CLOSE]
+        near = [ways for node, ways in zip(nodes, closer, strict=True) if abs(node - period) <= close]
         tried.append(_distinct(joined(ways.at(period) for ways in near)))
     for row, group in zip(hope, _valued(task, tried), strict=True):
         groups[row] = joined([groups[row], group])
@@ -152,14 +163,15 @@ def searched(task: Task, period: float) -> Ways:
     if not task.brake or (plain.size and plain.cost[0] <= _ENOUGH):
         return plain
     begin = task.brake_from
-    delays = np.arange(begin, max(begin, period) + _ROUNDING, _DELAY)
+    delays = np.arange(begin, max(begin, period) + _ROUNDING, _DELAY * task.scale)
     pairs = [(delay, part * task.width) for delay in delays.tolist() for part in _BRAKES]
     return joined([plain, _best(task, _grid(task, period, pairs))])
 
 
 def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine: int = 1) -> Ways:
     """Return the feasible grid cells over firing time and width, for each brake pulse."""
-    fired = np.linspace(max(period - _ROOM, task.single.left), period + _ROOM, fine * _GRID[0]).tolist()
+    room = _ROOM * task.scale
+    fired = np.linspace(max(period - room, task.single.left), period + room, fine * _GRID[0]).tolist()
     widths = np.linspace(LEAST_OF_OWN * task.width, task.widest, fine * _GRID[1]).tolist()
     cells = ways_of([(period, *pair, time, width) for pair in brakes for time in fired for width in widths])
     return cells.take(fits(task, cells))
@@ -169,7 +181,7 @@ def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
     """Solve from the best cells of a grid; return the best solutions."""
     if not cells.size:
         return cells
-    off = largest_of(seconds(task, cells))
+    off, apart = largest_of(seconds(task, cells)), _APART * task.scale
     starts: list[int] = []
     counts: dict[tuple[float, float], list[float]] = {}
     for place in np.argsort(off, kind="stable").tolist():
@@ -177,7 +189,7 @@ def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
             break
         pair = float(cells.delay[place]), float(cells.brake[place])
         others = counts.setdefault(pair, [])
-        if len(others) < more * _STARTS and all(abs(cells.fired[place] - time) > _APART for time in others):
+        if len(others) < more * _STARTS and all(abs(cells.fired[place] - time) > apart for time in others):
             others.append(float(cells.fired[place]))
             starts.append(place)
     return _kept(task, solved(task, cells.take(np.array(starts, dtype=np.int64))))
@@ -200,10 +212,11 @@ def _distinct(ways: Ways) -> Ways:
     return ways.take(np.array(kept, dtype=np.int64))
 
 
-def _path(ways: Ways, groups: Sequence[IntArray]) -> IntArray:
+def _path(ways: Ways, groups: Sequence[IntArray], jump: float) -> IntArray:
     """Choose one candidate per group by dynamic programming: minimise the sum of costs and branch changes.
 
-    A table can be interpolated between two periods only if the branch is the same.
+    A table can be interpolated between two periods only if the branch is the same: if firing times
+    relative to the slots differ by at most `jump`, s.
     """
     if not groups:
         return np.zeros(0, np.int64)
@@ -217,7 +230,7 @@ def _path(ways: Ways, groups: Sequence[IntArray]) -> IntArray:
         differ = (
             (ways.delay[before][:, np.newaxis] != ways.delay[here])
             | (ways.brake[before][:, np.newaxis] != ways.brake[here])
-            | (np.abs(late[before][:, np.newaxis] - late[here]) > JUMP)
+            | (np.abs(late[before][:, np.newaxis] - late[here]) > jump)
         )
         table = total[:, np.newaxis] + np.where(differ, _SWITCH, 0.0)
         steps.append(np.argmin(table, axis=0))

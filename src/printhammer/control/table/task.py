@@ -22,7 +22,7 @@ from printhammer.printing.dots.settling import settled_from, touches
 from printhammer.run.effort import Effort
 from printhammer.run.ensemble import Ensemble
 from printhammer.run.simulate import simulate
-from printhammer.run.window import FLIGHTS, wait_of
+from printhammer.run.window import FLIGHTS, time_scale, wait_of
 from printhammer.support.arrays import BoolArray, FloatArray
 
 # Distance from rest below which the hammer counts as settled, as a fraction of the distance to the pack
@@ -98,6 +98,11 @@ class Task:
         return float(own.width)
 
     @cached_property
+    def scale(self) -> float:
+        """Factor on all times that are stated for the paper's hammer."""
+        return time_scale(self.hammers[0], self.pulse)
+
+    @cached_property
     def faded(self) -> float:
         """Time from the end of the pulse until it has decayed to a negligible value, s."""
         return fading(self.hammers[0], self.pulse, 0.5 * TAIL)
@@ -109,7 +114,7 @@ class Task:
         By then the armature has left the pack and the print pulse has decayed, even if it is late or wide by
         `_WIDE`.
         """
-        return float(max(self.single.left, self.width + _WIDE + self.faded))
+        return float(max(self.single.left, self.width + _WIDE * self.scale + self.faded))
 
     @cached_property
     def window(self) -> float:
@@ -169,5 +174,5 @@ class Task:
                 axis=2,
             )
             off[rows][~result.ok] = np.nan
-            crowded[own] = dots.extra_contacts > self.limits.extra_contacts
+            crowded[own] = dots.extra_contacts > single.extra_contacts + self.limits.extra_contacts
         return off, crowded

@@ -11,10 +11,10 @@ from typing import Final, SupportsIndex, Unpack
 
 import numpy as np
 
+from printhammer.control.pulses import current_bound
 from printhammer.control.table.compensation import CompensationTable
 from printhammer.control.table.draft import Draft, blank, polish
 from printhammer.control.table.drive import (
-    LARGEST_CURRENT,
     REST,
     checked_size,
     clearance,
@@ -32,6 +32,7 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.rates.variability import Perturbation, Variability, perturbed
 from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
+from printhammer.run.window import time_scale
 from printhammer.support.arrays import FloatArray, IntArray
 
 HALVINGS: Final = 3  # Maximum number of bisections of the step between two rates
@@ -136,7 +137,7 @@ def tune(
     robust: bool = False,
     driver: str = "own",
     variability: Variability | None = None,
-    largest_current: float | str = LARGEST_CURRENT,
+    largest_current: float | str | None = None,
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> CompensationTable:
@@ -161,7 +162,7 @@ def tune(
     rate, rates : float or str, or sequence of them, optional
         Slot rates, Hz, or text with a unit. By default an automatic grid from 100 Hz, where every dot is
         printed from rest, to the highest rate at which the table is within the limits, in steps of `STEP`,
-        refined where the solution branch changes.
+        refined where the solution branch changes; both are lower for a slow device.
     history : int, optional
         Number of gaps in a history, 1 to 4.
     reach : int, optional
@@ -182,7 +183,8 @@ def tune(
         Spread of the constants of a production. The cost of a candidate is then the RMS deviation of a row of
         dots over this hammer and the sigma points of the variability.
     largest_current : float or str, optional
-        Current limit, A, or text with a unit.
+        Current limit, A, or text with a unit; by default 2 A or, if that is more, the current that the widest
+        pulse of the device reaches.
 
     Returns
     -------
@@ -191,15 +193,16 @@ def tune(
     """
     gaps, far = checked_size(read_count(history, "history"), read_count(reach, "reach"))
     bounds = Limits() if limits is None else limits
-    largest = read_positive(largest_current, "A", "largest_current")
+    largest = current_bound(hammer, largest_current)
     driven = driven_by(hammer, driver, largest)
     pulse, widest = print_pulse(driven, largest)
     single = single_of(driven, pulse, effort.tolerance)
     if rate is not None and rates is not None:
         raise InputError("rate and rates are given", key="rates", expected="one of them")
     asked = [rate] if rate is not None else rates
-    grid = _all_rates(single) if asked is None else _given_rates(asked)
-    nodes = len(spaced(_periods(grid, far, single), SPACING))
+    scale = time_scale(driven, pulse)
+    grid = _all_rates(single, scale) if asked is None else _given_rates(asked)
+    nodes = len(spaced(_periods(grid, far, single), SPACING * scale))
     # One report per searched period, one per Newton step, with and without dense patterns.
     steps = nodes + 3 + 2 * (ROUNDS + 1) * gaps
     if variability is not None:
@@ -258,10 +261,12 @@ def _counter(effort: Effort, total: int) -> Callable[[], None]:
     return count
 
 
-def _all_rates(single: Single) -> FloatArray:
+def _all_rates(single: Single, scale: float) -> FloatArray:
     """Return rates from where every dot is from rest up to where the armature has not yet left the pack."""
-    lowest = STEP * np.floor(1.0 / (single.settled * STEP))
-    return np.array([FIRST, *np.arange(lowest, 1.0 / single.left, STEP).tolist()])
+    first, step = FIRST / scale, STEP / scale
+    lowest = step * np.floor(1.0 / (single.settled * step))
+    rates = np.arange(lowest, 1.0 / single.left, step)
+    return np.array([first, *rates[rates > first].tolist()])
 
 
 def _given_rates(asked: Sequence[float | str]) -> FloatArray:
@@ -278,7 +283,7 @@ def _tune_again(draft: Draft) -> None:
     poor = np.flatnonzero(~(draft.worst <= _POOR))
     if not poor.size:
         return
-    again = _tuned(draft.task, draft.rates[poor], around=_AROUND)
+    again = _tuned(draft.task, draft.rates[poor], around=_AROUND * draft.task.scale)
     better = again.worst < draft.worst[poor]
     draft.values[:, poor[better]] = again.values[:, better]
 

@@ -38,6 +38,7 @@ def solve(
     least: float,
     most: float,
     bounded: Bounded,
+    longest: float = LONGEST_STEP,
 ) -> FloatArray:
     """Minimise deviations over firing times and widths (dots, 2); return the best iterates.
 
@@ -46,9 +47,9 @@ def solve(
     `measure` returns deviations (active, shifts, deviations), as fractions of the limits and NaN for a lost
     dot, from all current values, the indices of the active dots, and shifts (shifts, 2) of their values.
     `start` holds firing time, or advance, and width, s. Derivatives are finite differences with `steps`, s,
-    forward in time and backward in width. A dot is finished at a deviation of `good`; widths stay between
-    `least` and `most`, s. `bounded` clips values in place to their bounds, from all values, the indices of
-    the active dots, and a mask of those that made a step.
+    forward in time and backward in width; a step is at most `longest`, s. A dot is finished at a deviation of
+    `good`; widths stay between `least` and `most`, s. `bounded` clips values in place to their bounds, from
+    all values, the indices of the active dots, and a mask of those that made a step.
     """
     now, best, best_off = start.copy(), start.copy(), np.full(len(start), np.inf)
     shifts = np.array([(0.0, 0.0), (steps[0], 0.0), (0.0, -steps[1])])
@@ -70,7 +71,7 @@ def solve(
         stepped = better & np.isfinite(slopes).all(axis=(1, 2))
         on = active[stepped]
         width = now[on, 1]
-        now[on] += changes(slopes[stepped], here[stepped], least - width, most - width)
+        now[on] += changes(slopes[stepped], here[stepped], least - width, most - width, longest)
         bounded(now, active, stepped)
     return best
 
@@ -81,23 +82,29 @@ def largest_of(off: FloatArray) -> FloatArray:
     return np.asarray(np.where(np.isnan(size), np.inf, size))
 
 
-def changes(slopes: FloatArray, off: FloatArray, least: FloatArray, most: FloatArray) -> FloatArray:
+def changes(
+    slopes: FloatArray,
+    off: FloatArray,
+    least: FloatArray,
+    most: FloatArray,
+    longest: float = LONGEST_STEP,
+) -> FloatArray:
     """Compute one Levenberg-Marquardt step (dots, 2) for two times, s, with bounds on the second.
 
     `slopes` (dots, deviations, 2) are the derivatives of the deviations `off` (dots, deviations) with respect
     to firing time, or advance, and width, 1/s; the change of width, s, is clipped to `least` and `most`
-    (dots,).
+    (dots,), and both changes to `longest`, s.
     """
     turned = slopes.transpose(0, 2, 1)
     # The damping keeps the step finite in a direction that does not affect the deviations.
-    square = turned @ slopes + (_DAMPING / LONGEST_STEP) ** 2 * np.eye(2)
+    square = turned @ slopes + (_DAMPING / longest) ** 2 * np.eye(2)
     change = -np.linalg.solve(square, turned @ off[:, :, np.newaxis])[:, :, 0]
     wider = np.clip(change[:, 1], least, most)
     along = slopes[:, :, 0]
     rest = off + slopes[:, :, 1] * wider[:, np.newaxis]
     length = np.maximum((along * along).sum(axis=1), np.finfo(np.float64).tiny)
     later = np.where(wider == change[:, 1], change[:, 0], -(along * rest).sum(axis=1) / length)
-    return np.asarray(np.clip(np.column_stack([later, wider]), -LONGEST_STEP, LONGEST_STEP))
+    return np.asarray(np.clip(np.column_stack([later, wider]), -longest, longest))
 
 
 ROW: Final = 8  # Number of dots in the row that rates a candidate
@@ -191,11 +198,12 @@ def solved(task: Task, ways: Ways) -> Ways:
     fired, width = solve(
         measure,
         start,
-        steps=_STEPS,
+        steps=(_STEPS[0] * task.scale, _STEPS[1] * task.scale),
         good=_SOLVED,
         least=LEAST_OF_OWN * task.width,
         most=task.widest,
         bounded=bounded,
+        longest=LONGEST_STEP * task.scale,
     ).T
     return ways._replace(fired=fired, width=width)
 

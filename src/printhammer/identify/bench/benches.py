@@ -45,7 +45,10 @@ HIGHEST_CURRENT: Final = 1.25
 """Default number of currents, and the highest current relative to the peak of the waveform."""
 
 PEAKS: Final = (0.3, 0.45, 0.6)
-"""Default peak indentations of the load cycles, relative to the thickness of the pack."""
+"""Default peak indentations of the load cycles, relative to the thickness of the pack.
+
+Without a thickness, the largest one is that of a single pulse.
+"""
 
 BRANCH_POINTS: Final = 30
 """Default number of readings per branch of a load cycle."""
@@ -345,12 +348,18 @@ def _currents(hammer: Hammer) -> FloatArray:
 def _peaks(hammer: Hammer) -> FloatArray:
     thickness = getattr(hammer.pack, "thickness", None)
     if thickness is None:
-        raise InputError(
-            f"{hammer.path}: the pack has no thickness",
-            file=hammer.path,
-            key="pack",
-            expected="the largest indentations to be given",
-        )
+        from printhammer.drive.trains import PulseTrain
+
+        dots = [] if hammer.waveform is None else simulate(hammer, PulseTrain(hammer.waveform), points=2).dots
+        deepest = dots[0].indentation if dots else None
+        if deepest is None:
+            raise InputError(
+                f"{hammer.path}: the pack has no thickness, and no pulse of the hammer presses it",
+                file=hammer.path,
+                key="pack",
+                expected="the largest indentations to be given (--peaks)",
+            )
+        return float(deepest) * np.array(PEAKS) / PEAKS[-1]
     return float(thickness) * np.array(PEAKS)
 
 

@@ -32,7 +32,9 @@ class Judgement(Declared):
     arrival_deviation: FloatArray = column(
         "s", "touch minus slot time and single-pulse flight time", "member firing", more="NaN for a lost dot"
     )
-    extra_contacts: IntArray = column("1", "further pack contacts", "member firing")
+    extra_contacts: IntArray = column(
+        "1", "extra pack contacts beyond those of the single pulse", "member firing", more="not below 0"
+    )
     limits: Limits = part("limits that the dots are judged by")
 
     @property
@@ -93,6 +95,7 @@ def judge(
     single = [nominal] if isinstance(nominal, SinglePulse) else nominal
     single_force = np.array([pulse.force for pulse in single])[:, np.newaxis]
     single_flight = np.array([pulse.flight_time for pulse in single])[:, np.newaxis]
+    bounces = np.array([pulse.extra_contacts for pulse in single])[:, np.newaxis]
     force = np.where(struck, dots.peak_force / single_force - 1.0, np.nan)
     arrival = dots.fired_at + dots.flight_time - (slot_times + single_flight)
     return Judgement(
@@ -101,7 +104,7 @@ def judge(
         lost=run & asked & ~dots.struck,
         force_deviation=force,
         arrival_deviation=np.where(struck, arrival, np.nan),
-        extra_contacts=np.where(struck, dots.extra_contacts, 0),
+        extra_contacts=np.where(struck, np.maximum(dots.extra_contacts - bounces, 0), 0),
         limits=limits,
     )
 
@@ -116,7 +119,9 @@ class Limits(Declared):
         "largest absolute deviation of the touch from slot time plus single-pulse flight time, s",
         default=50e-6,
     )
-    extra_contacts: int = part("largest number of extra pack contacts", default=0)
+    extra_contacts: int = part(
+        "largest number of extra pack contacts beyond those of the single pulse", default=0
+    )
 
     def __post_init__(self) -> None:
         for name, unit in (("force", ""), ("arrival", " s"), ("extra_contacts", "")):

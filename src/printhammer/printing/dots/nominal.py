@@ -23,6 +23,9 @@ class SinglePulse(Declared):
 
     force: float = scalar("N", "largest pack force")
     flight_time: float = scalar("s", "time from firing to touch")
+    extra_contacts: int = scalar(
+        "1", "number of extra pack contacts, as of bounces on a stop", default=0, kw_only=True
+    )
 
 
 class Nominal(SinglePulse):
@@ -70,7 +73,7 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
             key="pulse",
             expected="a hammer that prints",
         )
-    return Nominal(*known)
+    return Nominal(*known, extra_contacts=dot.extra_contacts)
 
 
 @computation
@@ -97,9 +100,10 @@ def single_pulses(
     assert dots is not None
     good = result.ok & dots.struck[:, 0]
     forces, flights = dots.peak_force[:, 0].tolist(), dots.flight_time[:, 0].tolist()
+    more = dots.extra_contacts[:, 0].tolist()
     return [
-        SinglePulse(force, flight) if well and force > 0.0 else None
-        for well, force, flight in zip(good.tolist(), forces, flights, strict=True)
+        SinglePulse(force, flight, extra_contacts=extra) if well and force > 0.0 else None
+        for well, force, flight, extra in zip(good.tolist(), forces, flights, more, strict=True)
     ]
 
 

@@ -24,7 +24,7 @@ from printhammer.parts.pack.power import PowerPack
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import Nominal, nominal, pulse_of, single_pulses
 from printhammer.printing.dots.settling import settle
-from printhammer.printing.rates.safe_rate import FIRST, LAST, grid_notes, rate_grid, safe_rates
+from printhammer.printing.rates.safe_rate import grid_notes, grid_of, safe_rates
 from printhammer.printing.rates.variability import changed
 from printhammer.results import Declared, Result, column, derived, part, scalar
 from printhammer.results.declare import columns_of
@@ -246,9 +246,9 @@ def damping_study(
     *,
     current: float | str = CURRENT,
     limits: Limits | None = None,
-    first: float | str = FIRST,
-    last: float | str = LAST,
-    step: float | str = STEP,
+    first: float | str | None = None,
+    last: float | str | None = None,
+    step: float | str | None = None,
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> DampingStudy:
@@ -274,7 +274,7 @@ def damping_study(
         The study, with a status for each material.
     """
     allowed = read_positive(current, "A", "current")
-    grid = rate_grid(first, last, step)
+    grid = grid_of(hammer, first, last, step, STEP)[0]
     bounds = Limits() if limits is None else limits
     if hammer.backstop is None:
         raise InputError(

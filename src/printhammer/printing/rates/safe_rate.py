@@ -5,8 +5,9 @@ within limits: those of all 255 patterns of eight slots from rest, and those of 
 patterns are the binary de Bruijn cycle of order 8, which contains every word of eight slots exactly once,
 after a lead-in of 64 slots; rows of 200 slots; and a line of text.
 
-By default the grid begins at 100 Hz: 10 ms is several times the settle-out time of such a hammer, so below
-100 Hz every dot is a single pulse from rest.
+By default the grid of the paper's hammer begins at 100 Hz: 10 ms is several times the settle-out time of such
+a hammer, so below 100 Hz every dot is a single pulse from rest. The grid of a slower device is scaled down,
+see `printhammer.run.window.time_scale`.
 """
 
 from __future__ import annotations
@@ -42,13 +43,14 @@ from printhammer.results.summary import (
     styled,
 )
 from printhammer.run.effort import DEFAULT, Effort, InThreads, computation
+from printhammer.run.window import scaled_rate
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
-FIRST: Final = 100.0  # First rate of the grid, Hz
+FIRST: Final = 100.0  # First rate of the grid of the paper's hammer, Hz
 
-LAST: Final = 4000.0  # Last rate of the grid, Hz
+LAST: Final = 4000.0  # Last rate of that grid, Hz
 
-STEP: Final = 5.0  # Step of the grid, Hz
+STEP: Final = 5.0  # Step of that grid, Hz
 
 MOST_RATES: Final = 10_000  # Largest number of rates in a grid
 
@@ -186,9 +188,9 @@ def safe_rate(
     *,
     limits: Limits | None = None,
     nominal: SinglePulse | None = None,
-    first: float | str = FIRST,
-    last: float | str = LAST,
-    step: float | str = STEP,
+    first: float | str | None = None,
+    last: float | str | None = None,
+    step: float | str | None = None,
     stop: bool = True,
     long: bool = True,
     progress: Callable[[float], None] | None = None,
@@ -209,7 +211,8 @@ def safe_rate(
         The single-pulse dot that judges the others; by default that of the hammer. For a hammer that differs
         from the design of a drive, pass the dot of the design.
     first, last, step : float or str, optional
-        The grid of rates, Hz, or text with a unit.
+        The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, and as much lower
+        as a device is slower than the paper's hammer.
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise all rates of the grid are simulated,
         for a chart.
@@ -223,7 +226,7 @@ def safe_rate(
     SafeRate
         The rate, its limiting failure, and the deviations at every simulated rate.
     """
-    grid = rate_grid(first, last, step)
+    grid, apart = grid_of(hammer, first, last, step)
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=effort.tolerance) if nominal is None else nominal
     patterns = from_rest(every=strategy is not open_loop)
@@ -272,7 +275,7 @@ def safe_rate(
             (drive.peak for trial, case in best for drive in trial.drives[trial.rows(case)]), default=math.nan
         ),
         multiplier=np.concatenate(growth)[: len(rows)],
-        step=read_positive(step, "Hz", "step"),
+        step=apart,
         tolerance=effort.tolerance,
         **{name: np.array([row[name] for row in rows]) for name in rows[0]},
     )
@@ -282,6 +285,24 @@ def _said_of_row(growth: float) -> str:
     """Describe the multiplier of a row in words."""
     more = ": dots alternate, within limits" if growth < -1.0 else ""
     return f"multiplier {growth:+.3f} from dot to dot{more}"
+
+
+def grid_of(
+    hammer: Hammer,
+    first: float | str | None,
+    last: float | str | None,
+    step: float | str | None,
+    spacing: float = STEP,
+) -> tuple[FloatArray, float]:
+    """Return a grid of rates and its step, Hz; for what is None that of the device.
+
+    `spacing` is the default step for the paper's hammer, Hz.
+    """
+    values = [
+        scaled_rate(hammer, default) if value is None else read_positive(value, "Hz", name)
+        for name, value, default in (("first", first, FIRST), ("last", last, LAST), ("step", step, spacing))
+    ]
+    return rate_grid(*values), values[2]
 
 
 def rate_grid(first: float | str, last: float | str, step: float | str) -> FloatArray:

@@ -16,7 +16,7 @@ from printhammer.printing.dots.judging import Limits
 from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.strategy import Strategy, name_of, open_loop
 from printhammer.printing.dots.trial import Case
-from printhammer.printing.rates.safe_rate import FIRST, LAST, all_pass, grid_notes, rate_grid, safe_rates
+from printhammer.printing.rates.safe_rate import all_pass, grid_notes, grid_of, safe_rates
 from printhammer.printing.rates.variability import changed
 from printhammer.results import Result, column, derived, part, scalar
 from printhammer.results.summary import (
@@ -173,9 +173,9 @@ def tolerance_yield(
     judged_by: Judged = "own",
     strategy: Strategy = open_loop,
     limits: Limits | None = None,
-    first: float | str = FIRST,
-    last: float | str = LAST,
-    step: float | str = STEP,
+    first: float | str | None = None,
+    last: float | str | None = None,
+    step: float | str | None = None,
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> ToleranceYield:
@@ -213,7 +213,11 @@ def tolerance_yield(
         raise InputError.of("number", count, f"at most {MOST} hammers", written=str(count))
     if judged_by not in get_args(Judged):
         raise InputError.of("judged_by", judged_by, f"one of {', '.join(get_args(Judged))}")
-    grid = rate_grid(first, last, step) if rate is None else np.array([read_positive(rate, "Hz", "rate")])
+    grid = (
+        grid_of(hammer, first, last, step, STEP)[0]
+        if rate is None
+        else np.array([read_positive(rate, "Hz", "rate")])
+    )
     bounds = Limits() if limits is None else limits
     spread = spreads_of(hammer, spreads)
     design = nominal(hammer, tolerance=effort.tolerance)

@@ -1,0 +1,84 @@
+"""Every device in every verb: defaults of the device, refusals that name what is missing and the option."""
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests import hammers
+from tests.errors import refused
+
+import printhammer as ph
+from printhammer.control.least_work.burst import least_work
+from printhammer.control.pulses import LARGEST_CURRENT, current_bound
+from printhammer.drive.waveforms.drivers import Rail
+from printhammer.maps.frequency import HIGHEST, LOWEST, default_rates
+from printhammer.printing.dots.judging import Limits, judge
+from printhammer.printing.dots.nominal import SinglePulse
+from printhammer.printing.rates.safe_rate import FIRST, LAST, STEP, grid_of
+from printhammer.run import window
+
+PAPER = 0.28e-3
+
+
+def timed(monkeypatch: pytest.MonkeyPatch, flight: float) -> None:
+    """Let every single pulse fly for a time, s, without a run."""
+    monkeypatch.setattr(window, "_window_of", lambda *_: window.Window(20.0 * flight, flight))
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 5.0, 20.0, 100.0])
+def test_default_rates_go_by_the_flight_time(scale: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    hammer = hammers.crude()
+    timed(monkeypatch, 1.1 * PAPER * scale)
+    assert window.time_scale(hammer) == scale
+    assert default_rates(hammer, count=2).tolist() == [LOWEST / scale, HIGHEST / scale]
+    grid, step = grid_of(hammer, None, None, None)
+    assert (grid[0], step) == (FIRST / scale, STEP / scale)
+    assert math.isclose(grid[-1], LAST / scale)
+    # What is stated is not scaled.
+    assert grid_of(hammer, "200 Hz", 400.0, None, 50.0 * scale)[0].tolist() == [
+        200.0,
+        250.0,
+        300.0,
+        350.0,
+        400.0,
+    ]
+
+
+def test_a_long_pulse_makes_a_device_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    timed(monkeypatch, math.nan)
+    pulse = Rail(voltage=5.0, width=40.0 * PAPER)
+    assert window.time_scale(hammers.crude(), pulse) == 20.0
+    # Pulses at the highest default rate do not run into each other.
+    assert HIGHEST / window.time_scale(hammers.crude(), pulse) * pulse.width < 1.2
+
+
+def test_bounces_of_the_single_pulse_are_no_fault_of_others() -> None:
+    dots: Any = SimpleNamespace(
+        fired=np.ones((1, 2), bool),
+        struck=np.ones((1, 2), bool),
+        fired_at=np.array([[0.0, 1.0]]),
+        flight_time=np.full((1, 2), 1e-3),
+        peak_force=np.full((1, 2), 20.0),
+        extra_contacts=np.array([[2, 3]]),
+    )
+    single = SinglePulse(20.0, 1e-3, extra_contacts=2)
+    seen = judge(dots, np.ones((1, 2), bool), dots.fired_at, single, Limits())
+    assert seen.extra_contacts.tolist() == [[0, 1]]
+    assert seen.good.tolist() == [[True, False]]
+    assert judge(dots, seen.wanted, dots.fired_at, single, Limits(extra_contacts=1)).passed.all()
+
+
+def test_the_bound_on_the_current_is_that_of_the_device() -> None:
+    hammer = hammers.crude()
+    assert current_bound(hammer) == LARGEST_CURRENT
+    strong = hammer.replace({"waveform.amplitude": 3.0})
+    assert strong.waveform.peak <= current_bound(strong) <= strong.waveform.peak + 0.11
+    assert current_bound(strong, "1.5 A") == 1.5
+
+
+def test_a_burst_needs_a_current() -> None:
+    device = ph.load("relay-5v")
+    with refused("waveform", file="relay-5v.toml"):
+        least_work(device, 20.0, dots=1)
