@@ -192,7 +192,7 @@ class ThermalDuty(Result, rows="ambient burst"):
                 if self.heat.on_time
                 else None,
             ),
-            ("keeps the same", f"the {self.heat.feed} of the driver"),
+            ("held constant", f"the {self.heat.feed} of the driver"),
         ]
         return Summary([Facts(facts), "", Grid(rates), "", Grid(bursts)])
 

@@ -341,6 +341,7 @@ def summary(page: Page) -> str:
     said = [f"{page.line.size} dots wanted", f"{int(page.printed.sum())} printed", f"{lost} lost"]
     if not page.run.all():
         said.append(f"{int((~page.run).sum())} not run")
+    said.append(f"{int(page.good.sum())} within limits")
     said.append(f"{extra} extra contacts")
     if page.printed.any():
         error = _MICRONS.shown(page.placement_error[page.printed])

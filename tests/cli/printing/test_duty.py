@@ -43,7 +43,7 @@ def test_a_hammer_by_its_resistance_and_current(cli: Callable, tmp_path: Path) -
     ph.load("hendriks-1983").replace("coil.resistance", "4 ohm").save(wound)
     done = cli("duty", wound, *COIL, "--out", tmp_path / "duty.png")
     assert done.status == 0
-    assert "keeps the same" in done.out
+    assert "held constant" in done.out
     assert "the current of the driver" in done.out
 
 

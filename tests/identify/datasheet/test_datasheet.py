@@ -11,7 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import printhammer as ph
-from printhammer.identify.datasheet.build import Sheet, damping_ratio, fit_magnet, forces_of, hammer_of
+from printhammer.identify.datasheet.build import (
+    Sheet,
+    damping_ratio,
+    fit_magnet,
+    forces_of,
+    hammer_of,
+    implausible,
+)
 from printhammer.identify.datasheet.sheet import DataSheet, read_sheet
 from printhammer.parts.magnet import reluctance as law
 from printhammer.parts.magnet.reluctance import MU0, ReluctanceMagnet
@@ -184,3 +191,21 @@ def test_what_is_no_sheet_is_refused(change: tuple[str, str | None], said: str, 
     assert str(error.value).startswith(str(tmp_path / "sheet.toml"))
     assert said in str(error.value)
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_pole_that_the_device_cannot_hold_is_named(tmp_path: Path) -> None:
+    """5 N at 10 mm and 300 mA ask for a pole of some 80 cm2, and its armature for kilograms of iron."""
+    wrong = PLAIN.replace(
+        'force = [["0.25 mm", "85.9 N"], ["1 mm", "28.9 N"], ["2 mm", "11.1 N"], ["5 mm", "3.59 N"]]',
+        'force = [["10 mm", "5 N"]]\ncurrent = "0.3 A"',
+    ).replace('"4.75 mm"', '"10 mm"')
+    for text, count in ((PLAIN, 0), (wrong, 1)):
+        sheet = sheet_of(text, tmp_path)
+        magnet = hammer_of(sheet)[1]
+        assert len(implausible(sheet, magnet.part)) == count, text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_shipped_devices_are_plausible(name: str, tmp_path: Path) -> None:
+    sheet = sheet_of(SHEETS.joinpath(f"{name}.toml").read_text("utf-8"), tmp_path)
+    assert implausible(sheet, hammer_of(sheet)[1].part) == []

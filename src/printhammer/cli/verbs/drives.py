@@ -15,6 +15,7 @@ from printhammer.errors import InputError
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
+_OFF: Final = 1e-3  # Relative error of the current that is always shown
 _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minutes; arbitrary
 
 
@@ -90,6 +91,11 @@ def energy(
     shown = render(result.summary(), units)
     if supply:
         shown += ["", *render(result.under_supply().summary(result.count), units)]
+    else:
+        less, more = result.under_supply((-_OFF, _OFF)).adequate.tolist()
+        shown.append(
+            f"{less} and {more} of {result.count} dots adequate at {100.0 * _OFF:g} % less and more current"
+        )
     short = result.adequate < result.count
     return Answer(
         shown,

@@ -200,7 +200,7 @@ def from_datasheet(
         return Answer()
     if sheet is None:
         raise InputError("SHEET is missing", key="SHEET", expected="a data sheet; --example NAME prints one")
-    from printhammer.identify.datasheet.build import hammer_of
+    from printhammer.identify.datasheet.build import hammer_of, implausible
     from printhammer.identify.datasheet.sheet import read_sheet
     from printhammer.results import Cells, Grid, Summary
 
@@ -211,6 +211,8 @@ def from_datasheet(
             f"{sheet}: a force is met to {100.0 * magnet.misfit:.2g} % only: poles that are not flat, or a"
             " typing error"
         )
+    for sentence in implausible(read, magnet.part):
+        warn(f"{sheet}: {sentence}")
     gaps, printed = zip(*read.force, strict=True)
     forces = [
         Cells("gap", [f"{gap.value:g} {gap.unit}" for gap in gaps]),

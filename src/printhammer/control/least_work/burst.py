@@ -298,6 +298,7 @@ class LeastWork(Result, rows="node"):
         """Return works and ledger."""
         work, ledger = self.work, self.ledger
         return {
+            "interpolation": "linear between nodes; a current held from node to node prints fewer dots",
             "adequate_dots": self.adequate,
             "net_work": work.net,
             "positive_work": work.positive,
@@ -413,10 +414,7 @@ def least_work(
     for role in ("magnet", "spring", "backstop", "pack"):
         if getattr(hammer, role) is None:
             raise InputError(
-                f"{hammer.path}: the hammer has no {role}",
-                file=hammer.path,
-                key=role,
-                expected="one with all parts",
+                f"{hammer.path}: the hammer has no {role}", file=hammer.path, key=role, expected="all parts"
             )
     waveform = pulse_of(hammer)
     if waveform.quantity != "current":
@@ -432,10 +430,7 @@ def least_work(
         steepest = math.inf
     elif slew is None and not math.isfinite(steepest):
         raise InputError(
-            f"{hammer.path}: the waveform jumps",
-            file=hammer.path,
-            key="waveform",
-            expected="slew, the steepest slope of the current",
+            f"{hammer.path}: the waveform jumps", file=hammer.path, key="waveform", expected="slew (--slew)"
         )
     elif not (math.isfinite(steepest) and steepest > 0.0):
         raise InputError.of(

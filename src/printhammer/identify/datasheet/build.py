@@ -191,6 +191,37 @@ def _described(
     )
 
 
+IRON: Final = 7860.0  # Density, kg/m^3
+_HEAVY: Final = 3.0  # Factor on the stated mass above which an armature of iron is implausible; arbitrary
+
+
+def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
+    """Return a sentence for each property of a magnet that its device cannot have.
+
+    An armature of iron that closes a round pole of the area and carries its flux to the rim is a quarter of
+    the diameter thick; it must not weigh much more than the sheet says. The driver must be able to store the
+    field at the current of the forces and full gap within a pulse: half the inductance times the squared
+    current, of at most rail times current times on-time.
+    """
+    found = []
+    diameter = 2.0 * math.sqrt(part.pole_area / math.pi)
+    least, mass = IRON * part.pole_area * 0.25 * diameter, sheet.si("mass")
+    if "pole_diameter" not in sheet.entries and least > _HEAVY * mass:
+        found.append(
+            f"a pole of {1e4 * part.pole_area:.3g} cm2 is fitted to the forces: an iron armature for it has"
+            f" {1e3 * least:.3g} g or more, the sheet {1e3 * mass:.3g} g; check force, gap and current"
+        )
+    current = sheet.si("current", sheet.si("rail") / sheet.si("resistance"))
+    field = 0.5 * law.magnet_inductance(part.packed(0.0), 0.0, 0.0) * current**2
+    supplied = sheet.si("rail") * current * sheet.si("on_time")
+    if field > supplied:
+        found.append(
+            f"the field at {current:.3g} A holds {1e3 * field:.3g} mJ, a pulse supplies {1e3 * supplied:.3g}"
+            " mJ at most: check force, gap, current and on_time"
+        )
+    return found
+
+
 RESTITUTION: Final = 0.3
 """Assumed restitution of a stop: steel on steel with a thin film between."""
 

@@ -256,8 +256,8 @@ def assemble(
             low, high = constants[key].interval
             raise InputError(
                 (
-                    f"{data.files[0]}: {key} cannot be distinguished from zero (95 % interval {low:.3g} to"
-                    f" {high:.3g} {constants[key].unit})"
+                    f"{data.files[0]}: {key} {_unseen(constants[key])} (95 % interval {low:.3g} to {high:.3g}"
+                    f" {constants[key].unit})"
                 ),
                 file=data.files[0],
                 key=key,
@@ -268,7 +268,7 @@ def assemble(
         for key, each in constants.items()
         if each.held
     ]
-    held += [f"{key} cannot be distinguished from zero" for key in unseen]
+    held += [f"{key} {_unseen(constants[key])}" for key in unseen]
     weak = [
         f"{key} is weakly determined: its profile puts it between {shape.interval[0]:.4g} and"
         f" {shape.interval[1]:.4g} {constants[key].unit}"
@@ -301,6 +301,13 @@ def assemble(
         p_value=p_value,
         remarks=(*notes, *weak),
     )
+
+
+def _unseen(constant: FittedConstant) -> str:
+    """Say of a constant that has to be positive where it came out."""
+    if constant.interval[1] < 0.0:
+        return f"came out negative, {constant.value:.3g} {constant.unit}"
+    return "cannot be distinguished from zero"
 
 
 def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profile:

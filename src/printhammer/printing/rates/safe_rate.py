@@ -79,7 +79,7 @@ class Failure(Declared):
     def text(self) -> str:
         """The failure in one sentence."""
         where = {
-            "from rest": f"the last dot of the pattern {self.pattern}",
+            "from rest": f"pattern {self.pattern}: its last dot",
             "cycle": f"the last dot in the cycle after {self.pattern[:-1]}",
             "row": f"dot {self.dot} of a row",
             "text": f"the last dot in a line of text after {self.pattern[:-1]}",
@@ -91,7 +91,7 @@ class Failure(Declared):
             "lost": "is lost",
             "not run": "is not run: the run ended early",
         }[self.fault]
-        return f"At {self.rate:g} Hz {where} {what}."
+        return f"At {self.rate:g} Hz, {where} {what}."
 
 
 class SafeRate(Result):
