@@ -52,8 +52,8 @@ ROOMS = (
 )
 PAGES = (
     "README.md",
-    "docs/howto/learning.md",
     *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs").glob("*.md"))),
+    *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs/howto").glob("*.md"))),
     *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs/tutorials").glob("*.md"))),
 )
 PHRASES = (
