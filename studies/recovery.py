@@ -1,8 +1,8 @@
-"""The whole path: hammer, measurements, constants, hammer.
+"""The complete chain: from a hammer to measurements, from these to constants, and back to a hammer.
 
 A hammer is measured on every bench of the synthetic laboratory, its constants are fitted to the tables, and a
-hammer is built of them. As the true constants are known, it shows what fits and intervals are worth, and what
-a bench would give before anybody builds it.
+hammer is built from them. As the true constants are known, the study shows how good the fits and their
+confidence intervals are, and so what a real bench would give before it is built.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ STEEL: Final = ((200e9, 0.01), (0.3, 0.01))
 """Young's modulus, Pa, and Poisson ratio of both bodies of the backstop, with relative standard errors."""
 
 RADIUS_ERROR: Final = 0.01
-"""Relative standard error of the radius that is measured."""
+"""Relative standard error of the measured radius."""
 
 _TABLES: Final = ("magnet", "spring", "pack", "backstop", "motion")
-"""What is measured."""
+"""Tables that are measured."""
 
 _START: Final = 0.2
-"""The fit of the motion begins with constants wrong by up to this share."""
+"""Largest relative error of the constants with which the fit of the motion starts."""
 
 
 class Recovery(Declared, eq=False):
-    """One laboratory, and what was found."""
+    """The results of one laboratory: the true hammer, the fits, and the hammer built from them."""
 
     truth: Hammer = part("what was measured")
     fits: Mapping[str, Fit] = part('by kind: "magnet" (with the spring), "pack", "backstop", "motion"')
@@ -59,24 +59,24 @@ class Recovery(Declared, eq=False):
 def recover(
     hammer: Hammer, seed: int, *, sensor: Mapping[str, Any] | None = None, folder: str | Path | None = None
 ) -> Recovery:
-    """Measure a hammer, fit its constants and build a hammer of them.
+    """Measure a hammer, fit its constants and build a hammer from them.
 
     Parameters
     ----------
     hammer : Hammer
-        With a magnet after equation (3), a linear spring, a pack after equation (5), a Hertz backstop and a
-        waveform.
+        Must have a magnet after equation (3), a linear spring, a pack after equation (5), a Hertz backstop
+        and a waveform.
     seed : int
-        Of the laboratory.
+        Seed of the laboratory.
     sensor : mapping, optional
-        Settings of the sensors, as `measure` takes them, wherever they apply.
+        Settings of the sensors, as for `measure`, used wherever they apply.
     folder : path, optional
-        Where the tables are left; by default they are not kept.
+        Where the tables are kept; by default they are not.
 
     Raises
     ------
     InputError
-        The hammer lacks a part, or a fit fails.
+        The hammer lacks a component, or a fit fails.
     """
     if folder is None:
         with tempfile.TemporaryDirectory() as place:
@@ -92,7 +92,7 @@ def recover(
         "pack": fit_pack(paths["pack"], thickness=true_value(hammer, "pack.thickness")),
         "backstop": fit_backstop(paths["backstop"], stiffness=measured_stiffness(hammer, rng)),
     }
-    # The mass is a guess, so that the fit of the motion does not begin at the truth.
+    # Start from a guessed mass, so that the fit of the motion does not start at the truth.
     built = hammer.replace("mass", hammer.mass * (1.0 + _START * float(rng.uniform(-1.0, 1.0))))
     for fit in fits.values():
         built = fit.into(built)
@@ -104,9 +104,10 @@ def recover(
 
 
 def measured_stiffness(hammer: Hammer, rng: np.random.Generator) -> Stiffness:
-    """Return the stiffness of the backstop as it follows from bodies that are measured with errors.
+    """Return the stiffness of the backstop computed from bodies that are measured with errors.
 
-    A ball of steel meets a flat of steel; the radius is the one that gives the stiffness of the hammer.
+    The bodies are a steel ball and a steel flat; the radius is the one that gives the stiffness of the
+    hammer.
     """
     (modulus, modulus_error), (ratio, ratio_error) = STEEL
     k = true_value(hammer, "backstop.stiffness")
@@ -124,7 +125,7 @@ def measured_stiffness(hammer: Hammer, rng: np.random.Generator) -> Stiffness:
 
 
 def true_value(hammer: Hammer, key: str) -> float:
-    """Return a constant of a hammer, SI, also one that follows from others, such as l from a rebound."""
+    """Return a constant of a hammer, SI, also one derived from others, such as l from a rebound."""
     section, _, name = key.rpartition(".")
     if not section:
         return hammer.mass

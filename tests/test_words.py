@@ -50,6 +50,23 @@ ROOMS = (
     "sweep",
     "units",
 )
+HASHED = (
+    "buzz_losses",
+    "candidates",
+    "cloud_losses",
+    "evaluation",
+    "losses",
+    "map_losses",
+    "panel_losses",
+    "space",
+)
+"""Modules of the search whose text is hashed into its logs: changing a docstring would invalidate these."""
+
+STUDIES = tuple(
+    module
+    for module in sorted((ROOT / "studies").rglob("*.py"))
+    if not (module.parent.name == "search" and module.stem in HASHED)
+)
 PAGES = (
     "README.md",
     *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs").glob("*.md"))),
@@ -96,6 +113,10 @@ def test_a_room_speaks_plainly(room: str) -> None:
     modules = sorted(place.rglob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
     assert modules
     assert {str(module.relative_to(PACKAGE)): said for module in modules if (said := forbidden(module))} == {}
+
+
+def test_studies_speak_plainly() -> None:
+    assert {str(path.relative_to(ROOT)): said for path in STUDIES if (said := forbidden(path))} == {}
 
 
 def test_pages_speak_plainly() -> None:

@@ -1,4 +1,4 @@
-"""Files of JSON lines that grow while a search or a judge works: read as far as they are whole, added to."""
+"""Files of JSON lines that grow while a search or a judge runs: reading complete lines, and appending."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 
 
 def read_text(path: Path, what: str = "file", *, required: bool = False) -> str:
-    """Return the text of a file; unless it is required, none where there is no file.
+    """Return the text of a file; an empty text if there is no file, unless it is required.
 
     Raises
     ------
     InputError
-        It cannot be read.
+        The file cannot be read.
     """
     try:
-        # Bytes, since the length of what is kept counts in them.
+        # Read bytes, since the length of the kept part is counted in bytes.
         return path.read_bytes().decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         if isinstance(error, FileNotFoundError) and not required:
@@ -30,7 +30,7 @@ def read_text(path: Path, what: str = "file", *, required: bool = False) -> str:
 
 
 def read_object(line: str) -> dict[str, Any] | None:
-    """Return the JSON object of a line; None if it is none."""
+    """Return the JSON object of a line; None if the line is not one."""
     try:
         row = json.loads(line)
     except ValueError:
@@ -39,12 +39,12 @@ def read_object(line: str) -> dict[str, Any] | None:
 
 
 def append(path: Path, text: str, what: str = "file", *, kept: str | None = None) -> None:
-    """Add text to a file, behind a beginning that is kept, if one is given.
+    """Append text to a file; with `kept`, the file is first cut to that beginning.
 
     Raises
     ------
     InputError
-        It cannot be written.
+        The file cannot be written.
     """
     try:
         with path.open("ab") as file:

@@ -1,4 +1,4 @@
-"""From the judged candidates to what ships: the hammer file, and what the report tells of the search."""
+"""Shipping: the hammer file of the best judged candidate, and the data on the search for the report."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ claim by claim. Other constants do about as well, see the family. A reconstructe
 
 
 def gauge() -> str:
-    """Return in a sentence how the scales were set that no motion tells."""
+    """Return a sentence on how the two scales were fixed that the motion does not determine."""
     pounds = from_si(PRINT_FORCE, "N", "lbf")
     return (
         "Mass and all forces scale together without a change of the motion, and so do the current and 1 / Bm:"
@@ -37,12 +37,12 @@ def gauge() -> str:
 
 
 def best_of(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the candidate that ships: most claims, a panel of Fig. 11 as a twelfth."""
+    """Return the best judged candidate, see `standing`; it becomes the shipped hammer."""
     return max(rows, key=standing)
 
 
 def shipped_hammer(constants: Mapping[str, float], name: str) -> Hammer:
-    """Return the hammer that ships, with title and note."""
+    """Return the shipped hammer, with title and note."""
     return hammer_of(constants, name=name, title=TITLE, note=NOTE)
 
 
@@ -54,11 +54,10 @@ def search_json(
     core_hours: float,
     progress: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Return what `search.json` holds: the search, and for each claim that fails the best hammer for it.
+    """Build the contents of `search.json`: the search, and the best hammer for each claim that fails.
 
-    `hammer` is the one that ships, `rows` are judged candidates. Of each search its `aim`, its `seed` and the
-    number of `candidates` tried are kept. `progress` is called with the name of each claim before it is
-    judged.
+    `hammer` is the shipped one, `rows` are judged candidates. Of each search, `aim`, `seed` and the number of
+    `candidates` are kept. `progress` is called with the name of each claim before it is judged.
     """
     results = judge_all(hammer, progress=progress)
     held = {result.claim.name for result in results if result.verdict == "holds"}

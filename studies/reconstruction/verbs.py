@@ -1,4 +1,4 @@
-"""The verbs of the study: search for the hammer of the paper, judge what was found, ship the best."""
+"""The verbs of the study: search for the hammer of the paper, judge candidates, ship the best."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ EXAMPLE: Final = "python -m studies.reconstruction search all.jsonl --minutes 1"
 _SEARCHED: Final = "python -m studies.reconstruction search all.jsonl --from family --minutes 0.1 &&"
 _TWO: Final = f"{_SEARCHED} python -m studies.reconstruction judge all.jsonl judged.jsonl --best 2"
 _JUDGED_TOO: Final = f"{_TWO} &&"
-"""Make the logs that the examples read."""
+"""Commands that write the logs used in the examples."""
 
-_WORKERS: Final = opt.bounded(1, "Processes to compute in.", default=2, metavar="N")
-_SEED: Final = opt.bounded(0, "Decides on everything random.", default=1)
+_WORKERS: Final = opt.bounded(1, "Number of processes.", default=2, metavar="N")
+_SEED: Final = opt.bounded(0, "Seed of the random number generator.", default=1)
 _LOG: Final = opt.argument("LOG", "Log of a search.", default=..., type=Path, is_input=True)
 _JUDGED: Final = opt.argument("JUDGED", "Log of judged candidates.", default=..., type=Path, is_input=True)
 
@@ -68,10 +68,10 @@ def search(
         default="",
         flag="--from",
     ),
-    minutes: float = opt.bounded(0, "How long to search; 0: until interrupted.", default=60.0),
+    minutes: float = opt.bounded(0, "Search time in minutes; 0: until interrupted.", default=60.0),
     workers: int = _WORKERS,
 ) -> Answer:
-    """Try candidates, led by the claims, and note every one of them; Ctrl-C loses nothing."""
+    """Try candidates, ranked by the claims, and log each of them; interrupting with Ctrl-C loses nothing."""
     from time import monotonic
 
     from studies.reconstruction.search.evaluation import AIMS, WEIGHTS
@@ -165,7 +165,7 @@ def judge(
 def base_rates(
     job: Job,
     hammers: int = opt.bounded(1, "Number of random hammers.", default=100),
-    slow: int = opt.bounded(0, "For how many of them slow claims are judged too.", default=3),
+    slow: int = opt.bounded(0, "Number of hammers for which slow claims are judged too.", default=3),
     seed: int = _SEED,
     workers: int = _WORKERS,
 ) -> Answer:
@@ -251,7 +251,7 @@ def front(
     judged: list[Path] = opt.argument(
         "JUDGED...", "Logs of judged candidates.", type=Path, is_input=True, many=True, default=...
     ),
-    core_hours: float = opt.bounded(0, "Time that the searches took.", default=0.0),
+    core_hours: float = opt.bounded(0, "Core time of the searches in hours.", default=0.0),
 ) -> Answer:
     """Show panels of Fig. 11 against all other claims, and the hammers that no other one beats in both."""
     from studies.reconstruction.judging.front import front as pareto
@@ -275,7 +275,7 @@ def family(
     judged: list[Path] = opt.argument(
         "JUDGED...", "Logs of judged candidates.", type=Path, is_input=True, many=True, default=...
     ),
-    out: Path = opt.folder("Where to write.", default=Path("build/family")),
+    out: Path = opt.folder("Folder to write to.", default=Path("build/family")),
     hammers: int = opt.bounded(1, "Number of hammers wanted.", default=24),
     least: int = opt.bounded(1, "Number of hammers needed.", default=20),
 ) -> Answer:
@@ -304,9 +304,9 @@ def ship(
     logs: list[Path] = opt.argument(
         "LOG...", "Logs of the searches.", type=Path, is_input=True, many=True, default=...
     ),
-    out: Path = opt.folder("Where to write.", default=Path("build/hammer")),
+    out: Path = opt.folder("Folder to write to.", default=Path("build/hammer")),
     name: str = opt.text("TEXT", "Name of the hammer.", default="hendriks-1983"),
-    core_hours: float = opt.bounded(0, "Time that the searches took.", default=0.0),
+    core_hours: float = opt.bounded(0, "Core time of the searches in hours.", default=0.0),
 ) -> Answer:
     """Write the best judged candidate as a hammer file, and for each claim that fails the best for it."""
     from printhammer.claims import claims

@@ -1,4 +1,4 @@
-"""Processes that compute for a verb, and end with it at once when it is interrupted."""
+"""Pool of worker processes of a verb, which are terminated when it is interrupted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[Executor | None]:
-    """Lend so many processes; for one worker None, since this process does it."""
+    """Yield a pool of `workers` processes; None for one worker, where this process does the work."""
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import active_children, get_context
 
@@ -24,7 +24,7 @@ def worker_pool(workers: int) -> Iterator[Executor | None]:
     try:
         yield pool
     except BaseException:
-        # What they are at may take a minute, and nobody waits for it any more.
+        # Their current task may take a minute, and its result is no longer needed.
         for child in set(active_children()) - others:
             child.terminate()
         raise
@@ -33,7 +33,7 @@ def worker_pool(workers: int) -> Iterator[Executor | None]:
 
 
 def _leave_interrupts() -> None:
-    """Leave Ctrl-C, which all processes of a terminal get, to the one that asked for the work."""
+    """Ignore SIGINT in a worker: only the main process handles Ctrl-C, which the terminal sends to all."""
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     from printhammer.support.arrays import FloatArray
 
-APART: Final = 0.1  # Distance from which on two values of a constant count as different
+APART: Final = 0.1  # Relative difference from which two values of a constant count as different; arbitrary
 
-CONSTANTS_APART: Final = 3  # Number of constants in which two hammers are that far apart at least
+CONSTANTS_APART: Final = 3  # Least number of constants in which two hammers differ by that much; arbitrary
 
 FORCE_POWERS: Final[dict[str, float]] = {
     "kg": 1.0,
@@ -33,10 +33,10 @@ FORCE_POWERS: Final[dict[str, float]] = {
     "N^0.5 m^0.25": 0.5,
     "N^0.5 m^0.25/A": 0.5,
 }
-"""Power of a common factor of mass and forces with which a constant of that SI unit scales; else 0."""
+"""Exponent with which a constant of that SI unit scales when mass and all forces are multiplied; else 0."""
 
 CURRENT_POWERS: Final[dict[str, float]] = {"A": 1.0, "N^0.5 m^0.25/A": -1.0}
-"""Power of a factor of the current with which a constant of that SI unit scales; else 0."""
+"""Exponent with which a constant of that SI unit scales when all currents are multiplied; else 0."""
 
 
 def scaled(
@@ -57,19 +57,19 @@ def scaled(
 def at_gauge(
     constants: Mapping[str, float], units: Mapping[str, str], print_force: float
 ) -> dict[str, float]:
-    """Return constants with the same motion at the common print force and current of the search.
+    """Return constants with the same motion, normalized to the print force and current of the search.
 
-    As `scaled`; `print_force` is the peak force of the single-pulse dot with these constants, N.
+    See `scaled`; `print_force` is the peak force, N, of the dot of a single pulse with these constants.
     """
     amplitude = constants["waveform.amplitude"]
     return scaled(constants, units, PRINT_FORCE / print_force, CURRENT / amplitude)
 
 
 def distances(constants: FloatArray, others: FloatArray) -> FloatArray:
-    """Return how far a hammer is from others, shape (n,): its third largest distance of a constant.
+    """Return the distances of one hammer from others: the third largest relative difference of a constant.
 
-    Two hammers are clearly different where this is at least `APART`. The `constants` of the one have
-    shape (k,), those of the others (n, k).
+    Two hammers are clearly different where this is at least `APART`. `constants` has shape (k,), `others`
+    (n, k); the result has shape (n,).
     """
     least = np.minimum(np.abs(constants), np.abs(others))
     apart = np.abs(others - constants)
@@ -85,13 +85,13 @@ def choose(
     *,
     wide: bool = True,
 ) -> list[int]:
-    """Choose hammers, `count` at most, any two of them clearly different; return their numbers.
+    """Choose at most `count` pairwise clearly different hammers; return their indices.
 
-    The `tables` (n, k) hold the constants of the candidates, the best candidates first, in each way in which
-    they are compared. `accept` is asked of a candidate that would be chosen; where it says no, another one
-    is. The next one is the farthest from all chosen so far, for a `wide` family, or else the nearest of those
-    that are far enough, for a large one. The first candidate that is accepted comes first, and the choice is
-    the same for the same tables.
+    Each of the `tables` (n, k) holds the constants of all candidates in one normalization, the best candidate
+    first. The choice is greedy and deterministic: with `wide`, the candidate farthest from all chosen so far
+    is taken next (farthest-point sampling), which spreads the family; otherwise the nearest one that is still
+    clearly different, which makes the family large. `accept` is called with each index before it is chosen; a
+    candidate for which it returns false is skipped.
     """
     total = len(tables[0]) if tables else 0
     nearest: FloatArray = np.full(total, np.inf)

@@ -1,7 +1,7 @@
-"""Conclusions: what an engineer would conclude about a hammer, a few numbers each with its unit.
+"""Conclusions: quantities that an engineer would read off the model of one hammer, each with its unit.
 
-The constants of the paper's hammer are not known. These are the numbers that one would ask of it all the
-same; which of them can be trusted is seen where they are compared over a family of hammers.
+The constants of the hammer of the paper are not known. Comparing the conclusions over a family of hammers
+shows which of them do not depend on the unknown constants.
 """
 
 from __future__ import annotations
@@ -25,19 +25,18 @@ from printhammer.results.declare import columns_of
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
-ONSET_STEP: Final = 5e-6  # Step of the strobe times at which chaos is looked for, s
+ONSET_STEP: Final = 5e-6  # Step of the strobe times over which the onset of chaos is searched, s
 
-GRID: Final = (100, 3000, 5)  # First and last rate and step of the grid of the safe rate, Hz
+GRID: Final = (100, 3000, 5)  # First rate, last rate and step of the grid for the safe rate, Hz
 
 RATES: Final = (500, 1250, 5)
-"""First and last rate and step of the grid of bursts, Hz: from where dots are independent into the erratic
-band."""
+"""First rate, last rate and step of the grid of bursts, Hz: from independent dots into the erratic band."""
 
 _AT_ONCE: Final = 40
 
 
 class Conclusions(Declared):
-    """The conclusions about one hammer; their units end their names. None: it has none."""
+    """The conclusions about one hammer; field names end in the unit. None: it has no such value."""
 
     safe_rate_Hz: float | None = scalar(
         "Hz",
@@ -96,7 +95,7 @@ words."""
 
 
 def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
-    """Return the conclusions about a hammer with magnet, pack, backstop and waveform; a context shares runs.
+    """Compute the conclusions about a hammer with magnet, pack, backstop and waveform; `context` caches runs.
 
     Raises
     ------
@@ -122,7 +121,7 @@ def conclude(hammer: Hammer, context: Context | None = None) -> Conclusions:
 
 
 def rate_from_rest(context: Context) -> float | None:
-    """Return the rate up to which all patterns of eight slots from rest are printed well, Hz; None without.
+    """Return the rate, Hz, up to which all patterns of eight slots from rest print well, or None.
 
     Raises
     ------
@@ -145,12 +144,12 @@ def rate_from_rest(context: Context) -> float | None:
 
 
 def settle_out(context: Context) -> float:
-    """Return the time to the end of the last rebound higher than `SETTLED` of the stroke, s.
+    """Return the time, s, at which the last rebound higher than `SETTLED` times the stroke ends.
 
     Raises
     ------
     NotMeasurableError
-        There is no such rebound, or the last one does not end.
+        There is no such rebound, or the last one does not end within the run.
     """
     limit = SETTLED * context.stroke
     ends = [bounce.end for bounce in rebounds(context.single, context.position) if bounce.height > limit]
@@ -160,10 +159,10 @@ def settle_out(context: Context) -> float:
 
 
 def chaos_onset(context: Context) -> float | None:
-    """Return the longest strobe time whose train is strange, s; None where there is none."""
+    """Return the longest strobe time, s, at which a train is classified strange, or None."""
     settings = claims()["no_period_doubling_cascade"].settings
     first, last = settings["first_strobe_time_s"], settings["last_strobe_time_s"]
-    # Rounded, so that strobe times are the numbers that one would write.
+    # Rounded so that the strobe times are short decimal numbers.
     periods: list[float] = [
         round(first - ONSET_STEP * k, 12) for k in range(round((first - last) / ONSET_STEP) + 1)
     ]
@@ -178,11 +177,11 @@ def chaos_onset(context: Context) -> float | None:
 
 
 def flight_times(context: Context) -> tuple[float, dict[str, float | None]]:
-    """Return the largest flight-time spread of bursts, s, and the rates, Hz, at which it exceeds limits.
+    """Return the largest flight-time spread of bursts, s, and the lowest rates, Hz, that exceed the limits.
 
-    The spread is that of the struck dots of a burst, peak to peak. For "engraved_s" and "dot_matrix_s" the
-    rate is the lowest at which it exceeds that limit of the claim `flight_time_spread`; None where it never
-    does.
+    The spread of a burst is the peak-to-peak difference of the flight times of its struck dots. The rates are
+    given for the limits "engraved_s" and "dot_matrix_s" of the claim `flight_time_spread`; None if the spread
+    never exceeds the limit.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""The family: clearly different hammers that do what the paper says about as well as each other.
+"""The family: clearly different hammers that reproduce the claims of the paper about equally well.
 
-The constants of the 1983 hammer are not unique. From the log of a search hammers are chosen of which any two
-are clearly different, each is judged again with the claims themselves, and the conclusions that one would
-draw from it are computed; what holds for all members does not depend on what the paper did not print.
+The constants of the hammer of 1983 are not determined uniquely. From the log of a search, pairwise clearly
+different hammers are chosen, each is judged by the claims, and its conclusions are computed. A conclusion
+on which all members agree does not depend on the constants that the paper did not print.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
     from printhammer.support.arrays import FloatArray
 
-LEAST: Final = 20  # Number of hammers that make a family at least
+LEAST: Final = 20  # Least number of hammers of a family
 
-COUNT: Final = 24  # Number of hammers of the family unless told otherwise
+COUNT: Final = 24  # Default number of hammers of the family
 
 WRITTEN: Final = ("family.csv", "family.json")
-"""Files of a family."""
+"""Files that a family is written to."""
 
 FORMAT: Final = 1
 
@@ -59,15 +59,15 @@ _MOST: Final = 2000
 
 
 def family_hammers(folder: str | Path | None = None) -> list[Hammer]:
-    """Return the hammers of the family, each constant with status "reconstructed".
+    """Return the hammers of the family; the status of each constant is "reconstructed".
 
-    They come in the order of the table, named "hendriks-1983-family-01" and so on, from the `family.json` in
-    a folder, or the one that ships with the program.
+    They are in the order of the table, named "hendriks-1983-family-01" and so on, and come from the
+    `family.json` in a folder or, without a folder, from the one shipped with the program.
 
     Raises
     ------
     InputError
-        There is no table, or it is not one.
+        There is no table, or the file is not a valid one.
     """
     results = shipped_results() if folder is None else Results(Path(folder))
     table = family_table(results)
@@ -87,7 +87,7 @@ def family_table(results: Results) -> Family:
     Raises
     ------
     InputError
-        There is none, or it is not what it should be.
+        There is no table, or the file is not a valid one.
     """
     table = results.family
     if table is None:
@@ -103,19 +103,19 @@ def write_family(
     count: int = COUNT,
     least: int = LEAST,
 ) -> list[FamilyMember]:
-    """Choose a family from logs of judged candidates, judge it, and write `family.json` and `family.csv`.
+    """Choose a family from logs of judged candidates, judge it and write `family.json` and `family.csv`.
 
-    What is judged is kept in `family.part.jsonl` in the folder until the family is complete, so that work
-    that was interrupted goes on from there.
+    Verdicts and conclusions are kept in `family.part.jsonl` in the folder until the family is complete, so
+    that an interrupted run can be resumed.
 
     Parameters
     ----------
     logs : iterable of path
         See `studies.reconstruction.family.log`.
     folder : path
-        Where to write; made if it is missing, once the logs are read.
+        Where to write; created if it is missing, after the logs have been read.
     progress : callable, optional
-        Told what is being done, a line each.
+        Called with a line of text at each step.
     count : int, optional
         Number of members wanted.
     least : int, optional
@@ -124,8 +124,8 @@ def write_family(
     Raises
     ------
     InputError
-        A log is not one, a hammer of it cannot be made, there are too few clearly different hammers in the
-        logs, or a file cannot be written.
+        A log is invalid, a hammer of it cannot be built, the logs hold too few clearly different hammers, or
+        a file cannot be written.
     """
     tell = progress or (lambda _: None)
     paths = list(logs)
@@ -176,9 +176,9 @@ def _too_few(paths: Sequence[str | Path], count: int, least: int) -> str:
 
 
 def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:
-    """Return the hammers of logs that nothing speaks against, the best first.
+    """Return the hammers of logs that pass all stated claims judged so far, the best first.
 
-    From `most` on, nearly equal hammers count once.
+    If there are more than `most`, hammers in the same cell of a logarithmic lattice of constants count once.
     """
     rows = sorted(
         (row for row in logged if row.promising),
@@ -194,7 +194,7 @@ def promising(logged: Sequence[Logged], most: int = _MOST) -> list[Logged]:
 
 
 def _cell(constants: Mapping[str, float], width: float) -> tuple[tuple[str, float, int], ...]:
-    """Return in which cell of a logarithmic lattice constants lie."""
+    """Return the indices of the cell of a logarithmic lattice that contains the constants."""
     return tuple(
         (key, float(np.sign(value)), round(float(np.log(abs(value))) / width) if value else 0)
         for key, value in sorted(constants.items())
@@ -202,7 +202,7 @@ def _cell(constants: Mapping[str, float], width: float) -> tuple[tuple[str, floa
 
 
 def print_forces(hammers: Sequence[Hammer]) -> FloatArray:
-    """Return the peak forces of the single-pulse dots of hammers, N; NaN where one does not print."""
+    """Return the peak force, N, of the dot of a single pulse for each hammer; NaN where it does not print."""
     able = [i for i, hammer in enumerate(hammers) if hammer.waveform is not None]
     forces = np.full(len(hammers), np.nan)
     if able:
@@ -214,9 +214,10 @@ def print_forces(hammers: Sequence[Hammer]) -> FloatArray:
 
 
 def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) -> list[FloatArray]:
-    """Return the constants of hammers as they are, and at the common gauge, each of shape (n, k).
+    """Return the constants of hammers, as they are and normalized to the common gauge, each of shape (n, k).
 
-    What one lacks is that of the shipped hammer; `forces` are the peak forces of the single-pulse dots, N.
+    A constant that a hammer lacks is taken from the shipped hammer; `forces` are the peak forces, N, of the
+    dots of a single pulse.
     """
     keys = _keys(constants)
     units = {key: constant.si_unit for key, constant in template().constants.items()}
@@ -229,15 +230,15 @@ def compared(constants: Sequence[Mapping[str, float]], forces: Sequence[float]) 
 
 
 def _keys(constants: Sequence[Mapping[str, float]]) -> list[str]:
-    """Return the keys that any of some hammers gives, and the amplitude, in the order of the hammer file."""
+    """Return the keys given by at least one hammer, and the amplitude, in the order of the hammer file."""
     named = {key for row in constants for key in row} | {"waveform.amplitude"}
     return [key for key in template().constants if key in named]
 
 
 def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> FamilyMember | None:
-    """Return a hammer of a log as a member of the family, still without a name; None if it is none.
+    """Return a logged hammer as a member of the family, not yet named; None if it does not qualify.
 
-    Verdicts of kind "stated" are as judged here, others as the log has them.
+    Verdicts of kind "stated" are judged here; the others are taken from the log.
     """
     known = shelf.get(hammer)
     if known is None:
@@ -257,7 +258,7 @@ def _judged(row: Logged, hammer: Hammer, shelf: Shelf) -> FamilyMember | None:
 
 
 def _judge(hammer: Hammer) -> dict[str, Any]:
-    """Judge the stated claims, those that take longest last, and draw the conclusions if all is well."""
+    """Judge the stated claims, the slowest last, and compute the conclusions if they hold."""
     context = Context(hammer)
     verdicts: dict[str, str] = {}
     judged: dict[str, Any] = {"member": False, "verdicts": verdicts, "panels": 0, "conclusions": {}}
@@ -290,7 +291,7 @@ def _described(member: FamilyMember | None) -> str:
 def json_text(family: Sequence[FamilyMember], gauged: Sequence[Mapping[str, float]]) -> str:
     """Return the text of `family.json`, see `printhammer.report.reconstruction.results.Family`.
 
-    `gauged` are the constants of the members at the common gauge, key to value, SI.
+    `gauged` are the constants of the members normalized to the common gauge, key to value, SI.
     """
     hammers = ",\n".join(f"  {_table(member.model_dump(), 3)}" for member in family)
     held = robustness([member.conclusions for member in family], gauged)
@@ -301,7 +302,7 @@ def json_text(family: Sequence[FamilyMember], gauged: Sequence[Mapping[str, floa
 
 
 def _table(table: Mapping[str, Any], indent: int) -> str:
-    """Return the JSON text of a table, a line for each of its entries."""
+    """Return the JSON text of a table with one entry per line."""
     lines = (
         f"{' ' * indent}{json.dumps(key)}: {json.dumps(entry, allow_nan=False)}"
         for key, entry in table.items()
@@ -310,7 +311,7 @@ def _table(table: Mapping[str, Any], indent: int) -> str:
 
 
 def csv_text(family: Sequence[FamilyMember]) -> str:
-    """Return the text of `family.csv`: a row for each member, constants and conclusions with their units."""
+    """Return the text of `family.csv`: one row per member, constants and conclusions with their units."""
     units = {key: constant.si_unit for key, constant in template().constants.items()}
     keys = _keys([member.constants for member in family])
     judged = [name for name in claims() if any(name in member.verdicts for member in family)]

@@ -1,4 +1,4 @@
-"""Judged candidates as hammers that may be members of the family."""
+"""Reading logs of judged candidates as possible members of the family."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 LEAST_PANELS: Final = 8
-"""Number of verdicts of Fig. 11, of twelve, that a member of the family has as printed at least."""
+"""Least number of the twelve verdicts of Fig. 11 that must be as printed for a member of the family."""
 
 
 class Logged(Declared):
-    """A hammer of a log."""
+    """A judged hammer, read from a log."""
 
     constants: Mapping[str, float] = part("key of a hammer file to value, SI")
     verdicts: Mapping[str, bool] = part("claim to whether it holds, as far as it was judged")
@@ -26,7 +26,7 @@ class Logged(Declared):
 
     @property
     def promising(self) -> bool:
-        """Whether nothing in the log speaks against it as a member of the family."""
+        """Whether no stated claim judged so far fails and enough panels of Fig. 11 are as printed."""
         enough = self.panels is not None and self.panels >= LEAST_PANELS
         return enough and all(self.verdicts.get(name, True) for name in STATED)
 
@@ -34,13 +34,13 @@ class Logged(Declared):
 def read_logs(paths: Iterable[str | Path]) -> list[Logged]:
     """Read logs of judged candidates, see `reconstruction.judging.log`, in the order of the files.
 
-    A hammer that was judged several times, in whatever files, comes once, with all verdicts on it, the last
-    of each claim.
+    A hammer judged several times, also in different files, is returned once with all its verdicts; of each
+    claim the last verdict counts.
 
     Raises
     ------
     InputError
-        A file cannot be read, is no such log, or has no candidates.
+        A file cannot be read, is not such a log, or holds no candidates.
     """
     hammers: dict[Key, tuple[dict[str, Any], str]] = {}
     for path in map(Path, paths):

@@ -1,4 +1,4 @@
-"""The picture of the family."""
+"""Figure of the family."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ if TYPE_CHECKING:
 
 
 def family_picture(hammer: Hammer, results: Results | None = None) -> Figure:
-    """Draw the constants of the family over those of a hammer, and the conclusions from its members.
+    """Draw the constants of the family relative to those of a hammer, and the conclusions about its members.
 
     See `studies.reconstruction.figures.family`.
 
     Parameters
     ----------
     hammer : Hammer
-        The hammer whose constants are 1, usually the shipped one. Its forces and currents are brought to the
-        print force and the current of the family first, which leaves its motion as it is.
+        The reference hammer, whose constants are drawn as 1, usually the shipped one. It is first normalized
+        to the print force and the current of the family, which does not change its motion.
     results : Results, optional
-        Where the table of the family is; by default that which ships with the program.
+        Results that contain the table of the family; by default those shipped with the program.
 
     Raises
     ------
     InputError
-        There is no table of a family, or the hammer does not print or lacks a constant of the table.
+        There is no table of a family, the hammer does not print, or it lacks a constant of the table.
     """
     from studies.reconstruction.figures.family import family
 

@@ -1,9 +1,9 @@
-"""What holds for all hammers of a family, and what depends on constants that the paper did not print.
+"""Robustness: which conclusions hold for all hammers of a family, and which depend on unknown constants.
 
-A conclusion is robust if its values differ by less than a tenth of their median over the whole family, or if
-no member has it; a statement, if it is true of every member or of none. For a conclusion that is not robust,
-the rank correlations with the constants tell which of them decide. The family was chosen to differ, it is no
-random sample: ranges are those of its members, and correlations hold among them.
+A conclusion is robust if the spread of its values is less than a tenth of their median, or if no member has
+it; a statement is robust if it is true of every member or of none. For a conclusion that is not robust, rank
+correlations with the constants show which constants decide it. The members were chosen to differ and are not
+a random sample: ranges and correlations describe these members, not a population.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 
 Values = dict[str, Any]
 
-ROBUST: Final = 0.1  # Spread over median below which a conclusion is robust
+ROBUST: Final = 0.1  # Spread relative to the median below which a conclusion is robust; arbitrary
 
-SIGNIFICANT: Final = 0.05  # Probability with which any constant would seem to decide a conclusion by chance
+SIGNIFICANT: Final = 0.05  # Family-wise significance level of the rank correlations
 
 _FEWEST: Final = 4
 _SCALING: Final = ("J", "N")
 
 
 class Statement(Declared):
-    """Something that the paper says in general, as a margin by which it is true of a hammer."""
+    """A general statement of the paper, expressed as a margin that is positive where it is true."""
 
     text: str = part("the statement")
     source: str = part("where the paper says it")
@@ -42,7 +42,7 @@ class Statement(Declared):
 
 
 def _tolerated(name: str) -> float:
-    """Return a spread of flight times that the paper calls tolerable, s."""
+    """Return the spread of flight times, s, that the paper calls tolerable for a kind of printing."""
     return float(claims()["flight_time_spread"].settings[name])
 
 
@@ -84,20 +84,20 @@ STATEMENTS: Final[dict[str, Statement]] = {
         lambda known: known["backstop_loss_J"] - known["pack_loss_J"],
     ),
 }
-"""What is asked of every member, by name."""
+"""Statements that are checked on every member, by name."""
 
 
 def robustness(
     conclusions: Sequence[Values], constants: Sequence[Mapping[str, float]]
 ) -> dict[str, dict[str, Any]]:
-    """Return range, spread and robustness of every conclusion and statement.
+    """Return range, spread and robustness of all conclusions and statements.
 
     Parameters
     ----------
     conclusions : sequence of dict
-        Of each member, as `Conclusions.as_dict` gives them.
+        One mapping per member, as returned by `Conclusions.as_dict`.
     constants : sequence of mapping
-        Of each member at the common gauge, key to value, SI.
+        One mapping per member, normalized to the common gauge, key to value, SI.
 
     Returns
     -------
@@ -169,10 +169,10 @@ def _quantity(
 
 
 def decisive_constants(correlations: Mapping[str, float], count: int) -> dict[str, float]:
-    """Return the rank correlations that are significant among all that were looked at, strongest first.
+    """Return the rank correlations that are significant after a Bonferroni correction, the strongest first.
 
-    By Student's t of a rank correlation over `count` members, two-sided, each at the level `SIGNIFICANT`
-    over the number of constants (Bonferroni).
+    Two-sided test with Student's t for a rank correlation over `count` members, each at the level
+    `SIGNIFICANT` divided by the number of constants.
     """
     from scipy.stats import t as student
 
@@ -190,7 +190,7 @@ def _statement(statement: Statement, conclusions: Sequence[Values]) -> dict[str,
         try:
             values.append(statement.margin(row))
         except TypeError:
-            # One of the conclusions compared is None: the statement is not true of this member.
+            # A conclusion in the comparison is None: the statement is not true of this member.
             continue
     held = sum(value > 0.0 for value in values)
     count = len(conclusions)

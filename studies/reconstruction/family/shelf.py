@@ -1,4 +1,4 @@
-"""What is judged already, kept on disk until the family is complete."""
+"""Cache of judged hammers on disk, kept until the family is complete."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 class Shelf:
-    """Hammers judged, a JSON line each, by their fingerprint and the version of the program.
+    """Judged hammers, one JSON line each, keyed by their fingerprint and the version of the program.
 
-    The file need not exist. A line that breaks off, since the program was killed, is left out.
+    The file need not exist. An incomplete last line, left when the program was killed, is ignored.
     """
 
     def __init__(self, path: Path) -> None:
@@ -34,11 +34,11 @@ class Shelf:
                 self._judged[row["fingerprint"]] = row["judged"]
 
     def get(self, hammer: Hammer) -> dict[str, Any] | None:
-        """Return what is known of a hammer; None if nothing is."""
+        """Return the stored results for a hammer; None if there are none."""
         return self._judged.get(hammer.fingerprint)
 
     def put(self, hammer: Hammer, judged: dict[str, Any]) -> None:
-        """Keep what was found about a hammer.
+        """Store the results for a hammer.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The family of reconstructed hammers: their constants side by side, and what follows from each."""
+"""Figure of a family of reconstructed hammers: constants side by side, and the conclusions from each."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
 
 _SHOWN: Final = {"s": ("ms", "ms"), "J": ("mJ", "mJ"), "Hz": ("Hz", "Hz"), "N": ("N", "N"), "m": ("um", "µm")}
-"""SI unit to the unit drawn, and how it is written."""
+"""SI unit to the unit in the figure and its label."""
 
 _ROW: Final = 0.2
 _STRIP: Final = 0.52
 _COLUMNS: Final = 2
 _FAN: Final = 0.52
-"""Part of a row over which the members are spread, so that equal values do not hide each other."""
+"""Fraction of the height of a row over which members are spread, so that equal values stay visible."""
 
 _NICE: Final = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 _FEWEST_TICKS: Final = 5
 _EQUAL: Final = 1e-2
-"""Relative difference up to which a constant is the same for all, as one that sets a scale is."""
+"""Relative difference up to which a constant counts as the same for all members; such rows are not drawn."""
 
 
 @styled
@@ -43,18 +43,18 @@ def family(
     *,
     order: str = "safe_rate_Hz",
 ) -> Figure:
-    """Draw the constants of a family over those of a hammer, and below them the conclusions.
+    """Draw the constants of a family relative to those of a hammer, and below them the conclusions.
 
-    A dot for each member in each row. `constants` are those of the hammer and then of each member, by key of
-    a hammer file, SI, at the common gauge; `conclusions` those of each member by name, SI, None where it has
-    none. `drawn` gives of each conclusion `title`, `unit`, `robust`, `low` and `high`; members are
-    coloured by the one that is the `order`, light to dark, in all panels.
+    Each row has one dot per member. `constants` holds those of the hammer, then those of each member, by key
+    of a hammer file, SI, normalized to the common gauge; `conclusions` holds those of each member by name,
+    SI, None if it has none. `drawn` gives `title`, `unit`, `robust`, `low` and `high` of each conclusion.
+    Members are coloured from light to dark by the value of the conclusion `order`, in all panels.
     """
     from matplotlib.colors import LinearSegmentedColormap
 
     own, *members = constants
     rows = [key for key in own if any(abs(row[key] - own[key]) > _EQUAL * abs(own[key]) for row in members)]
-    # What is missing comes first.
+    # Members without a value are sorted first.
     known = np.array([-np.inf if row.get(order) is None else row[order] for row in conclusions])
     places = np.argsort(np.argsort(known, kind="stable"), kind="stable")
     ranks = np.asarray(places / max(len(known) - 1, 1), dtype=np.float64)
@@ -109,7 +109,7 @@ def _constants(
 
 
 def _ticks(low: float, high: float) -> list[float]:
-    """Return round numbers for a logarithmic axis about 1."""
+    """Return round tick values for a logarithmic axis around 1."""
     decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     for steps in ((1.0,), (1.0, 2.0, 5.0), _NICE, tuple(np.arange(10, 100) / 10.0)):
         ticks = [round(step * 10.0**decade, 9) for decade in decades for step in steps]
@@ -130,7 +130,7 @@ def _conclusion(
     if known.any():
         low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
         room = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
-        # Values that hardly differ should look so.
+        # Widen the axis, so that values that hardly differ look alike.
         room = max(room, 0.5 * (0.2 * abs(high) - (high - low)))
         ax.set_xlim(low - room, high + room)
         ax.plot([low, high], [0.0, 0.0], color=colour, lw=6.0, alpha=0.25, solid_capstyle="round", zorder=1.0)

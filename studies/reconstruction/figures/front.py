@@ -1,4 +1,4 @@
-"""Panels of Fig. 11 against the other claims, over judged hammers."""
+"""Figure of the Pareto front: panels of Fig. 11 against the other claims for judged hammers."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _SIZE: Final = 14.0
 
 @styled
 def plot(front: Front) -> Figure:
-    """Draw how many panels of Fig. 11 and how many other claims hold for each judged hammer.
+    """Draw the number of panels of Fig. 11 against the number of other claims that hold for judged hammers.
 
-    The area of a mark is the number of hammers; those that hold all other stated claims are filled, and the
-    line is the Pareto front.
+    The area of a mark is proportional to the number of hammers. Marks of hammers for which all other stated
+    claims hold are filled; the line is the Pareto front.
     """
     from matplotlib.ticker import MaxNLocator
 

@@ -1,9 +1,9 @@
-"""How often each claim holds by chance: among random hammers of the search space that work at all.
+"""Base rates: how often each claim holds by chance for random hammers of the search space.
 
-They rest at the backstop, print with one pulse, and come back to rest.
+The hammers are restricted to those that rest at the backstop, print with one pulse and come back to rest.
 
-A hammer drawn at random has another stroke than the printed one, so the claim about the stroke is judged for
-a random mass first; then the mass is set so that the stroke is as printed, and the others are judged.
+A randomly drawn hammer does not have the printed stroke. The claim about the stroke is therefore judged with
+a random mass; then the mass is set such that the stroke is as printed, and the other claims are judged.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _NEAR: Final = 1e-6
 
 
 def draw(count: int, seed: int) -> list[dict[str, float]]:
-    """Return the constants of so many random hammers with the printed stroke, SI."""
+    """Draw the constants, SI, of `count` random hammers with the printed stroke."""
     rng = np.random.default_rng([seed, 0])
     drawn: list[dict[str, float]] = []
     while len(drawn) < count:
@@ -45,7 +45,7 @@ def draw(count: int, seed: int) -> list[dict[str, float]]:
         ends = [CYCLE] * len(printing)
         table = run_all(printing, drives, ends, 1, strobes=[np.array([end]) for end in ends]).strobes
         assert table is not None
-        # Those that are back at the backstop, all but at rest, some time after a single pulse.
+        # Keep those that are near the rest position again one cycle after a single pulse.
         for candidate, x in zip(printing, table.x[:, 0].tolist(), strict=True):
             if abs(x - candidate.rest) < _NEAR:
                 drawn.append(candidate.constants)
@@ -69,10 +69,10 @@ def base_rates(
     pool: Executor | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Count for how many random hammers each claim holds: what `base_rates.json` holds.
+    """Count for how many random hammers each claim holds; return the contents of `base_rates.json`.
 
-    The slow claims are judged for the first `slow` hammers only, or for all. `tell` is called with the
-    numbers of hammers done and of all.
+    Slow claims are judged for the first `slow` hammers only (None: all). `tell` is called with the number of
+    hammers done and the total.
     """
     drawn = draw(count, seed)
     rng = np.random.default_rng([seed, 1])

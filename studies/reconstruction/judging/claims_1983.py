@@ -1,8 +1,8 @@
-"""The claims as the integrators of 1983 would have judged them: the same measures on what a scheme computes.
+"""Claims judged as with the integrators of 1983: the same measures, applied to motions of a 1983 scheme.
 
-The paper read its figures from such computations. Claims without a motion are the same either way; left out
-are those that are about the schemes themselves, and those whose measure takes ensembles or a search, which
-the schemes have no engine for.
+The paper read its figures from such computations. Claims that need no motion give the same verdict either
+way. Left out are the claims about the schemes themselves and those whose measure needs ensembles or a search,
+which are not implemented for the schemes.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ COMPUTED: Final = (
     "points_on_single_pulse_orbit",
     "flight_time_spread",
 )
-"""Claims about motions of which a scheme computes all that their measures look at."""
+"""Claims whose measures use only quantities that a scheme computes."""
 
 
 class SchemeContext(Context):
-    """A hammer and its motions as a scheme of 1983 computes them, on the schedule as the claims read it."""
+    """A hammer with motions computed by a scheme of 1983, on the schedule that the claims use."""
 
     def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> Any:
-        """Return what the firings of many drives do: struck, peak force, N, and flight time, s."""
+        """Run many drives; return `struck`, `peak_force`, N, and `flight_time`, s, of each firing."""
         rows = [self.run(drive, float(drive.times[-1]) + tail).dots for drive in drives]
         return SimpleNamespace(
             struck=np.array([[dot.struck for dot in row] for row in rows]),
@@ -59,5 +59,5 @@ class SchemeContext(Context):
 def judge_as_in_1983(
     hammer: Hammer, scheme: Scheme = "runge-kutta-4", progress: Callable[[str], None] | None = None
 ) -> list[JudgedClaim]:
-    """Judge the claims in `COMPUTED` from what a scheme of 1983 computes; `progress` as for `judge_all`."""
+    """Judge the claims in `COMPUTED` with a scheme of 1983; `progress` as for `judge_all`."""
     return judge_all(hammer, COMPUTED, progress, SchemeContext(hammer, scheme=scheme))

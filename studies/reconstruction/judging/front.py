@@ -1,4 +1,4 @@
-"""Panels of Fig. 11 against all other claims: which judged hammers no other one beats in both."""
+"""Pareto front of judged hammers: panels of Fig. 11 against all other claims."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Front(Result):
-    """Judged hammers by panels of Fig. 11 and other claims that hold: the Pareto front and the rest."""
+    """Judged hammers with the numbers of panels of Fig. 11 and of other claims that hold."""
 
     candidate: IntArray = coordinate(
         "1", "number of the judged hammer", "hammer", more="in the order of the logs, the first is number 1"
@@ -49,12 +49,12 @@ class Front(Result):
 def front(rows: Sequence[dict[str, Any]], core_time: float = 0.0) -> Front:
     """Return the Pareto front of judged candidates, see `judged.row_of`.
 
-    Candidates on which a claim was not judged are left out; `core_time` is in s.
+    Candidates for which a claim has not been judged are left out; `core_time` is in s.
 
     Raises
     ------
     InputError
-        All claims were judged on none of them.
+        No candidate has been judged on all claims.
     """
     known = [name for name in claims() if name != FIGURE_11]
     complete = [

@@ -1,4 +1,4 @@
-"""Candidates judged by the claims themselves; slow claims only where they can make a difference."""
+"""Judging candidates by the claims; a slow claim is judged only if its verdict can still matter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 FIGURE_11: Final = "poincare"
 SLOW: Final = ("map_sensitivity", "no_period_doubling_cascade")
-"""Claims that may take minutes for a hammer that is far from the one of the paper."""
+"""Claims that may take minutes for a hammer far from that of the paper."""
 
 STATED: Final = tuple(
     name for name, claim in claims().items() if claim.kind == "stated" and name != FIGURE_11
@@ -27,10 +27,11 @@ STATED: Final = tuple(
 
 
 def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tuple[str, str]]:
-    """Return for each panel of Fig. 11 the verdict found and the one printed, by its strobe time.
+    """Return the computed and the printed verdict of each panel of Fig. 11, by strobe time.
 
-    Without the changes of constants and tolerance under which the claim wants the verdict to stay: where this
-    is another than the printed one, the claim fails.
+    The panels are judged at the given constants only. The claim on Fig. 11 also requires that the verdicts
+    stay the same under small changes of constants and tolerance; if a verdict here differs, the claim fails
+    anyway.
     """
     printed = printed_verdicts()
     periods = list(printed)
@@ -42,11 +43,11 @@ def plain_panels(hammer: Hammer, tolerance: float = TOLERANCE) -> dict[str, tupl
 
 
 def row_of(constants: Mapping[str, float], names: Iterable[str], *, panels: bool = True) -> dict[str, Any]:
-    """Judge a candidate, its constants in SI, by the claims named, and by Fig. 11 if asked for.
+    """Judge a candidate, constants in SI, by the named claims, and by Fig. 11 if `panels` is set.
 
-    The claim of Fig. 11 itself, with all its changes, is judged only where all panels are as printed without
+    The claim on Fig. 11, with all its perturbations, is judged only if all panels are as printed without
     them. The row has `constants`, `verdicts` (claim to true or false), `values` (claim to the measured values
-    in bands), and `panels` and `panel_verdicts` where asked for.
+    of the quantities that have a band), and, with Fig. 11, `panels` and `panel_verdicts`.
     """
     hammer = hammer_of(constants)
     context = Context(hammer)
@@ -70,5 +71,5 @@ def row_of(constants: Mapping[str, float], names: Iterable[str], *, panels: bool
 
 
 def text_of(row: Mapping[str, Any]) -> str:
-    """Return a row as a line of a log of judged candidates."""
+    """Return the line of a row in a log of judged candidates."""
     return json.dumps(row, default=float) + "\n"

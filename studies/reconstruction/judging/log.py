@@ -1,4 +1,4 @@
-"""The log of judged candidates: a JSON line for each, as `judged.row_of` makes it."""
+"""Log of judged candidates: one JSON line each, as returned by `judged.row_of`."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ Key = tuple[tuple[str, float], ...]
 
 
 def key_of(constants: Mapping[str, float]) -> Key:
-    """Return what tells one candidate from another."""
+    """Return a hashable key for the constants of a candidate."""
     return tuple(sorted(constants.items()))
 
 
 def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
-    """Return the candidates of a log, see `judged.row_of`, in the order of their first lines.
+    """Return the candidates of a log, see `judged.row_of`, in the order in which they first occur.
 
-    A candidate that was judged again comes once, with all verdicts on it, the last of each claim. A last line
-    that breaks off is left out: the program was stopped while it wrote. Without a file there are none.
+    A candidate judged more than once is returned once with all its verdicts; of each claim the last verdict
+    counts. An incomplete last line is ignored: the program was stopped while writing it. A missing file
+    counts as an empty one.
 
     Raises
     ------
     InputError
-        The file cannot be read, is no such log, or has no candidates where there must be some.
+        The file cannot be read or is not such a log, or it is empty and `some` is set.
     """
     candidates: dict[Key, dict[str, Any]] = {}
     for number, line in enumerate(read_text(path).split("\n")[:-1], 1):
@@ -45,7 +46,7 @@ def read_judged(path: Path, *, some: bool = False) -> list[dict[str, Any]]:
 
 
 def joined(before: dict[str, Any] | None, row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row with what an earlier one on the same candidate knows beside."""
+    """Return a row, supplemented by the verdicts of an earlier row of the same candidate."""
     if before is None:
         return row
     both = {**before, **{name: value for name, value in row.items() if value is not None}}
@@ -55,7 +56,7 @@ def joined(before: dict[str, Any] | None, row: dict[str, Any]) -> dict[str, Any]
 
 
 def mend(path: Path) -> None:
-    """Cut off a last line that breaks off, so that rows can be added.
+    """Cut off an incomplete last line, so that rows can be appended.
 
     Raises
     ------

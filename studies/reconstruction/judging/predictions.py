@@ -1,4 +1,4 @@
-"""What hammers found on the stated claims alone say about the others, which did not steer: predictions."""
+"""Predictions: what hammers found on the stated claims alone say about the claims that were not used."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 
 def predictions(rows: Sequence[dict[str, Any]], seed: int, candidates: int) -> dict[str, Any]:
-    """Count for how many hammers each claim of kind "shape" holds: what `predictions.json` holds.
+    """Count for how many hammers each claim of kind "shape" holds; return the contents of `predictions.json`.
 
-    Rows are judged candidates of a search on the stated claims alone; those count for which all stated claims
-    outside Fig. 11 hold. `seed` and `candidates` say which search it was and how many it tried.
+    `rows` are judged candidates of a search on the stated claims alone; only those count for which all stated
+    claims outside Fig. 11 hold. `seed` and `candidates` identify the search and the number it tried.
     """
     kept = [row for row in rows if all(row["verdicts"].get(name) for name in STATED)]
     counts: dict[str, dict[str, Any]] = {}

@@ -1,10 +1,10 @@
-"""What the integrators of 1983 do to verdicts: for the shipped hammer, its family, and random hammers.
+"""Effect of the integrators of 1983 on verdicts: for the shipped hammer, its family and random hammers.
 
-The paper judged its figures from computations in steps of 10, 1 and 20 us that locate no contact. How often
-such a computation gives another verdict on a panel of Fig. 11 than the exact motion is counted over random
-hammers, those of the base rates for which both schemes complete the single-pulse cycle on the schedule, as
-those of the paper did. Panels of one hammer hang together, so that the interval of a share is that
-of the mean over hammers, two standard errors either way.
+The paper judged its figures from computations with steps of 10, 1 and 20 us that do not locate contacts. The
+study counts how often such a computation gives another verdict on a panel of Fig. 11 than the exact motion.
+The random hammers are those of the base rates for which both schemes complete the single-pulse cycle on the
+schedule, as those of the paper did. The panels of one hammer are not independent, so that the interval of a
+share is that of the mean over hammers (cluster sampling), plus and minus two standard errors.
 """
 
 from __future__ import annotations
@@ -32,31 +32,31 @@ if TYPE_CHECKING:
     from printhammer.run.scheme_runs import Scheme
 
 CHANGE: Final = 1e-5
-"""By which all constants are changed at once, up, to see how much a verdict hangs on their last digits."""
+"""Relative increase of all constants at once, to see how sensitive a verdict is to their last digits."""
 
 Way = tuple["Scheme | None", Reading, bool]
-"""How verdicts are computed: scheme or None for exactly, reading of the schedule, constants moved or not."""
+"""How a verdict is computed: scheme (None: exact), reading of the schedule, constants changed or not."""
 
 READING: Final[Reading] = "firings"
-"""Reading of the schedule under which both schemes are compared; the others are for the first alone."""
+"""Reading of the schedule used for both schemes; the other readings use the first scheme only."""
 
 EXACT: Final[Way] = (None, READING, False)
 PLAIN: Final[tuple[Way, ...]] = (
     *((SCHEMES[0], reading, False) for reading in READINGS),
     (SCHEMES[1], READING, False),
 )
-"""The schemes as they are shown beside the exact verdicts."""
+"""The combinations that are compared with the exact verdicts."""
 
 PAIRS: Final[tuple[tuple[Way, Way], ...]] = (
     (EXACT, (None, READING, True)),
     *((EXACT, way) for way in PLAIN),
     *(((scheme, READING, False), (scheme, READING, True)) for scheme in SCHEMES),
 )
-"""Verdicts that are compared: the first with the second."""
+"""Pairs of computations whose verdicts are compared."""
 
 
 def panel_verdicts(hammer: Hammer, way: Way) -> list[str]:
-    """Return the verdicts on the panels of Fig. 11."""
+    """Return the verdicts on the panels of Fig. 11, computed in the given way."""
     scheme, reading, moved = way
     periods = list(printed_verdicts())
     which = changed(hammer, lambda _: 1, CHANGE) if moved else hammer
@@ -68,7 +68,7 @@ def panel_verdicts(hammer: Hammer, way: Way) -> list[str]:
 
 
 def drawn_workable(count: int, seed: int) -> list[dict[str, float]]:
-    """Return the constants, SI, of so many random hammers on which both schemes complete the cycle."""
+    """Return the constants, SI, of `count` random hammers on which both schemes complete the cycle."""
     claim = claims()["integrator_comparison"]
     chosen: list[dict[str, float]] = []
     tried = 0
@@ -89,7 +89,7 @@ def _random(constants: dict[str, float]) -> dict[Way, list[str]]:
 def _comparison(
     first: Way, second: Way, before: Sequence[list[str]], after: Sequence[list[str]]
 ) -> dict[str, Any]:
-    """Return how many verdicts differ, from periodic to strange and back, and the share with its error."""
+    """Count differing verdicts in both directions (periodic, strange); return them with share and error."""
     pairs = [list(zip(one, other, strict=True)) for one, other in zip(before, after, strict=True)]
     every = [pair for row in pairs for pair in row]
     each = np.array([np.mean([one != other for one, other in row]) for row in pairs])
@@ -109,7 +109,7 @@ def _comparison(
 
 
 def named(way: Way) -> str:
-    """Return a way of computing in words."""
+    """Return a short text that describes how verdicts are computed."""
     scheme, reading, moved = way
     words = "exact" if scheme is None else f"{scheme}, {reading}"
     return f"{words}, constants changed by {CHANGE:g}" if moved else words
@@ -122,9 +122,9 @@ def changes(
     pool: Executor | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Compare verdicts on the panels of so many random hammers, a row for each of `PAIRS`.
+    """Compare verdicts on the panels of random hammers; return one row for each of `PAIRS`.
 
-    `tell` is called with the numbers of hammers done and of all.
+    `tell` is called with the number of hammers done and the total.
     """
     drawn = drawn_workable(count, seed)
     table = []
@@ -143,7 +143,7 @@ def schemes_json(
     pool: Executor | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
-    """Return what `schemes.json` holds, see `printhammer.report.reconstruction.results.Schemes`."""
+    """Build the contents of `schemes.json`, see `printhammer.report.reconstruction.results.Schemes`."""
     printed = list(printed_verdicts().values())
     family = {}
     for member in family_hammers():

@@ -1,4 +1,4 @@
-"""The best candidates of searches, judged by the claims: a log of its own, from which all else is made."""
+"""Judging the best candidates of searches by the claims; the log is the input of all later steps."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
     from pathlib import Path
 
-APART: Final = 0.01  # Least distance of two candidates of a shortlist in one variable, in shares of its range
+APART: Final = 0.01  # Least distance between candidates of a shortlist, as a fraction of a variable's range
 
-DIGITS: Final = 6  # Digits of the constants that are judged and shipped
+DIGITS: Final = 6  # Significant digits of the constants that are judged and shipped
 
 _TOGETHER: Final = 8
 
 
 def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) -> list[dict[str, Any]]:
-    """Return the best candidates of a log that are not next to each other.
+    """Return the best candidates of a log that are not close to each other.
 
-    Any two differ by `apart` in one variable at least, in shares of its range.
+    Any two differ in at least one variable by `apart` times its range.
     """
     chosen: list[dict[str, Any]] = []
     points = np.empty((0, 0))
@@ -42,7 +42,7 @@ def shortlist(rows: Sequence[dict[str, Any]], count: int, apart: float = APART) 
 
 
 def rounded(constants: Mapping[str, float]) -> dict[str, float]:
-    """Return constants with as many digits as a hammer file should have."""
+    """Round constants to the significant digits of a hammer file."""
     return {key: float(f"{value:.{DIGITS}g}") for key, value in constants.items()}
 
 
@@ -59,10 +59,10 @@ def judge_candidates(
     pool: Executor | None = None,
     tell: Callable[[int, int, dict[str, Any]], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Judge candidates and add them to a log; what is in it already is not judged again.
+    """Judge candidates and append them to a log; those already in it are not judged again.
 
-    Candidates are constants of hammer files, SI; claims to judge beside Fig. 11 are the stated ones unless
-    others are named. `tell` is called with the number done, of all, and the row. The rows of these candidates
+    `every` holds constants of hammer files, SI. Besides Fig. 11 the stated claims are judged unless `names`
+    gives others. `tell` is called with the number done, the total and the row. The rows of these candidates
     are returned, see `judged.row_of`.
     """
     wanted = [dict(constants) for constants in every]
@@ -87,9 +87,9 @@ def judge_candidates(
 
 
 def standing(row: dict[str, Any]) -> tuple[float, int]:
-    """Return how good a judged candidate is: claims that hold, and how many of them are stated.
+    """Return the rank of a judged candidate: the claims that hold, and how many of them are stated.
 
-    A panel of Fig. 11 counts as a twelfth of a claim; claims that are "typical" have no say.
+    A panel of Fig. 11 counts as a twelfth of a claim; claims of kind "typical" do not count.
     """
     kinds = {name: claim.kind for name, claim in claims().items()}
     holding = [

@@ -1,6 +1,8 @@
-"""Steps over the region in which all but Fig. 11 is met: where verdicts jump, one has to look everywhere.
+"""Differential steps in the region in which the claims other than Fig. 11 are met.
 
-Differences of points of the region, added to a third, follow its shape, however narrow it is.
+The verdicts of Fig. 11 jump between neighbouring points, so that the whole region has to be sampled.
+As in differential evolution (Storn & Price 1997), a scaled difference of two points is added to a third: such
+steps follow the shape of the region, however narrow it is.
 """
 
 from __future__ import annotations
@@ -22,9 +24,9 @@ CHEAP: Final = (
     "two_pulses_700us",
     "second_dot_lost",
 )
-"""Claims that make the region, as far as they lead the search."""
+"""Claims that define the region, as far as they have a weight in the search."""
 
-MOST: Final = 3000  # Points of the region that are remembered
+MOST: Final = 3000  # Largest number of points of the region that are kept; arbitrary
 
 _FEW: Final = 24
 _NEARLY: Final = 0.3
@@ -33,7 +35,7 @@ _TRIES: Final = 4
 
 
 class Explorer:
-    """Points of the region, and proposals for more; `weights` are those of the claims that lead."""
+    """Points of the region, and proposals for new ones; `weights` are those of the claims in the search."""
 
     def __init__(self, weights: dict[str, float], rng: np.random.Generator) -> None:
         self._names = [name for name in CHEAP if name in weights]
@@ -42,7 +44,7 @@ class Explorer:
         self._nearest: list[dict[str, Any]] = []
 
     def note(self, rows: list[dict[str, Any]]) -> None:
-        """Remember what lies in the region; as long as little does, what lies nearest."""
+        """Store the points in the region and, while these are few, the points of least loss."""
         for row in rows:
             if row["constants"] is None:
                 continue
@@ -52,11 +54,11 @@ class Explorer:
         if len(self._inside) < _FEW:
             self._nearest = sorted([*self._nearest, *rows], key=lambda row: float(row["total"]))[:_FEW]
         if len(self._inside) > MOST:
-            # The oldest go, and with them where the region was first found.
+            # Drop the oldest points.
             del self._inside[: len(self._inside) - MOST]
 
     def ask(self, count: int) -> list[FloatArray]:
-        """Return points to try."""
+        """Return `count` new points to evaluate."""
         known = self._inside if len(self._inside) >= _FEW else [*self._inside, *self._nearest]
         proposed = []
         for _ in range(count):
@@ -67,7 +69,7 @@ class Explorer:
             change = stride * (np.array(first["point"]) - np.array(second["point"]))
             noise = _NOISE * self._rng.standard_normal(len(change))
             point = np.array(base["point"]) + change + noise
-            # What leaves the ranges comes back from their ends.
+            # Points outside the ranges are reflected at the bounds.
             proposed.append(
                 np.clip(np.where(point < 0.0, -point, np.where(point > 1.0, 2.0 - point, point)), 0, 1)
             )

@@ -1,4 +1,4 @@
-"""The log of a search: a heading, then a line for each candidate, in the order they were tried."""
+"""Log of a search: a heading line, then one line for each candidate, in the order of evaluation."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     Raises
     ------
     InputError
-        The file cannot be read, or is no such log.
+        The file cannot be read, or it is not such a log.
     """
     rows = []
     for number, line in enumerate(read_text(path, "log", required=True).split("\n")[:-1], 1):
@@ -51,14 +51,14 @@ def read_search(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 class Log:
-    """A log on disk, begun or continued: JSON lines, the first of which says what decides on the search.
+    """A log on disk, new or resumed: JSON lines, of which the first determines the search.
 
-    A last line that breaks off is cut: the search was stopped while it wrote.
+    An incomplete last line is cut off: the search was stopped while writing it.
 
     Raises
     ------
     InputError
-        The file cannot be read or written, holds something else, or is the log of another search.
+        The file cannot be read or written, is not a log, or is the log of another search.
     """
 
     def __init__(self, path: Path, heading: dict[str, Any]) -> None:
@@ -67,7 +67,7 @@ class Log:
         first = json.dumps(heading)
         text = read_text(path, "log")
         if first.startswith(text):
-            # Nothing yet, or stopped inside the heading.
+            # The file is empty, or the search was stopped while writing the heading.
             append(path, first + "\n", "log", kept="")
             return
         whole, _, broken = text.rpartition("\n")
@@ -86,18 +86,18 @@ class Log:
         self._rows = rows[1:]
 
     def append(self, rows: Sequence[dict[str, Any]]) -> None:
-        """Add candidates."""
+        """Append candidates."""
         if rows:
             self._rows += rows
             append(self.path, "".join(json.dumps(row) + "\n" for row in rows), "log")
 
     def known(self, place: int, points: Sequence[FloatArray]) -> list[dict[str, Any]]:
-        """Return the candidates from a place on, as far as they are there.
+        """Return the logged candidates from the given index on, at most one for each point.
 
         Raises
         ------
         InputError
-            They are not those of the points that the search asks for.
+            They do not belong to the points that the search asks for.
         """
         there = self._rows[place : place + len(points)]
         for number, (row, point) in enumerate(zip(there, points, strict=False), place + 1):

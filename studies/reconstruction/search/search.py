@@ -1,7 +1,9 @@
-"""The search: a wide sample, then evolution strategies from its best points, and steps over what is feasible.
+"""The search: a Sobol sample, then CMA-ES from its best points and differential steps in the feasible region.
 
-Everything follows from the seed. Each candidate is a line of the log, so that a search that was stopped goes
-on where it was: what the log holds is not computed again.
+CMA-ES: Hansen, "The CMA evolution strategy: a tutorial" (2016), run as independent islands that restart when
+they no longer improve; the differential steps are those of `explorer`. The seed determines everything. Each
+candidate is a line of the log, so that a search that was stopped can be resumed without computing logged
+candidates again.
 """
 
 from __future__ import annotations
@@ -27,30 +29,30 @@ if TYPE_CHECKING:
 
 FORMAT: Final = 1
 SAMPLE: Final = 16384
-"""Points of the wide sample."""
+"""Number of points of the initial Sobol sample; arbitrary."""
 
 ISLANDS: Final = 4
 EXPLORED: Final = 64
-"""Points of each round that explore, beside those of the islands."""
+"""Number of points per generation from the explorer, beside those of the islands; arbitrary."""
 
 POPULATION: Final = 16
 SIGMA: Final = 0.08
-"""Largest first step length of an island, in shares of the ranges."""
+"""Largest initial step length of an island, as a fraction of the ranges; arbitrary."""
 
-PATIENCE: Final = 30  # Generations without gain after which an island begins anew
+PATIENCE: Final = 30  # Generations without improvement after which an island restarts; arbitrary
 
-_SEEDS: Final = 200  # Best points known from which islands begin
+_SEEDS: Final = 200  # Number of best points from which the start of an island is drawn
 
 _FAVOUR: Final = 2.0
 _TOGETHER: Final = 128
 _GAIN: Final = 1e-3
 _APART: Final = 0.03
 STARTS: Final = 64
-"""Points taken over from another search."""
+"""Default number of points taken over from another search."""
 
 
 class Plan(Declared):
-    """What decides on a search."""
+    """Everything that determines a search."""
 
     aim: Aim = part("which claims lead, one of `AIMS`")
     seed: int = part("of everything random")
@@ -61,7 +63,7 @@ class Plan(Declared):
     shape: Shape = part("waveform of the hammers", default="rectangle")
 
     def heading(self) -> dict[str, Any]:
-        """Return the first line of the log."""
+        """Return the first line of the log as a mapping."""
         return {
             "format": FORMAT,
             "aim": self.aim,
@@ -79,13 +81,13 @@ class Plan(Declared):
 
 
 def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, ...], ...]:
-    """Return the best points of another search for one with this aim, not next to each other.
+    """Return the best points of another search as starts for this aim, not close to each other.
 
     Raises
     ------
     InputError
-        The file is not the log of a search, or a search on the stated claims would be led by others through
-        its starts.
+        The file is not the log of a search, or the aim is "stated" and the other search used further claims,
+        which would then influence this one.
     """
     from studies.reconstruction.judging.shortlist import shortlist
 
@@ -96,12 +98,13 @@ def starts_of(path: Path, aim: Aim, count: int = STARTS) -> tuple[tuple[float, .
 
 
 def known_starts(aim: Aim) -> tuple[tuple[float, ...], ...]:
-    """Return the points of the shipped hammer and of its family.
+    """Return the points of the shipped hammer and of its family as starts.
 
     Raises
     ------
     InputError
-        A search on the stated claims would be led by others through them.
+        The aim is "stated": those hammers were found with further claims, which would then influence the
+        search.
     """
     from printhammer.report.reconstruction.results import shipped_results
 
@@ -120,15 +123,15 @@ def search(
     pool: Executor | None = None,
     tell: Callable[[int, float, dict[str, Any]], None] | None = None,
 ) -> Iterator[dict[str, Any]]:
-    """Search without end; every candidate is yielded, as a row of the log, after it was noted.
+    """Search without end; each candidate is yielded, as a row of the log, after it has been written.
 
-    A search begun in the log goes on. `tell` is called after each batch with the number of candidates, the
-    least total loss, and its row.
+    A search already in the log is resumed. `tell` is called after each batch with the number of candidates,
+    the least total loss so far, and its row.
 
     Raises
     ------
     InputError
-        The log is that of another search, or the package that searches is not installed.
+        The log belongs to another search, or the package `cmaes` is not installed.
     """
     from scipy.stats import qmc
 
@@ -173,14 +176,14 @@ def search(
             own = rows[number * POPULATION : (number + 1) * POPULATION]
             island.tell(own)
             if island.done:
-                # What it found may be where another begins.
+                # Its best point may be the start of another island.
                 start.append(island.best)
                 start.sort(key=lambda row: row["total"])
                 islands[number] = _Island(start, rng)
 
 
 def _strategies() -> Any:
-    """Return the evolution strategy of the optional package."""
+    """Return the class of the evolution strategy, CMA, from the optional package `cmaes`."""
     try:
         from cmaes import CMA
     except ImportError:
@@ -189,10 +192,10 @@ def _strategies() -> Any:
 
 
 class _Island:
-    """One evolution strategy, from one of the best points known."""
+    """One run of CMA-ES, started at one of the best points known."""
 
     def __init__(self, start: list[dict[str, Any]], rng: np.random.Generator) -> None:
-        # Good ones are taken more often.
+        # Better points are drawn more often.
         pick = int(min(_SEEDS, len(start)) * rng.random() ** _FAVOUR)
         self._strategy = _strategies()(
             mean=np.clip(np.array(start[pick]["point"]), 0.02, 0.98),
@@ -216,5 +219,5 @@ class _Island:
 
     @property
     def done(self) -> bool:
-        """Whether it gains no more."""
+        """Whether it no longer improves."""
         return self._since > PATIENCE or self._strategy.should_stop()
