@@ -70,6 +70,7 @@ STUDIES = tuple(
 PAGES = (
     "README.md",
     *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs").glob("*.md"))),
+    *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs/decisions").glob("*.md"))),
     *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs/howto").glob("*.md"))),
     *(str(page.relative_to(ROOT)) for page in sorted((ROOT / "docs/tutorials").glob("*.md"))),
 )
