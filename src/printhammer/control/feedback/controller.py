@@ -234,7 +234,10 @@ class Controller:
             loop.printed = printed if unsure else None
 
     def decide_again(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Decide again how runs are thrown, after their contacts, each with the index of the coming dot."""
+        """Repeat the choice of the next pulse after a contact, with the improved estimate of the pack front.
+
+        `now` holds each loop with the index of the coming dot.
+        """
         before = [loop.printed for loop, _dot in now if loop.printed is not None]
         kind, touch, speed, thought, force, slope, back = (
             np.array([getattr(printed, name) for printed in before])

@@ -290,7 +290,7 @@ class Pattern(Declared):
 
     @property
     def wanted(self) -> int:
-        """Number of dots."""
+        """Number of dots to print, over all lines and wires."""
         return int(self.dots.sum())
 
     def __eq__(self, other: Any) -> bool:
