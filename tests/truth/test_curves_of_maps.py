@@ -151,6 +151,17 @@ def test_a_fold_that_turns_in_one_constant_only_has_no_cusp() -> None:
     assert points(curve) == []
 
 
+def test_a_fold_that_turns_has_no_cusp_where_the_other_constant_has_a_wide_range() -> None:
+    # x -> x + r - p^2 - (x - p / 2)^2: a fold at x = p / 2, r = p^2; in its range p moves but little.
+    known = Map(
+        lambda u, p, r: [u[0] + r - p**2 - (u[0] - 0.5 * p) ** 2, 0.5 * u[1]],
+        lambda u, p, r: [[1.0 - 2.0 * (u[0] - 0.5 * p), 0.0], [0.0, 0.5]],
+    )
+    curve = curve_through(known, "fold", (0.5, 0.0), (1.0, 1.0), (-15.0, 5000.0), (-1.0, 4.0))
+    assert (first(curve).min(), first(curve).max()) == pytest.approx((-2.0, 2.0), abs=1e-8)
+    assert points(curve) == []
+
+
 def test_neimark_sacker_of_the_delayed_logistic_map() -> None:
     curve = curve_through(DELAYED, "Neimark-Sacker", (0.5, 0.5), (2.0, 0.0), (1.0, 8.0), (-0.5, 2.5))
     np.testing.assert_allclose(first(curve), 2.0 + curve.second, rtol=0.0, atol=SHARP)
@@ -166,8 +177,10 @@ def test_neimark_sacker_of_the_delayed_logistic_map() -> None:
 
 def test_a_torus_ends_in_strong_resonances() -> None:
     curve = curve_through(BOGDANOV, "Neimark-Sacker", (0.0, 0.0), (0.0, 0.3), (-2.0, 2.0), (-3.0, 3.0))
-    inner = np.abs(curve.second) < 2.0
-    np.testing.assert_allclose(first(curve)[inner], 0.0, atol=SHARP)
+    # Beyond the resonances there is no torus.
+    assert (curve.second.min(), curve.second.max()) == pytest.approx((-2.0, 2.0), abs=1e-8)
+    np.testing.assert_allclose(first(curve), 0.0, atol=SHARP)
+    np.testing.assert_allclose(np.abs(curve.multipliers), 1.0, atol=1e-4)
     assert [stop.reason for stop in curve.stops] == ["resonance", "resonance"]
     found = {kind: (p, r) for kind, p, r in points(curve)}
     assert found == {

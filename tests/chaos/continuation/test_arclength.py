@@ -62,6 +62,17 @@ def test_too_many_steps_are_told() -> None:
     assert len(curve.nodes) == 6
 
 
+def test_a_curve_that_a_watch_ends_at_its_last_node_has_that_node_once() -> None:
+    def watch(here: Node, ahead: Node) -> Stop | None:
+        return Stop("here", here.parameter, here.state, "", here) if ahead.parameter > 0.5 else None
+
+    curve = follow(line, [0.0], 0.0, scales=ONE, bounds=(-0.1, 1.0), watch=watch)
+    assert curve.stops[1].reason == "here"
+    parameters = [node.parameter for node in curve.nodes]
+    assert parameters[-1] == pytest.approx(0.5, abs=1e-6)
+    assert (np.diff(parameters) > 0.0).all()
+
+
 def test_a_watch_may_end_a_curve_between_two_nodes() -> None:
     def watch(here: Node, ahead: Node) -> Stop | None:
         return Stop("far enough", 0.4, ahead.state, "far enough", here) if ahead.parameter > 0.4 else None

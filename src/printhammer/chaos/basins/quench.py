@@ -51,6 +51,8 @@ _PIECE: Final = 8192
 _SPACING: Final = 5e-6
 _FINE: Final = 8
 """Number of samples of a second run on either side of the highest one of the first, within its spacing."""
+_PEAK_TOLERANCE: Final = 1e-8
+"""Largest tolerance of that second run: with that of a display, 5e-7, peaks err by 1e-4 of the way."""
 _FIRST, _SECOND = 2, 3
 
 
@@ -320,13 +322,14 @@ def _piece(
     turned, times = _highest(grid, x.astype(np.float64), after)
     lost = np.flatnonzero(result.ok & ~second & np.isfinite(turned))
     if lost.size:
-        # Where a pulse begins or ends beside the turn no parabola goes through three samples.
+        # A run of a display is not good enough for a peak, nor a parabola where a pulse ends beside it.
         offsets = (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, 2 * _FINE + 1)
         moments = np.clip(times[lost, np.newaxis] + offsets, after[lost, np.newaxis], ends[lost, np.newaxis])
         strobes = [np.unique(row) for row in moments]
-        closer = Ensemble(
-            hammer, [every[k] for k in lost], ends[lost], starts=begin, tolerance=effort.tolerance
-        ).run(strobes=strobes, threads=effort.threads)
+        sharp = min(effort.tolerance, _PEAK_TOLERANCE)
+        closer = Ensemble(hammer, [every[k] for k in lost], ends[lost], starts=begin, tolerance=sharp).run(
+            strobes=strobes, threads=effort.threads
+        )
         assert closer.strobes is not None
         top = _top(closer.strobes.t, closer.strobes.x, closer.strobes.v)
         turned[lost] = np.where(np.isfinite(top), top, turned[lost])

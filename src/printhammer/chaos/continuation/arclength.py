@@ -222,7 +222,9 @@ def _half(
             continue
         if stop is None and reached is not None:
             stop = _bound_stop(ahead, reached)
-        nodes.append(ahead if stop is None or stop.node is None else stop.node)
+        last = ahead if stop is None or stop.node is None else stop.node
+        if last is not here:
+            nodes.append(last)
         if stop is not None:
             return nodes, stop
         if float(here.tangent @ ahead.tangent) > 0.5 * (1.0 + _LEAST_COSINE):

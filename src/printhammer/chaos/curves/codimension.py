@@ -42,6 +42,8 @@ RESONANCES: Final = 3
 
 _LEVEL: Final = 1e-3
 """Component of a tangent of length 1 below which a curve stands still in a constant."""
+_VANISHES: Final = 0.1
+"""Component of a tangent at a cusp, as a fraction of that beside it, below which it vanishes there."""
 _ROUNDS: Final = 20
 _MOVE: Final = 1e-6
 _PRECISION: Final = 1e-11
@@ -151,7 +153,7 @@ def points_along(
             # The curve turns back in the plane, whatever the direction in which the cusp points.
             turn = ahead.tangent[-2:] - here.tangent[-2:]
             _, node = zero_between(follower, here, ahead, _along(turn))
-            if node is not None and float(np.linalg.norm(node.tangent[-2:])) < _LEVEL:
+            if node is not None and _stands_still(node, here, ahead):
                 points.append(point_of("cusp", place_of(node), after))
         pair = coefficients[after : after + 2]
         if kind == "period doubling" and pair[0] * pair[1] < 0.0:
@@ -162,6 +164,17 @@ def points_along(
             ):
                 points.append(point_of("degenerate doubling", place_of(node), after))
     return points
+
+
+def _stands_still(node: Node, here: Node, ahead: Node) -> bool:
+    """Return whether a curve stands still in both constants at a node between two others.
+
+    Each component of the tangent is compared with itself beside the node: a constant with a wide range has a
+    small one everywhere.
+    """
+    components = np.abs([each.tangent[-2:] for each in (node, here, ahead)])
+    beside = np.maximum(_VANISHES * components[1:].max(axis=0), _NOISE)
+    return bool((components[0] < np.minimum(beside, _LEVEL)).all())
 
 
 def meeting(

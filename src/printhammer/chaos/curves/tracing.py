@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps, Stop, follow
+from printhammer.chaos.continuation.branch_points import zero_between
 from printhammer.chaos.continuation.family import rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.chaos.continuation.flights import near_touches
@@ -139,11 +140,25 @@ class CurveTracer:
             points += self.meetings(part, begin)
             begin += len(part)
         points.sort(key=lambda point: point.after)
+        for end, inner in ((0, 1), (-1, -2)):
+            if stops[end].reason == "resonance" and len(nodes) > 1:
+                # The points were found with the node beyond it.
+                node = self.resonance(pieces[end][0], nodes[inner], nodes[end])
+                nodes[end] = pieces[end][1][end] = node
         if not curve.closed:
             points = self.with_ends(nodes, stops, points)
         surface = system.surface if isinstance(system, GrazingSystem) else ""
         first, last = (self.in_words(stop, points, end) for end, stop in enumerate(stops))
         return Traced(self.kind, surface, nodes, (first, last), points, coefficients, pieces)
+
+    def resonance(self, system: System, here: Node, beyond: Node) -> Node:
+        """Return the point of a torus between two others at which both its multipliers become real."""
+        sign = float(np.sign(np.trace(place_of(beyond).jacobian)))
+        corrector = Corrector(system, system.scales, self.steps.precision)
+        _, node = zero_between(
+            corrector, here, beyond, lambda each: sign * float(np.trace(place_of(each).jacobian)) - 2.0
+        )
+        return here if node is None else node
 
     def coefficient(self, place: Place) -> float:
         """Return the coefficient of the normal form of a period doubling."""
