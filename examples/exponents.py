@@ -11,7 +11,7 @@ import printhammer as ph
 
 hammer = ph.load("hendriks-1983")
 
-for period in ("1.25 ms", "1.20 ms", "1.10 ms"):
+for period in ("1.25 ms", "1.20 ms", "1.15 ms"):
     found = ph.lyapunov(hammer, period=period, firings=500, transient=500)
     largest, error = found.exponents[0], found.standard_errors[0]
     print(f"{period}: {largest:+.3f} ± {error:.3f} per firing, {found.growth}")
@@ -38,7 +38,7 @@ returns = ph.recurrence(found.points, rate=0.05).plot()
 # What is heard of all this is a train of impacts on the paper. Each interval is drawn
 # against the one before: however irregular they are, a simple rule makes them.
 
-dots = ph.section(hammer, surface="pack", period="1.10 ms", touches=2000, transient=500)
+dots = ph.section(hammer, surface="pack", period="1.15 ms", touches=2000, transient=500)
 train = ph.impact_train(dots)
 print(f"intervals vary by {100 * train.variation:.1f} %")
 intervals = train.plot()
@@ -47,4 +47,4 @@ intervals = train.plot()
 # The backstop is met several times each period. Velocity, and time since the firing,
 # are all of the state there.
 
-impacts = ph.section(hammer, period="1.10 ms", touches=2000, transient=500).plot()
+impacts = ph.section(hammer, period="1.15 ms", touches=2000, transient=500).plot()

@@ -42,7 +42,7 @@ for orbit in found:
 # for a while, leaves it, and comes near another. Their states lie on the attractor
 # or beside it.
 
-strange = ph.orbits(hammer, period="1.10 ms", longest=6, starts=100)
+strange = ph.orbits(hammer, period="1.15 ms", longest=6, starts=100)
 print(strange.message)
 strange.plot(points=2000)
 
@@ -50,7 +50,7 @@ strange.plot(points=2000)
 # How fast the unstable ones lose their neighbours, per firing, beside the largest
 # exponent of the train, which is an average over what it comes near.
 
-exponent = ph.strobe(hammer, period="1.10 ms", points=1).verdict.exponent
+exponent = ph.strobe(hammer, period="1.15 ms", points=1).verdict.exponent
 rates = [np.log(abs(orbit.multipliers[0])) / orbit.firings for orbit in strange]
 figure, panel = plt.subplots()
 panel.plot([orbit.firings for orbit in strange], rates, "o", markerfacecolor="none")

@@ -47,14 +47,14 @@ def test_most_trains_are_decided_and_the_others_say_why(cli: Callable) -> None:
     assert done.status == 0
     out = " ".join(done.out.split())
     assert re.search(r"period: 100 values and \d+ between those that differ, \d+ trains of 1000 firings", out)
-    # It was half of the range.
     shares = {
         row[1]: float(row[3]) for row in re.finditer(r"(undecided|strange) +(\d+) +([\d.]+) ", done.out)
     }
     assert shares["undecided"] < 6.0
     assert shares["strange"] > 25.0
     assert "[ms] [ms]" in out
-    assert re.search(r"With rising values the first strange train comes at 0\.92\d\d? ms after", out)
+    assert "With rising values the very first train, at 0.8 ms, is strange." in out
+    assert re.search(r"With falling values the first strange train comes at 1\.29\d\d? ms after", out)
     assert (
         "undecided trains: neighbouring motions approach each other: they still settle, more firings" in out
     )

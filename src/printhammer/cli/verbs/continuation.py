@@ -190,8 +190,8 @@ def read_event(written: str, name: str) -> int | str:
 
 @verb(
     "curve",
-    "printhammer curve hendriks-1983 --rate '745 Hz' --from '740 Hz' --to '750 Hz'"
-    " --second backstop.damping --second-from '3.6e10 N*s/m^2.5' --second-to '3.7e10 N*s/m^2.5'"
+    "printhammer curve hendriks-1983 --rate '730 Hz' --from '728 Hz' --to '737 Hz'"
+    " --second backstop.damping --second-from '2.2e10 N*s/m^2.5' --second-to '2.3e10 N*s/m^2.5'"
     " --out curve.png",
     {
         "most": opt.whole("Maximum number of continuation steps in each direction.", default=200),

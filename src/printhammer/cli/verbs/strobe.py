@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @verb(
     "strobe",
-    "printhammer strobe hendriks-1983 --period '1.10 ms' --points 200 --out points.csv",
+    "printhammer strobe hendriks-1983 --period '1.15 ms' --points 200 --out points.csv",
     {
         **opt.FIRED_TRAIN,
         "points": opt.whole("Number of points (firings recorded).", default=200),
@@ -94,7 +94,7 @@ _trains = partial(opt.text, panel=_TRAINS)
 
 @verb(
     "lyapunov",
-    "printhammer lyapunov hendriks-1983 --period '1.10 ms, 1.30 ms' --firings 300",
+    "printhammer lyapunov hendriks-1983 --period '1.15 ms, 1.30 ms' --firings 300",
     {
         "overlap": opt.overlapping(_TRAINS),
         "drive": opt.source(
@@ -109,7 +109,7 @@ _trains = partial(opt.text, panel=_TRAINS)
 def lyapunov(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    period: str | None = _trains("TIMES", "Times between firings, e.g. '1.10 ms, 1.30 ms'."),
+    period: str | None = _trains("TIMES", "Times between firings, e.g. '1.15 ms, 1.30 ms'."),
     rate: str | None = _trains("RATES", "Firings per second, e.g. '952 Hz'."),
     lowest: str | None = _trains(
         "TIME", "Shortest time between firings of a range, e.g. '0.8 ms'.", flag="--from"
