@@ -28,8 +28,11 @@ from printhammer.support.arrays import BoolArray, FloatArray
 FIRING: Final = 12
 """Index of the firing from which to the next one the map leads; the state in a row from rest is near it."""
 
-DOTS: Final = FIRING + 4
-"""Number of dots of a row that is long enough: nothing that the map meets depends on where the row ends."""
+MORE: Final = 4
+"""Number of dots from that firing on after which nothing that the map meets depends on where the row ends."""
+
+DOTS: Final = FIRING + MORE
+"""Number of dots of a row that is long enough."""
 
 _SPACING: Final = 1e-5
 _CLOSED: Final = 1e-6  # Distance from state to image at which an orbit is closed, relative likewise
@@ -38,20 +41,28 @@ _ITERATIONS: Final = 12  # Iteration limit
 
 
 def row_multipliers(
-    hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort, *, closed: bool = True
+    hammers: Sequence[Hammer],
+    drives: Sequence[Drive],
+    effort: Effort,
+    *,
+    closed: bool = True,
+    firing: int = FIRING,
 ) -> FloatArray:
     """Compute the leading multiplier of each of several rows of dots, shape (rows,).
 
     Parameters
     ----------
     hammers, drives : sequences
-        A hammer and a drive for each row. A drive has `DOTS` firings at least, from rest; from the firing
-        before `FIRING` on they are alike and as far apart from each other.
+        A hammer and a drive for each row. A drive has four firings more than `firing` at least, from rest;
+        from the firing before `firing` on they are alike and as far apart from each other.
     effort : Effort
         Tolerance and threads.
     closed : bool, optional
         Whether to find the fixed point by Newton's method; otherwise the derivative is that at the state
         that the row from rest reaches, which is near the fixed point if the dots before are good.
+    firing : int, optional
+        Index of the firing from which to the next one the map leads. Where the first dots are made right
+        their state is the fixed point, and an early firing is nearer to it than a later one.
 
     Returns
     -------
@@ -62,7 +73,7 @@ def row_multipliers(
     """
     if not hammers:
         return np.zeros(0)
-    maps = _Maps(hammers, drives, effort)
+    maps = _Maps(hammers, drives, effort, firing)
     z, jacobian = maps.start, np.full((len(hammers), 2, 2), np.nan)
     open_ = np.flatnonzero(np.isfinite(z).all(axis=1))
     for _ in range(_ITERATIONS if closed else 1):
@@ -97,12 +108,15 @@ def leading(jacobians: FloatArray) -> FloatArray:
 class _Maps:
     """The strobe maps of rows: states in units of the scales, shape (rows, 2), and their images."""
 
-    def __init__(self, hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort) -> None:
+    def __init__(
+        self, hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort, firing: int
+    ) -> None:
         self.hammers, self.drives, self.effort = hammers, drives, effort
+        least = firing + MORE
         for drive in drives:
-            if len(drive.times) < DOTS:
-                raise InputError.of("drive", len(drive.times), f"a row of {DOTS} dots or more")
-        self.times = np.array([drive.times[FIRING - 1 : FIRING + 2] for drive in drives])
+            if len(drive.times) < least:
+                raise InputError.of("drive", len(drive.times), f"a row of {least} dots or more")
+        self.times = np.array([drive.times[firing - 1 : firing + 2] for drive in drives])
         period = self.times[:, 2] - self.times[:, 1]
         way = np.array([_way(hammer) for hammer in hammers])
         self.scales = np.stack([way, way / period], axis=1)

@@ -10,6 +10,7 @@ from tests.control.table.test_tuning import RATE, SLOTS, quick
 import printhammer as ph
 from printhammer.control.table import search, tuning
 from printhammer.control.table import ways as table_ways
+from printhammer.control.table.drive import JUMP
 from printhammer.control.table.task import Task
 from printhammer.control.table.ways import Ways
 from printhammer.printing.dots.nominal import nominal
@@ -106,7 +107,7 @@ def test_a_way_is_kept_where_another_one_is_hardly_better() -> None:
         [(700, 0, 0.4), (700, 20, 0.5), (710, 0, 0.45), (710, 20, 0.4), (720, 0, 0.4), (720, 20, 2.0)]
     )
     groups = [np.array([0, 1]), np.array([2, 3]), np.array([4, 5])]
-    assert search._path(every, groups).tolist() == [0, 2, 4]
+    assert search._path(every, groups, JUMP).tolist() == [0, 2, 4]
 
 
 def test_a_way_is_left_where_it_is_no_good() -> None:
@@ -114,10 +115,10 @@ def test_a_way_is_left_where_it_is_no_good() -> None:
         [(700, 0, 0.4), (700, 20, 0.5), (710, 0, 3.0), (710, 20, 0.4), (720, 0, 0.4), (720, 20, 2.0)]
     )
     groups = [np.array([0, 1]), np.array([2, 3]), np.array([4, 5])]
-    chosen = search._path(every, groups).tolist()
+    chosen = search._path(every, groups, JUMP).tolist()
     assert chosen[1] == 3
     assert chosen[2] == 4
-    assert search._path(every, []).size == 0
+    assert search._path(every, [], JUMP).size == 0
 
 
 def test_pulses_keep_to_their_bounds_also_where_it_is_looked_closely(

@@ -29,7 +29,7 @@ from printhammer.control.table.drive import (
 )
 from printhammer.control.table.task import Task
 from printhammer.control.table.ways import LONGEST_STEP, solve
-from printhammer.derivatives.rows import DOTS, row_multipliers
+from printhammer.derivatives.rows import MORE, row_multipliers
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
@@ -121,11 +121,16 @@ class Draft:
             if gap / rate <= task.single.settled
         ]
         drives = []
+        # From the firing before this one on the whole history is that of the row.
+        first = task.gaps + 1
         for row, history in cells:
-            settings, slots = Settings(*self.values[:4, row]), range(0, history[0] * DOTS, history[0])
+            settings, slots = (
+                Settings(*self.values[:4, row]),
+                range(0, history[0] * (first + MORE), history[0]),
+            )
             pulses = pulses_of(settings, task.gaps, task.reach, slots, float(self.rates[row]))
             drives.append(sequence(pulses, task.pulse, known))
-        growth = row_multipliers([task.hammers[0]] * len(cells), drives, task.effort)
+        growth = row_multipliers([task.hammers[0]] * len(cells), drives, task.effort, firing=first)
         if cells:
             rows, columns = self.places([cells[k] for k in np.flatnonzero(~(np.abs(growth) < 1.0)).tolist()])
             self.deviation[rows, columns] = np.inf

@@ -30,7 +30,9 @@ import numpy as np
 from printhammer.control.table.drive import JUMP
 from printhammer.control.table.task import Task
 from printhammer.control.table.ways import (
+    BAD,
     LEAST_OF_OWN,
+    UNSTABLE,
     Ways,
     costs,
     fits,
@@ -45,7 +47,6 @@ from printhammer.support.arrays import FloatArray, IntArray
 # Distance of the periods at which a full search is run; other periods use the solutions of their neighbours,
 # s
 SPACING: Final = 30e-6
-BAD: Final = 0.75  # Cost above which more candidates are searched
 _ROOM: Final = 100e-6  # Half-width of the range of firing times about the slot, s
 _GRID: Final = (12, 8)  # Numbers of firing times and widths of the starting grid
 _FINE: Final = 3  # Refinement factor of grid and number of starts without a brake pulse
@@ -88,7 +89,8 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
     task.report()
     if task.brake:
         _look_closely(task, periods, groups)
-    there = [group for group in groups if group.size]
+    stable = (group.take(group.cost < UNSTABLE) for group in groups)
+    there = [group for group in stable if group.size]
     every = joined(there)
     ends = np.cumsum([group.size for group in there])
     best = every.take(
@@ -121,8 +123,9 @@ def _look_closely(task: Task, periods: FloatArray, groups: list[Ways]) -> None:
     Extends the groups of candidates of the periods in place.
     """
     least = [group.cost.min(initial=np.inf) for group in groups]
-    # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected.
-    hope = [row for row, cost in enumerate(least) if not cost <= BAD and cost <= _FAR]
+    # Where even the re-solved neighbours cost more than `_FAR`, no candidate is expected; an unstable one may
+    # have a stable neighbour.
+    hope = [row for row, cost in enumerate(least) if BAD < cost <= _FAR or UNSTABLE <= cost < np.inf]
     close, shifts = _CLOSE * task.scale, [later * task.scale for later in _LATER]
     nodes = spaced(periods[hope], close)
     begin, narrowest = task.brake_from, _LEAST_BRAKE * task.width

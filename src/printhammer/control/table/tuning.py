@@ -119,6 +119,8 @@ SPREAD: Final = (
 
 # Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid
 _USABLE: Final = 0.9
+_GAP: Final = 6
+"""Most rates of the grid that a gap may have to be searched again; arbitrary: each takes some seconds."""
 _POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
 # Offsets of additional periods at which candidates are then searched, s
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
@@ -227,8 +229,9 @@ def tune(
     )
     draft = _tuned(task, grid, open_ended=asked is None)
     if asked is None:
+        _bridge(draft)
         return refined(draft.rows(np.arange(_usable(draft)))).table().fired_by(driver, hammer)
-    _tune_again(draft)
+    _tune_again(draft, np.flatnonzero(~(draft.worst <= _POOR)))
     lost = np.flatnonzero(~np.isfinite(draft.worst))
     if lost.size:
         speed = float(grid[lost[0]])
@@ -278,9 +281,23 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
     return rates
 
 
-def _tune_again(draft: Draft) -> None:
-    """Retune the rates that are not good enough, with candidates from neighbouring periods too; in place."""
-    poor = np.flatnonzero(~(draft.worst <= _POOR))
+def _bridge(draft: Draft) -> None:
+    """Retune the first rates that are not usable, as long as that makes them so; in place.
+
+    The table ends below the first rate that stays poor, so that a gap of a few rates would cost all above.
+    """
+    while (bad := np.flatnonzero(~(draft.worst <= _USABLE))).size:
+        first = bad[: _GAP + 1]
+        gap = first[first - first[0] == np.arange(first.size)]
+        if gap.size > _GAP:
+            return
+        _tune_again(draft, gap)
+        if not draft.worst[gap[0]] <= _USABLE:
+            return
+
+
+def _tune_again(draft: Draft, poor: IntArray) -> None:
+    """Retune rates that are not good enough, with candidates from neighbouring periods too; in place."""
     if not poor.size:
         return
     again = _tuned(draft.task, draft.rates[poor], around=_AROUND * draft.task.scale)

@@ -13,7 +13,7 @@ import numpy as np
 
 from printhammer.control.table.drive import Pulses, sequence
 from printhammer.control.table.task import Task
-from printhammer.derivatives.rows import DOTS, row_multipliers
+from printhammer.derivatives.rows import MORE, row_multipliers
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
@@ -106,6 +106,11 @@ def changes(
     later = np.where(wider == change[:, 1], change[:, 0], -(along * rest).sum(axis=1) / length)
     return np.asarray(np.clip(np.column_stack([later, wider]), -longest, longest))
 
+
+BAD: Final = 0.75  # Cost above which more candidates are searched for
+_SECOND: Final = 2  # Index of the first firing after two dots that are made right
+UNSTABLE: Final = 1e3
+"""Cost from which on a candidate is unstable: never chosen, but a neighbour may be stable; arbitrary."""
 
 ROW: Final = 8  # Number of dots in the row that rates a candidate
 NOMINAL: Final = 8.0  # Weight of the design hammer relative to the perturbed hammers
@@ -214,8 +219,8 @@ def costs(task: Task, ways: Ways) -> FloatArray:
     The cost is the largest deviation of any dot of a row of `ROW` dots, over the hammers of `task.spread`
     and, with the weight `NOMINAL`, the design. With a stated variability it is instead the RMS of the largest
     deviations over its sigma points and the design. Candidates that miss even the second dot cost `_WRONG`
-    more. The cost is infinite if a dot is lost, the pulses overlap, or the multiplier of a long row exceeds
-    `STABLE`.
+    more. It is at least `UNSTABLE`, and the more the larger the multiplier of a long row, if that exceeds
+    `STABLE`. It is infinite if a dot is lost or the pulses overlap.
     """
     cost = np.full(ways.size, np.inf)
     some = np.flatnonzero(fits(task, ways))
@@ -231,15 +236,25 @@ def costs(task: Task, ways: Ways) -> FloatArray:
             worst = np.maximum.reduce([NOMINAL * largest_of(own), *spread])
         cost[some] = worst + np.where(largest_of(own[:, 1]) > _RIGHT, _WRONG, 0.0)
         made = np.flatnonzero(np.isfinite(cost))
-        cost[made[~is_stable(task, ways.take(made))]] = np.inf
+        growth = growths(task, ways.take(made)._replace(cost=cost[made]))
+        grows = ~(growth <= STABLE)
+        cost[made[grows]] = UNSTABLE * (1.0 + np.fmin(growth[grows], UNSTABLE))
     return cost
 
 
-def is_stable(task: Task, ways: Ways) -> BoolArray:
-    """Mask of the candidates with which an error in a long row decays from dot to dot, (ways,)."""
+def growths(task: Task, ways: Ways) -> FloatArray:
+    """Compute the factor by which an error in a long row of each candidate grows from dot to dot, (ways,).
+
+    NaN if it is unknown. The state after two dots is the fixed point of the row if these are right; where the
+    cost says that they are not, and the row looks stable, the fixed point is located.
+    """
+    rows = rows_of(task, ways, _SECOND + MORE)
     hammers = [task.hammers[0]] * ways.size
-    growth = row_multipliers(hammers, rows_of(task, ways, DOTS), task.effort, closed=False)
-    return np.abs(growth) <= STABLE
+    growth = np.abs(row_multipliers(hammers, rows, task.effort, closed=False, firing=_SECOND))
+    far = np.flatnonzero((ways.cost > BAD) & (growth <= STABLE))
+    located = row_multipliers(hammers[: far.size], [rows[k] for k in far], task.effort, firing=_SECOND)
+    growth[far] = np.abs(located)
+    return growth
 
 
 def seconds(task: Task, ways: Ways) -> FloatArray:
