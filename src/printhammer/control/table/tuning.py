@@ -23,9 +23,9 @@ from printhammer.control.table.drive import (
     number_of,
     print_pulse,
 )
-from printhammer.control.table.search import BAD, SPACING, chosen, searched, spaced
+from printhammer.control.table.search import SPACING, chosen, searched, spaced
 from printhammer.control.table.task import Single, Task, single_of
-from printhammer.control.table.ways import ROUNDS, costs, solved, ways_of
+from printhammer.control.table.ways import BAD, ROUNDS, costs, solved, ways_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
