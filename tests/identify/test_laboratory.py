@@ -280,7 +280,7 @@ def test_benches_that_cannot_choose_for_themselves() -> None:
     assert len(ph.measure("spring", bare, displacements=[60e-6, 90e-6]).values["force"]) == 2
     soft = HAMMER.replace("pack", hammers.PACKS["dashpot"])
     with refused("pack"):
-        ph.measure("pack", soft)
+        ph.measure("pack", soft.replace("waveform", None))
     table = ph.measure("pack", soft, sensor={"exact": True}, peaks=[20e-6], points=4)
     # A linear spring pressed slowly has no loop.
     np.testing.assert_allclose(table.values["force"], 3e5 * table.values["indentation"], rtol=1e-12)

@@ -292,8 +292,8 @@ class ImpactEstimator:
             file=self.hammer.path,
             key="signal",
             expected=(
-                f"less noise than {sampling.noise:g} {sampling.unit}, more bits than {sampling.bits},"
-                " or faster sampling"
+                f"less noise than {sampling.noise:.3g} {sampling.unit} (--noise), more bits than"
+                f" {sampling.bits} (--bits), or faster sampling (--sampling-rate)"
             ),
         )
 

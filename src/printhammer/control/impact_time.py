@@ -29,6 +29,9 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
+LEVELS: Final = (0.001, 0.003, 0.01)
+"""Default standard deviations of a sample, relative to the peak current or 10 V."""
+
 MOST: Final = 2000
 """Largest number of sampling settings in a study."""
 
@@ -197,7 +200,12 @@ def impact_time(
         )
     if not levels.size:
         scale = 10.0 if volts else _largest_current(hammer)
-        levels = scale * np.array([0.001, 0.003, 0.01])
+        levels = scale * np.array(LEVELS)
+        if rates.size and widths.size:
+            # A device whose impact shows less is sampled with less noise.
+            least = float(rates.min()), int(widths.min()), span, late, width
+            clear = [_is_clear(hammer, Sampling(signal, level, *least)) for level in levels.tolist()]
+            levels = levels[clear] if any(clear) else levels[:1]
     shape = levels.size, rates.size, widths.size
     total = int(np.prod(shape))
     if not 0 < total <= MOST:
@@ -243,6 +251,15 @@ def impact_time(
         bits=widths,
         **arrays,
     )
+
+
+def _is_clear(hammer: Hammer, probe: Sampling) -> bool:
+    """Whether the estimator can tell the impact of a hammer in samples of a probe."""
+    try:
+        ImpactEstimator(hammer, probe)
+    except InputError:
+        return False
+    return True
 
 
 def _largest_current(hammer: Hammer) -> float:

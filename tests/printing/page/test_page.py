@@ -234,6 +234,11 @@ def test_limits_and_heads_are_those_asked_for(hammer: ph.Hammer) -> None:
     np.testing.assert_allclose(found.density, 2.0 * found.force_ratio)
     assert head_of(24).line_pitch == pytest.approx(head_of(9).line_pitch)
     assert head_of(7).wire_pitch == pytest.approx(head_of(9).wire_pitch * 9 / 7)
+    # A Braille cell: rows 2.5 mm apart, lines 10 mm.
+    braille = head_of(3, wire_pitch=2.5e-3, pitch=0.5e-3, wire_diameter=1.5e-3)
+    assert braille.line_pitch == pytest.approx(10e-3)
+    assert (braille.wire_pitch, braille.pitch, braille.wire_diameter) == (2.5e-3, 0.5e-3, 1.5e-3)
+    assert head_of(24, wire_pitch=1e-3).pitch == 1e-3
 
 
 @pytest.mark.parametrize(

@@ -281,6 +281,9 @@ def print_(
         "Maximum number of characters in a print line (default: 40).", panel=_PATTERN
     ),
     pitch: float | None = _length("Distance between slots (default: 1/60 in for 9 wires)."),
+    wire_pitch: float | None = _length(
+        "Distance between neighbouring wires (default: such that all are as high as 9, 1/72 in apart)."
+    ),
     wire_diameter: float | None = _length(
         "Diameter of a wire (default: 0.35 mm for 9 wires).", flag="--wire"
     ),
@@ -325,7 +328,14 @@ def print_(
         # A bitmap continues across print lines.
         line_gap = 0.0
     head = head_of(
-        asked.wires, **opt.given(pitch=pitch, wire_diameter=wire_diameter, density=density, line_gap=line_gap)
+        asked.wires,
+        **opt.given(
+            pitch=pitch,
+            wire_pitch=wire_pitch,
+            wire_diameter=wire_diameter,
+            density=density,
+            line_gap=line_gap,
+        ),
     )
     if limits is not None:
         passed["limits"] = limits_named(limits)

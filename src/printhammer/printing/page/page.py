@@ -97,11 +97,12 @@ def head_of(
     wires: int,
     *,
     pitch: float | None = None,
+    wire_pitch: float | None = None,
     wire_diameter: float | None = None,
     density: float = DENSITY,
     line_gap: float = LINE_GAP,
 ) -> Head:
-    """Return a head with assumed dimensions, as high as a head of nine wires, whatever the number of wires.
+    """Return a head with assumed dimensions, by default as high as one of nine wires.
 
     Parameters
     ----------
@@ -109,14 +110,18 @@ def head_of(
         As for `Head`.
     pitch : float, optional
         Distance between slots, m; by default 1/60 in for 9 wires, else the wire pitch.
+    wire_pitch : float, optional
+        Distance between neighbouring wires, m; by default the height of nine wires 1/72 in apart over their
+        number.
     wire_diameter : float, optional
         Diameter of the wires, m; by default 0.35, 0.25 and 0.2 mm for 9, 18 and 24 wires, else 4/3 of the
         wire pitch.
     """
     if wires < 1:
         raise InputError.of("wires", wires, "a positive number", file="head")
-    apart = _HEIGHT / wires
-    usual = _STANDARD.get(wires, Head(wires, apart, apart, _THICKNESS * apart))
+    apart = _HEIGHT / wires if wire_pitch is None else wire_pitch
+    own = Head(wires, apart, apart, _THICKNESS * apart)
+    usual = _STANDARD.get(wires, own) if wire_pitch is None else own
     return Head(
         wires,
         usual.wire_pitch,
