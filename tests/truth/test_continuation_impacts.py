@@ -368,3 +368,18 @@ def test_chart_of_the_bouncing_ball() -> None:
         exact = [BouncingBall(GRAVITY, e, FREQUENCY) for e in curve.second]
         limits = [one.fold if curve.kind == "fold" else one.doubling for one in exact]
         np.testing.assert_allclose(curve.first / weight, limits, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_chart_has_a_limit_that_its_branch_does_not_meet() -> None:
+    # At e = 0.8 the doubling lies at 1.0708, above the range; at e = 0.9 at 1.0163, within it.
+    case = BouncingBall(GRAVITY, 0.8, FREQUENCY)
+    branch = bounces(case, 0.8, (0.3, 1.05))
+    assert [event.kind for event in branch.events] == ["fold"]
+    chart = stability_chart(branch, "backstop.restitution", (0.7, 0.9), grid=(0, 0))
+    assert sorted(curve.kind for curve in chart.curves) == ["fold", "period doubling"]
+    (doubling,) = [curve for curve in chart.curves if curve.kind == "period doubling"]
+    exact = [BouncingBall(GRAVITY, e, FREQUENCY).doubling for e in doubling.second]
+    np.testing.assert_allclose(doubling.first / (MASS * GRAVITY), exact, rtol=1e-6)
+    assert doubling.second.max() == pytest.approx(0.9)
+    assert "others are not in the chart" in chart.message

@@ -3,10 +3,14 @@
 An orbit loses its stability at a fold, a period doubling or a Neimark-Sacker point, each a curve in the plane
 (`printhammer.chaos.curves.systems`). Beside the curves the chart shows to what a train from rest settles, on
 a grid; a stable orbit need not be what is reached from there.
+
+Curves are begun where the branch along the first constant meets a limit, and where branches along the second
+one do, which begin at orbits of the former. A closed curve that none of them meets is not found.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -43,6 +47,9 @@ if TYPE_CHECKING:
 GRID: Final = (48, 32)
 """Numbers of values of the two constants at which trains from rest are judged."""
 
+_ACROSS: Final = (0.02, 0.98)
+"""Places in the range of the first constant at which branches along the second one begin."""
+
 
 class StabilityChart(Result):
     """Where in the plane of two constants an orbit is stable, and what ends it."""
@@ -64,6 +71,9 @@ class StabilityChart(Result):
         dtype=np.int32,
     )
     refused: tuple[str, ...] = part("why a curve could not be followed, a sentence each", default=())
+    across: tuple[float, ...] = part(
+        "values of the first constant at which limits were sought along the second, SI", default=()
+    )
 
     @property
     def title(self) -> str:
@@ -82,8 +92,13 @@ class StabilityChart(Result):
         counts = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
         share = float(np.mean(self.settled == self.firings)) if self.settled.size else 0.0
         missed = f"; {len(self.refused)} could not be followed" if self.refused else ""
+        at = ", ".join(f"{value:.6g}" for value in self.across)
+        sought = f"along {self.names[0]}" + (
+            f" and along {self.names[1]} at {at} {self.units[0]}" if at else ""
+        )
         return (
             f"curves on which the period-{self.firings} orbit loses its stability: {counts}{missed};"
+            f" limits were sought {sought.removesuffix(' 1')}, others are not in the chart;"
             f" from rest {100.0 * share:.0f} % of the grid settles to period {self.firings}"
         )
 
@@ -156,8 +171,9 @@ def stability_chart(
     Returns
     -------
     StabilityChart
-        With the curves on which the branch's orbit loses its stability, one through each limit of a range of
-        stability that lies on no other curve, and what trains from rest settle to.
+        With the curves on which the branch's orbit loses its stability, one through each limit that lies on
+        no other curve, and what trains from rest settle to. Limits are sought along the branch, and along the
+        second constant from two of its orbits; a curve that meets neither is not in the chart.
     """
     if isinstance(branch, Branch):
         if first is not None or firing:
@@ -178,11 +194,12 @@ def stability_chart(
     if not ends[0] <= value <= ends[1]:
         raise InputError.of("bounds", bounds, f"a range around the hammer's own {second}, {value:g}")
     chart = _Chart(branch, second, ends, Steps(most=read_count(most, "most"), precision=PRECISION))
-    # The other multiplier lies inside the unit circle there.
-    lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
-    limits = [event for event in lost if event.kind in TESTS]
-    curves, refused = chart.curves(limits, effort)
     axes, settled = settled_plane(regime, chart.plane.names, chart.plane.bounds, grid, effort.threads)
+    limits = _limits(branch)
+    starts = [start_of(branch, event, None) for event in limits]
+    across = chart.across(effort)
+    starts += [start for _, some in across for start in some]
+    curves, refused = chart.curves(starts, effort)
     return StabilityChart(
         regime=regime,
         names=(branch.parameter, second),
@@ -193,7 +210,14 @@ def stability_chart(
         grid=axes,
         settled=settled,
         refused=tuple(refused),
+        across=tuple(value for value, _ in across),
     )
+
+
+def _limits(branch: Branch) -> list[BranchEvent]:
+    """Return the events at which a branch loses its stability: the other multiplier is in the unit circle."""
+    lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
+    return [event for event in lost if event.kind in TESTS]
 
 
 class _Chart:
@@ -205,11 +229,40 @@ class _Chart:
         self.plane = Plane(branch.regime, names, own, branch.firings, branch.tolerance)
         self.value = branch.regime.value(second)
 
-    def curves(self, limits: list[BranchEvent], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
-        """Return a curve through each limit, but those that lie on one already."""
+    def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
+        """Return values of the first constant, and the limits that branches along the second meet there."""
+        branch, values = self.branch, self.branch.values
+        low, high = float(values.min()), float(values.max())
+        # A stable orbit where there is one: at its limits stability is lost.
+        among = np.flatnonzero(branch.stable) if branch.stable.any() else np.arange(len(values))
+        aims = [low + place * (high - low) for place in _ACROSS]
+        numbers = dict.fromkeys(int(among[np.argmin(np.abs(values[among] - aim))]) for aim in aims)
+
+        def along(number: int) -> tuple[float, list[Start]]:
+            value = float(values[number])
+            try:
+                other = continuation(
+                    branch.orbit(number), self.plane.names[1], self.plane.bounds[1], most=self.steps.most
+                )
+            except InputError:
+                return value, []
+            starts = [start_of(other, event, None) for event in _limits(other)]
+            return value, [
+                replace(start, first=branch.parameter, bounds=branch.bounds, value=value, other=start.value)
+                for start in starts
+            ]
+
+        return effort.quiet.mapped(along, list(numbers), length=1)
+
+    def second(self, start: Start) -> float:
+        """Return the second constant at a start."""
+        return self.value if start.other is None else start.other
+
+    def curves(self, starts: list[Start], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
+        """Return a curve through each start, but those that lie on one already."""
         curves: list[BifurcationCurve] = []
         refused: list[str] = []
-        left = [start_of(self.branch, event, None) for event in limits]
+        left = starts
         while left:
             left = [start for start in left if not any(self.on(curve, start) for curve in curves)]
             # As many at once whatever the number of threads, so that the outcome is the same.
@@ -219,13 +272,13 @@ class _Chart:
                     refused.append(curve)
                 elif not any(self.on(other, start) for other in curves):
                     curves.append(curve)
-            effort.report(len(limits) - len(left), len(limits))
+            effort.report(len(starts) - len(left), len(starts))
         return curves, refused
 
     def curve(self, start: Start) -> BifurcationCurve | str:
         """Return the curve through an event of the branch, or why there is none."""
         try:
-            traced = CurveTracer(self.plane, start.kind, self.steps).trace(start, self.value, 1)
+            traced = CurveTracer(self.plane, start.kind, self.steps).trace(start, self.second(start), 1)
         except InputError as error:
             return str(error)
         return curve_of(self.plane, traced, (0, 0), 1)
@@ -234,9 +287,10 @@ class _Chart:
         """Return whether an event of the branch lies on a curve, between two of its points."""
         if curve.kind != start.kind:
             return False
-        event = CurveTracer(self.plane, start.kind, self.steps).state_at(start, self.value)
+        second = self.second(start)
+        event = CurveTracer(self.plane, start.kind, self.steps).state_at(start, second)
         points = np.column_stack([curve.state, curve.first, curve.second]) / self.plane.scales
-        place = np.array([*event, start.value, self.value]) / self.plane.scales
+        place = np.array([*event, start.value, second]) / self.plane.scales
         along = np.diff(points, axis=0)
         lengths = (along**2).sum(axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
