@@ -42,7 +42,7 @@ from printhammer.control.table.ways import (
     solved,
     ways_of,
 )
-from printhammer.support.arrays import FloatArray, IntArray
+from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 # Distance of the periods at which a full search is run; other periods use the solutions of their neighbours,
 # s
@@ -89,7 +89,7 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
     task.report()
     if task.brake:
         _look_closely(task, periods, groups)
-    stable = (group.take(group.cost < UNSTABLE) for group in groups)
+    stable = (group.take((group.cost < UNSTABLE) & ~_is_barred(task, group)) for group in groups)
     there = [group for group in stable if group.size]
     every = joined(there)
     ends = np.cumsum([group.size for group in there])
@@ -97,6 +97,14 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
         _path(every, np.split(np.arange(every.size), ends[:-1]) if there else [], JUMP * task.scale)
     )
     return best.period, best
+
+
+def _is_barred(task: Task, ways: Ways) -> BoolArray:
+    """Mask of the candidates that failed in a table tuned before."""
+    mask = np.zeros(ways.size, np.bool_)
+    for period, delay, brake in task.barred:
+        mask |= np.isclose(ways.period, period, 1e-9) & (ways.delay == delay) & (ways.brake == brake)
+    return mask
 
 
 def spaced(periods: FloatArray, spacing: float) -> list[float]:

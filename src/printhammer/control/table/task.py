@@ -88,6 +88,10 @@ class Task:
     brake: bool
     effort: Effort
     report: Callable[[], None]
+    barred: tuple[tuple[float, float, float], ...] = ()
+    """Period, delay and width of brake pulses, s, of candidates that failed in a tuned table."""
+    located: bool = False
+    """Whether the fixed points of all rows are located, also of those that look good after two dots."""
     mean_square: bool = False
     """Whether the cost of a candidate is the RMS over all hammers instead of the worst case."""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Final, SupportsIndex, Unpack
 
 import numpy as np
@@ -121,6 +122,7 @@ SPREAD: Final = (
 _USABLE: Final = 0.9
 _GAP: Final = 6
 """Most rates of the grid that a gap may have to be searched again; arbitrary: each takes some seconds."""
+_TRIES: Final = 4  # Most times that a rate is searched again, without the candidates that failed
 _POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
 # Offsets of additional periods at which candidates are then searched, s
 _AROUND: Final = 1e-6 * np.arange(-60.0, 61.0, 15.0)
@@ -300,9 +302,29 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
     """Retune rates that are not good enough, with candidates from neighbouring periods too; in place."""
     if not poor.size:
         return
-    again = _tuned(draft.task, draft.rates[poor], around=_AROUND * draft.task.scale)
-    better = again.worst < draft.worst[poor]
-    draft.values[:, poor[better]] = again.values[:, better]
+    task = replace(draft.task, located=True)
+    for _ in range(_TRIES):
+        again = _tuned(task, draft.rates[poor], around=_AROUND * task.scale)
+        better = again.worst < draft.worst[poor]
+        draft.values[:, poor[better]] = again.values[:, better]
+        failed = ~np.isfinite(again.worst)
+        if not failed.any():
+            break
+        poor, task = (
+            poor[failed],
+            replace(task, barred=task.barred + _failed(again.rows(np.flatnonzero(failed)))),
+        )
+
+
+def _failed(draft: Draft) -> tuple[tuple[float, float, float], ...]:
+    """Return period, delay and width of the brake pulses, s, of the candidates whose rows failed."""
+    task, barred = draft.task, []
+    for gap in range(1, task.reach + 1):
+        columns = [number_of(each, task.reach) for each in histories(task.gaps, task.reach) if each[0] == gap]
+        for row in np.flatnonzero(~np.isfinite(draft.deviation[:, columns]).all(axis=1)).tolist():
+            delay, brake = draft.values[2:4, row, columns[0]].tolist()
+            barred.append((gap / float(draft.rates[row]), delay, brake))
+    return tuple(barred)
 
 
 def _tuned(

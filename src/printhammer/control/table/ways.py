@@ -246,12 +246,13 @@ def growths(task: Task, ways: Ways) -> FloatArray:
     """Compute the factor by which an error in a long row of each candidate grows from dot to dot, (ways,).
 
     NaN if it is unknown. The state after two dots is the fixed point of the row if these are right; where the
-    cost says that they are not, and the row looks stable, the fixed point is located.
+    cost says that they are not, and the row looks stable, the fixed point is located. So it is for all rows
+    if the task says so: beside a grazing there is none, however good the first dots are.
     """
     rows = rows_of(task, ways, _SECOND + MORE)
     hammers = [task.hammers[0]] * ways.size
     growth = np.abs(row_multipliers(hammers, rows, task.effort, closed=False, firing=_SECOND))
-    far = np.flatnonzero((ways.cost > BAD) & (growth <= STABLE))
+    far = np.flatnonzero(((ways.cost > BAD) | task.located) & (growth <= STABLE))
     located = row_multipliers(hammers[: far.size], [rows[k] for k in far], task.effort, firing=_SECOND)
     growth[far] = np.abs(located)
     return growth
