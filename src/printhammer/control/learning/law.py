@@ -193,7 +193,7 @@ class Verdict(NamedTuple):
     """Comparison of a table with the open loops on the hammers believed in."""
 
     gains: bool  # Whether the table is better than both open loops
-    loop: OpenLoop  # The better one of these
+    loop: OpenLoop  # What is handed out otherwise
     multiplier: float  # Largest absolute multiplier of rows printed with the table; NaN if no row is periodic
     expected: float  # Mean fraction of dots within limits, with what is handed out
     certainty: float  # Fraction of the hammers that print every dot within limits with it
@@ -360,27 +360,33 @@ class LearningLaw:
         """
         press, settings = self.production.press(alike), self.entries.settings(corrections)
         table = yield from order_good(press, [settings] * len(alike))
-        better, others = yield from better_loop(press, self.entries)
+        others = yield from order_loops(press, self.entries)
+        shares = np.array([good.mean(axis=1) for good in others])
         growth = press.multipliers(settings)
-        edge = table.mean(axis=1) - np.max([each.mean(axis=1) for each in others], axis=0)
-        harmless = bool(
-            np.quantile(edge, self.doubt) >= 0.0
-            and np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0
-        )
-        gains = harmless and float(table.mean() - others[better].mean()) >= _GAIN
-        good = table if gains else others[better]
+        steady = bool(np.quantile(np.nan_to_num(growth), 1.0 - self.doubt) <= 1.0)
+        gains = steady and self._leads(table.mean(axis=1), shares)
+        # The open loop that is better over the production, unless no likely unit loses with the other.
+        loops = self.entries.loops
+        chosen = next(k for k, loop in enumerate(loops) if loop.pulse is self.first.pulse)
+        chosen = next((k for k in range(len(loops)) if self._leads(shares[k], shares[[chosen]])), chosen)
+        good = table if gains else others[chosen]
         every = float(good.all(axis=1).mean())
-        loop = self.entries.loops[better]
-        return Verdict(gains, loop, float(np.fmax.reduce(growth)), float(good.mean()), every)
+        return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
+
+    def _leads(self, share: FloatArray, others: FloatArray) -> bool:
+        """Whether hammers (M,) print more dots in the mean than in other ways (ways, M), and none fewer."""
+        harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
+        return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 
 
-def better_loop(press: Press, entries: Adjustable) -> Printing[tuple[int, list[BoolArray]]]:
-    """Return the index of the open loop with more good dots, and the good dots of each, as `order_good`."""
+def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
+    """Return which dots of `PRINTED` are within limits, (M, dots), in each open loop, as `order_good`."""
     count = len(press.hammers)
-    good = yield from together(
-        [order_good(press, [loop.settings] * count, [loop.pulse] * count) for loop in entries.loops]
+    return (
+        yield from together(
+            [order_good(press, [loop.settings] * count, [loop.pulse] * count) for loop in entries.loops]
+        )
     )
-    return int(np.argmax([each.mean() for each in good])), good
 
 
 def order_good(

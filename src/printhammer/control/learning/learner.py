@@ -28,7 +28,10 @@ MISFIT: Final = 2.0
 
 Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the sensor."""
 
-_STARTED: Final = 2  # How often, at most, a table is tuned for the hammer believed in
+_STARTED: Final = 3  # How often, at most, a table is tuned for the hammer believed in
+_LATE: Final = (
+    2  # Stages after which the belief is narrow enough to do that since rows do not hold; arbitrary
+)
 
 
 class Mean(NamedTuple):
@@ -126,13 +129,15 @@ class Learner:
                 line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
             )
         update = yield from law.update(self.belief, self.corrections, unexplained)
-        if update.left > BAD and self._started < _STARTED:
+        # Where rows of the unit do not hold with these ways to fire, a table for it may have others.
+        grows = update.verdict.multiplier > 1.0 and self.stage >= _LATE
+        if (update.left > BAD or grows) and self._started < _STARTED:
             self._started += 1
             other = law.started_anew(self.belief)
             if other is not None:
                 fresh = np.zeros(other.entries.inputs.shape[1])
                 again = yield from other.update(self.belief, fresh, unexplained)
-                if again.left < update.left:
+                if (again.verdict.gains, -again.left) > (update.verdict.gains, -update.left):
                     self.law, update = other, again
         self.corrections, self.verdict = update.corrections, update.verdict
         if self.misfit > MISFIT:

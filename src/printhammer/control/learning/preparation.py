@@ -7,7 +7,7 @@ from typing import Any, Final, SupportsIndex
 
 import numpy as np
 
-from printhammer.control.learning.law import ADVANCE, WIDTH, Adjustable, LearningLaw, OpenLoop, better_loop
+from printhammer.control.learning.law import ADVANCE, WIDTH, Adjustable, LearningLaw, OpenLoop, order_loops
 from printhammer.control.learning.lines import Rung, Surrogate, candidates, choose, printed
 from printhammer.control.learning.production import Production
 from printhammer.control.learning.sensor import ImpactSensor
@@ -119,7 +119,7 @@ def _law(
     seen = np.concatenate(list(both), axis=1)
     shown = tuple(Surrogate.of(own, each) for each in seen.T)
     few = production.press([hammer for _row, hammer in drawn[:_FEW]])
-    first = entries.loops[printed(better_loop(few, entries), task)[0]]
+    first = entries.loops[int(np.argmax([good.mean() for good in printed(order_loops(few, entries), task)]))]
     return LearningLaw(entries, production, forgetting, doubt, seed, rungs, shown, rows, seen, first)
 
 
