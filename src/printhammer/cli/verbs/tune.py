@@ -206,7 +206,7 @@ _PANEL: Final = "The sensor"
     },
     out=opt.results("Dots printed at each stage"),
     table=opt.files("Learned compensation table (.csv, .json, .h, ...).", *opt.DATA, ".h", pictures=False),
-    believed=opt.file("Hammer file with the estimated constants, for `printhammer feedback`.", ".toml"),
+    believed=opt.file("Hammer file with the estimated constants of the unit.", ".toml"),
 )
 def learn(
     job: Job,

@@ -223,7 +223,7 @@ class Learning(Result, rows=_DOTS):
 
     @property
     def believed_hammer(self) -> Hammer:
-        """The nominal hammer with the estimated constants of the unit, such as for `printhammer.feedback`."""
+        """The nominal hammer with the estimated constants of the unit."""
         spread = self.variability.constants(self.hammer)
         off = self.believed - np.array([self.hammer.constants[name].si for name in spread])
         sigma = np.array(list(spread.values()))
