@@ -1,0 +1,139 @@
+"""Try every verb on every device that ships beside the print hammer, and write what comes of it.
+
+Run it with ``.venv/bin/python docs/measure/devices.py``; it takes half an hour. Names of devices or verbs as
+arguments try these alone, print their answers and write nothing. Each cell is the verb with its defaults, at
+a size that takes seconds, in a folder of its own; the table is written anew after each verb.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+import shlex
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from importlib import import_module
+from typing import NoReturn
+
+from measured import MOTION, Cell, Column, write
+
+import printhammer as ph
+from printhammer.run.window import scaled_rate
+
+# The program depends on every room; what is told here depends on the motions.
+program = import_module("printhammer.cli.main").main
+
+DEVICES = (
+    "impact-wire",
+    "dot-peen",
+    "braille-embosser",
+    "relay-5v",
+    "pot-magnet",
+    "pinball-coil",
+    "pinball-flipper",
+)
+
+VERBS = {
+    "run": "run {device}",
+    "duty": "duty {device} --thermal-resistance '12 K/W' --limit '91 degC' --ambient '25 degC'",
+    "energy": "energy {device} --dots 1",
+    "feedback": "feedback {device}",
+    "map": "map {device} --rates 12 --times 64",
+    "strobe": "strobe {device} --period {period} --points 20 --no-verdict",
+    "impact-time": "impact-time {device} --dots 10 --hammers 3",
+    "quality": "quality {device} --rate {rate} --pattern 1101",
+    "print": "print I --hammer {device} --rate {rate} --out page.png",
+    "bifurcation": "bifurcation {device} --values 4 --firings 30 --refine 0 --no-exponents",
+    "basins --quench": "basins {device} --quench --gaps {gaps} --widths {widths}",
+    "dead-time": "dead-time {device} --voltage {voltage} --temperature '20 degC, 20 degC, 1'",
+    "measure all": "measure all {device} --out bench",
+}
+"""A command line for each verb; the rate is that which 300 Hz are for the hammer of the paper."""
+
+LIMIT = 60  # Longest time of a cell, s
+
+
+class TooLongError(Exception):
+    """A cell takes longer than `LIMIT`."""
+
+
+def late(*_: object) -> NoReturn:
+    """Interrupt a cell."""
+    raise TooLongError
+
+
+def slots(device: str) -> dict[str, str]:
+    """Return rate, period and widths of the second pulse for a device, as texts."""
+    hammer = ph.load(device)
+    rate = scaled_rate(hammer, 300.0)
+    width, voltage = (float(getattr(hammer.waveform, name, 0.0)) for name in ("width", "voltage"))
+    return {
+        "rate": f"'{rate:g} Hz'",
+        "period": f"'{1e3 / rate:g} ms'",
+        "gaps": f"'{0.2e3 / rate:g} ms, {0.3e3 / rate:g} ms, 4'",
+        "widths": f"'{0.5e3 * width:g} ms, {1.5e3 * width:g} ms, 4'",
+        "voltage": f"'{voltage:g} V, {voltage:g} V, 1'",
+    }
+
+
+def tried(verb: str, device: str) -> tuple[int | None, str]:
+    """Return exit status (None: too long) and the last sentence of a cell, and print its answer."""
+    arguments = shlex.split(VERBS[verb].format(device=device, **slots(device)))
+    out, err = io.StringIO(), io.StringIO()
+    status: int | None = 0
+    began, before = time.monotonic(), os.getcwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        signal.alarm(LIMIT)
+        try:
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+                program(arguments)
+        except SystemExit as end:
+            status = int(end.code or 0)
+        except TooLongError:
+            status = None
+        except Exception:  # noqa: BLE001 - a traceback is what a cell must not show
+            status = -1
+            traceback.print_exc(file=err)
+        finally:
+            signal.alarm(0)
+            os.chdir(before)
+    said = [line for line in err.getvalue().splitlines() if line.startswith("printhammer: ")]
+    sentence = said[-1].removeprefix("printhammer: ") if said else err.getvalue()[-200:]
+    head = f"##### {verb} {device}: {status}, {time.monotonic() - began:.0f} s"
+    print(f"\n{head}\n{out.getvalue()}{err.getvalue()}", flush=True)
+    return status, sentence
+
+
+WORDS = {0: "yes", 1: "in part", 2: "no", None: f"over {LIMIT} s"}
+"""Cell of the table by exit status."""
+
+
+def main() -> None:
+    """Try the cells, and write the table if they are all."""
+    signal.signal(signal.SIGALRM, late)
+    asked = sys.argv[1:]
+    devices = [name for name in DEVICES if name in asked] or list(DEVICES)
+    verbs = [name for name in VERBS if name in asked] or list(VERBS)
+    rows: list[list[Cell]] = []
+    for verb in verbs:
+        cells = [tried(verb, device) for device in devices]
+        reasons = [
+            re.sub(rf"^{device}(\.toml)?: ", "", sentence)
+            for device, (status, sentence) in zip(devices, cells, strict=True)
+            if status in (1, 2)
+        ]
+        why = "; ".join(dict.fromkeys(reasons))
+        rows.append([verb, *(WORDS.get(status, "error") for status, _sentence in cells), why])
+        if not asked:
+            columns = [Column(name=name) for name in ("verb", *devices, "why not")]
+            write("devices", columns, rows, {"limit": LIMIT}, MOTION, DEVICES)
+
+
+if __name__ == "__main__":
+    main()
