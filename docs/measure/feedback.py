@@ -50,7 +50,7 @@ SEEDS = range(1, 6)
 ASKED = 2.2
 """How many times faster than the open loop feedback is asked to be."""
 SIX = ("hendriks-1983", "02", "06", "10", "14", "18")
-ROOMS = (*MOTION, "derivatives", "control/feedback", "printing")
+ROOMS = (*MOTION, "derivatives", "control/feedback", "control/pulses", "printing")
 OFF = {
     "current −3 or +3 %": [Perturbation(current=share) for share in (-0.03, 0.03)],
     "travel −10 or +10 µm": [Perturbation(travel=way) for way in (-10e-6, 10e-6)],
