@@ -19,6 +19,7 @@ def by_hand(hammer: ph.Hammer) -> Feedback:
     force[0, 0, 3] = np.nan
     return Feedback(
         hammer=hammer,
+        believed=hammer,
         driven=hammer,
         driver=driver_of(hammer),
         sensor=PositionSensor(),

@@ -139,6 +139,10 @@ def feedback(
         "Quantisation step of the sensor, as a fraction of the travel to the pack (default: 1/1024)."
     ),
     seed: int | None = opt.whole("Seed of the sensor noise (default: 0)."),
+    unit: Path | None = opt.source("Hammer file of the driven unit (default: the nominal hammer)."),
+    believed: Path | None = opt.source(
+        "Hammer file for which the controller is designed, from `learn --believed` (default: nominal)."
+    ),
     supply: float = opt.number("Current of the driven hammer, as a fraction of nominal.", default=1.0),
     travel: float | None = opt.quantity(
         "m", "LENGTH", "Extra distance of the driven hammer's pack, e.g. '10 um' (default: 0)."
@@ -158,13 +162,16 @@ def feedback(
     from printhammer.control.table.compensation import TableStrategy, load_table
     from printhammer.drive.file import save_drive
     from printhammer.drive.input import read_positive
+    from printhammer.hammer.hammer import load
     from printhammer.printing.rates.variability import Perturbation, perturbed
 
     if beside is not None:
         passed["beside"] = [TableStrategy(load_table(beside), hammer)]
     change = Perturbation(current=read_positive(supply, "1", "supply") - 1.0, travel=travel or 0.0)
     sensor = PositionSensor(**opt.given(noise=noise, delay=delay, interval=interval, step=step, seed=seed))
-    driven = perturbed(hammer, change)
+    driven = perturbed(hammer if unit is None else load(unit), change)
+    if believed is not None:
+        passed["believed"] = load(believed)
     with job.counting("tables, closed loops") as tell:
         result = compared(
             hammer, rate or rate_text(hammer, 1600.0), driven=driven, sensor=sensor, progress=tell, **passed

@@ -26,7 +26,7 @@ from printhammer.drive.input import read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
-from printhammer.printing.dots.nominal import Nominal
+from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.printing.dots.strategy import Strategy, name_of, open_loop, slots_of
 from printhammer.printing.dots.trial import Case, attempt
 from printhammer.printing.rates.safe_rate import from_rest
@@ -71,7 +71,8 @@ _DOTS: Final = "strategy pattern dot"
 class Feedback(Result, rows=_DOTS):
     """Comparison of drive strategies; feedback is the last one."""
 
-    hammer: Hammer = part("nominal hammer, for which the controller is designed")
+    hammer: Hammer = part("nominal hammer")
+    believed: Hammer = part("hammer for which the controller is designed", repr=False)
     driven: Hammer = part("driven hammer")
     driver: Driver = part("driver of the coil for feedback")
     sensor: PositionSensor = part("sensor of the controller")
@@ -136,6 +137,7 @@ class Feedback(Result, rows=_DOTS):
         """Return driver, sensor, limits, and the pattern of the recorded run."""
         return {
             "driven_fingerprint": self.driven.fingerprint,
+            "believed_fingerprint": self.believed.fingerprint,
             "largest_current": self.driver.current,
             "edge": self.driver.edge,
             **{f"sensor_{name}": value for name, value in asdict(self.sensor).items()},
@@ -157,6 +159,7 @@ def feedback(
     rate: float | str,
     *,
     driven: Hammer | None = None,
+    believed: Hammer | None = None,
     sensor: PositionSensor | None = None,
     current: float | str | None = None,
     edge: float | str | None = None,
@@ -176,6 +179,9 @@ def feedback(
         Slot rate, Hz, or text with a unit.
     driven : Hammer, optional
         The driven hammer; by default the nominal one.
+    believed : Hammer, optional
+        Hammer for which the controller is designed, such as `Learning.believed_hammer`; by default the
+        nominal one. The requested dots are those of the nominal hammer.
     sensor : PositionSensor, optional
         Sensor of the controller; by default with 1 % noise and 20 us delay.
     current : float or str, optional
@@ -210,7 +216,10 @@ def feedback(
         effort.report(done, steps)
 
     tell(0, steps)
-    controller = Controller(hammer, driver, bounds, threads=effort.threads, progress=tell)
+    known = hammer if believed is None else believed
+    controller = Controller(
+        known, driver, bounds, single=nominal(hammer), threads=effort.threads, progress=tell
+    )
     own = FeedbackStrategy(controller, position_sensor, tolerance=effort.tolerance, threads=effort.threads)
     every: list[Strategy] = [open_loop, *beside, own]
     if between is None:
@@ -228,6 +237,7 @@ def feedback(
     judged = [trial.judgement for trial in trials]
     return Feedback(
         hammer=hammer,
+        believed=known,
         driven=actual,
         driver=driver,
         sensor=position_sensor,

@@ -33,7 +33,7 @@ from printhammer.control.feedback.soft_landing import launch
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
-from printhammer.printing.dots.nominal import nominal
+from printhammer.printing.dots.nominal import Nominal, nominal
 from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
@@ -80,8 +80,9 @@ class Ahead(NamedTuple):
 class Controller:
     """A controller designed for a nominal hammer and the driver of its coil.
 
-    The hammer needs a pack and a backstop. `limits` normalise the deviations of dots; `threads` defaults to
-    one per core; `progress` is called with the number of finished steps and of all steps of `fronts`.
+    The hammer needs a pack and a backstop. `limits` normalise the deviations of dots; `single` is the
+    requested dot, by default the single-pulse dot of the hammer; `threads` defaults to one per core;
+    `progress` is called with the number of finished steps and of all steps of `fronts`.
 
     Raises
     ------
@@ -95,6 +96,7 @@ class Controller:
         driver: Driver,
         limits: Limits | None = None,
         *,
+        single: Nominal | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> None:
@@ -104,7 +106,7 @@ class Controller:
                 f"{hammer.path}: the hammer has no {missing}", file=hammer.path, key=missing, expected="one"
             )
         self.limits = Limits() if limits is None else limits
-        self.plant = plant = Plant(hammer, driver, nominal(hammer), threads)
+        self.plant = plant = Plant(hammer, driver, nominal(hammer) if single is None else single, threads)
         self.hammer, self.driver = hammer, driver
         self.single, self.stroke = plant.single, plant.stroke
         forces = force_map(plant)
