@@ -31,14 +31,14 @@ _SPAN: Final = 2.0  # Length of the first simulation, in pulse widths
 _DOUBLINGS: Final = 6
 
 
-def current_bound(hammer: Hammer, largest: float | str | None = None) -> float:
+def current_bound(hammer: Hammer, largest: float | str | None = None, key: str = "largest_current") -> float:
     """Return a bound on the current, A, from a number, a text with a unit or, for None, the device.
 
     That of a device is 2 A or, if that is more, what its own pulse reaches at the largest width, rounded up
     to 0.1 A.
     """
     if largest is not None:
-        return read_positive(largest, "A", "largest_current")
+        return read_positive(largest, "A", key)
     pulse: Any = hammer.waveform
     if pulse is None or pulse.quantity == "force":
         return LARGEST_CURRENT

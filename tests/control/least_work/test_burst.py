@@ -302,5 +302,7 @@ def test_pulses_without_a_width_are_refused(monkeypatch: pytest.MonkeyPatch) -> 
         PulsePlan(task, record, 1e-3, 1e-4, 1e-3, 1e-3, 5e-5)
     with refused("width"):
         ph.least_work(
-            hammers.crude().replace("waveform", HalfSine(amplitude=4.0, width=4e-4)), shape="pulses"
+            hammers.crude().replace("waveform", HalfSine(amplitude=4.0, width=4e-4)),
+            shape="pulses",
+            largest="2 A",
         )

@@ -424,7 +424,7 @@ def least_work(
             key="waveform",
             expected="a current: the burst is planned in currents, which a driver of the coil does not set",
         )
-    top = current_bound(hammer, largest)
+    top = current_bound(hammer, largest, "largest")
     steepest = steepest_rise(waveform) if slew is None else read_number(slew, "A/s", "slew")
     if shape == "pulses":
         steepest = math.inf

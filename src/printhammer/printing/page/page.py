@@ -446,7 +446,7 @@ def _dots_of(trial: Trial) -> dict[str, Any]:
         "flight_time": dots.flight_time[wanted],
         "peak_force": dots.peak_force[wanted],
         "indentation": dots.indentation[wanted],
-        "extra_contacts": judged.extra_contacts[wanted],
+        "extra_contacts": np.where(dots.struck, dots.extra_contacts, 0)[wanted],
         "extra_of": place[extra.member, extra.firing],
         "extra_arrival": late,
         "extra_force": extra.peak_force,

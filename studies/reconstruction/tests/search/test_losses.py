@@ -104,7 +104,7 @@ def test_no_loss_where_the_claim_holds_and_some_where_it_fails() -> None:
 
 @pytest.mark.slow
 def test_losses_and_verdicts_of_many_candidates() -> None:
-    shipped = candidates(near_points(24, 5, 0.002, "hendriks-1983"))
+    shipped = candidates(near_points(24, 5, 0.002, "hendriks-1983-1"))
     chosen = (*some_candidates(200, 48, 5), *(one for one in shipped if one is not None))
     scores = looked_at(chosen)
     assert check(chosen, QUICK, scores) > 0.8 * len(QUICK) * len(chosen)
@@ -253,7 +253,7 @@ def test_panels_of_short_trains_are_mostly_those_of_the_claim() -> None:
 
 @pytest.mark.slow
 def test_the_looks_of_map_and_cloud_are_about_those_of_the_claims() -> None:
-    shipped = candidates(near_points(3, 5, 0.002, "hendriks-1983"))
+    shipped = candidates(near_points(3, 5, 0.002, "hendriks-1983-1"))
     chosen = tuple(each for each in shipped if each is not None)
     scores = looked_at(chosen)
     panels(chosen, scores)
@@ -283,9 +283,9 @@ def test_what_just_fails_counts_where_the_number_of_claims_leads() -> None:
 
 
 def test_region_and_clouds_agree_with_the_claims() -> None:
-    """The shipped hammer has neither, the best that the search knows has both."""
+    """The former hammer has neither, the best that the search knows has both."""
     best = json.loads(BEST.read_text("utf-8").splitlines()[0])
-    points = [best["point"], *near_points(1, 5, 0.0, "hendriks-1983")]
+    points = [best["point"], *near_points(1, 5, 0.0, "hendriks-1983-1")]
     names = ("chaotic_region", "behind_the_backstop")
     for (candidate, score), verdict in zip(evaluate(points, "claims"), ("holds", "fails"), strict=True):
         assert candidate is not None
