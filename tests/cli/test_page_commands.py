@@ -30,6 +30,7 @@ ELSEWHERE = {
     "printhammer basins hendriks-1983 --period '1.05 ms' --x '30 um, 260 um, 24'": (
         "takes a minute; with another hammer in chaos/test_basins.py"
     ),
+    "printhammer learn mine.toml": "on the page on learning, with another hammer",
     "printhammer fit coil": "in test_fit_coil.py, which has hammers with records of their currents",
 }
 # What takes minutes as printed runs with fewer values.
@@ -47,8 +48,7 @@ FEWER = {
     "tune mine.toml": "tune mine.toml --history 1 --no-judge",
     "--longest 4": "--longest 1 --starts 20",
     "--longest 3 --out regimes": "--longest 1 --seeds 1 --most 20 --out regimes",
-    "learn hendriks-1983": "learn hendriks-1983 --members 100",
-    "learn mine.toml": "learn mine.toml --members 100",
+    "learn hendriks-1983-1": "learn hendriks-1983-1 --members 100",
     "--doublings 1": "--doublings 1 --most 20",
     "--second backstop": "--grid 3 --most 5 --second backstop",
     "--yield 64": "--yield 2",

@@ -75,7 +75,7 @@ def stream(monkeypatch: pytest.MonkeyPatch, name: str, encoding: str) -> io.Byte
 def test_an_output_of_ascii_gets_plain_text(monkeypatch: pytest.MonkeyPatch) -> None:
     out, err = stream(monkeypatch, "stdout", "ascii"), stream(monkeypatch, "stderr", "ascii")
     with pytest.raises(SystemExit, match="0"):
-        main(["hammer", "show"])
+        main(["hammer", "show", "hendriks-1983-1"])
     assert b"0.41 um deep in the backstop" in out.getvalue()
     with pytest.raises(SystemExit, match="2"):
         main(["hammer", "show", "caf\N{LATIN SMALL LETTER E WITH ACUTE}-\N{GREEK SMALL LETTER OMEGA}.toml"])

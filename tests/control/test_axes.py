@@ -23,12 +23,12 @@ SLOTS = (0, 1, 2, 4, 5, 8)
 
 @pytest.fixture(scope="module")
 def tables() -> AxisTables:
-    return tune_along(ph.load("hendriks-1983"), "gap", GAPS, rate=RATE, history=1)
+    return tune_along(ph.load("hendriks-1983-1"), "gap", GAPS, rate=RATE, history=1)
 
 
 @pytest.mark.parametrize("gap", [-10e-6, 5e-6, 10e-6])
 def test_dots_are_those_of_the_design(tables: AxisTables, gap: float) -> None:
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     single = nominal(hammer)
     driven = perturbed(hammer, Perturbation(travel=gap))
     drive = tables.at(gap).strategy(hammer)(driven, [SLOTS], RATE)[0]
@@ -47,7 +47,7 @@ def test_files_and_the_header(tables: AxisTables, tmp_path: Path) -> None:
     assert len(tables.to_dataframe()) == 3 * len(tables.tables[0].to_dataframe())
     text = tables.to_header("1 us", budget=tables.size("1 us"))
     (tmp_path / "t.h").write_text(text)
-    prefix = "printhammer_hendriks_1983_1275hz_gap"
+    prefix = "printhammer_hendriks_1983_1_1275hz_gap"
     entries = tables.tables[0].advance.shape[1]
     columns = [
         f"{prefix}_{name}"
@@ -116,7 +116,7 @@ def test_firmware_interpolates_to_the_tick(tables: AxisTables, tmp_path: Path, t
         last.advance.shape[1],
         [-12000, -10000, -7001, -1, 0, 1, 3333, 4999, 5001, 7777, 10000, 11000],
     )
-    prefix = "printhammer_hendriks_1983_1275hz_gap"
+    prefix = "printhammer_hendriks_1983_1_1275hz_gap"
     (tmp_path / "main.c").write_text(f"""
 #include "t.h"
 #include <stdio.h>
@@ -147,7 +147,7 @@ int main(void) {{
 
 
 def test_bad_axes_are_refused(tables: AxisTables) -> None:
-    hammer = ph.load("hendriks-1983")
+    hammer = ph.load("hendriks-1983-1")
     for axis, values, key in (
         ("weather", GAPS, "axis"),
         ("rail", ("90 V", "100 V"), "rail.axis"),

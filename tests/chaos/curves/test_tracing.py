@@ -30,9 +30,7 @@ def henon() -> Traced:
 
 
 @pytest.mark.parametrize(("beyond", "sign"), [(0.2, 1.0), (-0.25, -1.0)])
-def test_a_curve_goes_on_at_another_section(
-    beyond: float, sign: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_curve_goes_on_at_another_section(beyond: float, sign: float) -> None:
     """At the first section there is no map beyond a value of the second constant, at another one there is."""
     image = known_maps.image_by(HENON)
 
@@ -45,11 +43,11 @@ def test_a_curve_goes_on_at_another_section(
         late = abs(at.value(NAMES[1])) > 0.1
         return (dataclasses.replace(at, phase=0.5), state) if late else (at, state)
 
-    with standing_in(HENON):
+    with standing_in(HENON), pytest.MonkeyPatch.context() as patch:
         for module in ("systems", "normal_forms"):
-            monkeypatch.setattr(f"printhammer.chaos.curves.{module}.image_of", image_of)
+            patch.setattr(f"printhammer.chaos.curves.{module}.image_of", image_of)
         for module in ("tracing", "normal_forms"):
-            monkeypatch.setattr(f"printhammer.chaos.curves.{module}.quiet_section", quiet)
+            patch.setattr(f"printhammer.chaos.curves.{module}.quiet_section", quiet)
         traced = CurveTracer(PLANE, "period doubling", STEPS).trace(BEGIN, 0.0, 1)
     assert [stop.reason for stop in traced.stops] == ["bound", "bound"]
     assert len(traced.pieces) == 2
@@ -64,15 +62,15 @@ def test_a_curve_goes_on_at_another_section(
     assert all(node.tangent[-1] > 0.0 for node in traced.nodes)
 
 
-def test_where_there_is_no_other_section_the_curve_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_there_is_no_other_section_the_curve_ends() -> None:
     image = known_maps.image_by(HENON)
 
     def image_of(at: Regime, state: Array, firings: int, tolerance: float, **options: Any) -> Image:
         whole = image(at, state, firings, tolerance, **options)
         return dataclasses.replace(whole, status="stopped") if at.value(NAMES[1]) > 0.2 else whole
 
-    with standing_in(HENON):
-        monkeypatch.setattr("printhammer.chaos.curves.systems.image_of", image_of)
+    with standing_in(HENON), pytest.MonkeyPatch.context() as patch:
+        patch.setattr("printhammer.chaos.curves.systems.image_of", image_of)
         traced = CurveTracer(PLANE, "period doubling", STEPS).trace(BEGIN, 0.0, 1)
     assert traced.stops[0].reason == "bound"
     assert traced.stops[1].parameter == pytest.approx(0.2, abs=1e-5)

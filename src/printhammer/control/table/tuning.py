@@ -302,7 +302,7 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
     """Retune rates that are not good enough, with candidates from neighbouring periods too; in place."""
     if not poor.size:
         return
-    task = replace(draft.task, located=True)
+    task = draft.task
     for _ in range(_TRIES):
         again = _tuned(task, draft.rates[poor], around=_AROUND * task.scale)
         better = again.worst < draft.worst[poor]
@@ -310,10 +310,8 @@ def _tune_again(draft: Draft, poor: IntArray) -> None:
         failed = ~np.isfinite(again.worst)
         if not failed.any():
             break
-        poor, task = (
-            poor[failed],
-            replace(task, barred=task.barred + _failed(again.rows(np.flatnonzero(failed)))),
-        )
+        barred = task.barred + _failed(again.rows(np.flatnonzero(failed)))
+        poor, task = poor[failed], replace(task, barred=barred, located=True)
 
 
 def _failed(draft: Draft) -> tuple[tuple[float, float, float], ...]:
