@@ -204,4 +204,4 @@ def test_a_warm_coil_is_on_longer(behind_a_rail: ph.Hammer) -> None:
     assert steps == sorted(steps)
     assert steps[-1][0] <= steps[-1][1]
     with refused("rail.waveform"):
-        tune_along(behind_a_rail, "rail", ["100 V", "130 V"], rate=RATE)
+        tune_along(behind_a_rail, "rail", ["100 V", "130 V"], rate=RATE, largest_current="2 A")
