@@ -75,7 +75,7 @@ def test_longer_histories_begin_with_shorter_ones(table: CompensationTable) -> N
 @pytest.mark.slow
 def test_the_current_keeps_to_its_bound_also_with_brake_pulses() -> None:
     hammer = quick()
-    found = ph.tune(hammer, rates=[1100.0, 1150.0], history=1, largest_current=1.3)
+    found = ph.tune(hammer, rates=[1200.0, 1300.0], history=1, largest_current=1.3)
     assert found.brake_width.max() > 0.0
     for rate in found.rates.tolist():
         drive = found.drive(hammer, SLOTS, rate)

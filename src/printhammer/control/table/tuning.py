@@ -25,7 +25,7 @@ from printhammer.control.table.drive import (
     print_pulse,
 )
 from printhammer.control.table.search import SPACING, chosen, searched, spaced
-from printhammer.control.table.task import Single, Task, single_of
+from printhammer.control.table.task import Single, Task, search_scale, single_of
 from printhammer.control.table.ways import BAD, ROUNDS, costs, solved, ways_of
 from printhammer.drive.input import read_count, read_positive
 from printhammer.errors import InputError
@@ -33,7 +33,6 @@ from printhammer.hammer.hammer import Hammer
 from printhammer.printing.dots.judging import Limits
 from printhammer.printing.rates.variability import Perturbation, Variability, perturbed
 from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
-from printhammer.run.window import time_scale
 from printhammer.support.arrays import FloatArray, IntArray
 
 HALVINGS: Final = 3  # Maximum number of bisections of the step between two rates
@@ -204,7 +203,7 @@ def tune(
     if rate is not None and rates is not None:
         raise InputError("rate and rates are given", key="rates", expected="one of them")
     asked = [rate] if rate is not None else rates
-    scale = time_scale(driven, pulse)
+    scale = search_scale(driven, pulse)
     grid = _all_rates(single, scale) if asked is None else _given_rates(asked)
     nodes = len(spaced(_periods(grid, far, single), SPACING * scale))
     # One report per searched period, one per Newton step, with and without dense patterns.
