@@ -1,4 +1,4 @@
-"""Try every verb on every device that ships beside the print hammer, and write what comes of it.
+"""Run every verb on every device that ships beside the print hammer, and write a table of the outcomes.
 
 Run it with ``.venv/bin/python docs/measure/devices.py``; it takes half an hour. Names of devices or verbs as
 arguments try these alone, print their answers and write nothing. Each cell is the verb with its defaults, at

@@ -89,10 +89,13 @@ def _orbits(
 
 
 def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bool]:
-    """Return what asks of successive nodes whether an impact fades toward a grazing, at ever lower speeds."""
+    """Create the predicate of two successive nodes: whether an impact between them fades toward a grazing.
+
+    A grazing is located only where the speed of the impact has fallen well below that at the last attempt.
+    """
     tried = math.inf
 
-    def asked(here: Node, ahead: Node) -> bool:
+    def is_fading(here: Node, ahead: Node) -> bool:
         nonlocal tried
         before, slow = _slowest(here), _slowest(ahead)
         fast = float(scales[1])
@@ -103,7 +106,7 @@ def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bo
         tried = slow
         return grazing_end(family, scales, ahead, impacts=True) is not None
 
-    return asked
+    return is_fading
 
 
 def _slowest(node: Node) -> float:

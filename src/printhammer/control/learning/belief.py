@@ -39,7 +39,7 @@ _FINE: Final = 0.01  # Of those that say how well constants are known: what expl
 _ITERATIONS: Final = 10  # At most, at a level
 _STILL: Final = 0.03  # Step at which a level is over, in standard deviations
 _GAIN: Final = 0.01  # Of the objective, below which a step is none
-_OUTLIER: Final = 5.0  # Standard deviations beyond which what is left of a reading counts as this
+_OUTLIER: Final = 5.0  # Largest residual that counts in the misfit, in standard deviations; arbitrary
 _EXPLAINED: Final = 2.0  # Mean square of what is left of readings, in variances, that explains them
 
 
@@ -65,7 +65,7 @@ class Mode:
     predicted: FloatArray  # Readings of a unit with these constants, (readings,)
     level: float  # At which the readings are explained
     objective: float  # Less the logarithm of the probability density, but for a constant
-    misfit: float = 0.0  # RMS of what is left of the readings, in standard deviations of their noise
+    misfit: float = 0.0  # RMS of the residuals of the readings, in standard deviations of their noise
 
     def apart(self, other: Mode) -> float:
         """Return how far another mode is off, in standard deviations of this one."""
@@ -157,14 +157,14 @@ def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> 
     # What is not explained is as much of a reason to doubt as noise is.
     covariance = np.asarray(max(misfit, 1.0) * np.linalg.inv(normal), np.float64)
     finest = _objective(place.constants[None], place.shown[None], evidence.value, evidence.at(LEVELS[-1]))
-    left = _left(place.shown, evidence)
-    return Mode(place.constants, covariance, place.shown, level, float(finest[0]), left)
+    misfit = _misfit(place.shown, evidence)
+    return Mode(place.constants, covariance, place.shown, level, float(finest[0]), misfit)
 
 
-def _left(shown: FloatArray, evidence: Evidence) -> float:
-    """Return the RMS of what is left of readings, in standard deviations, outliers cut off.
+def _misfit(shown: FloatArray, evidence: Evidence) -> float:
+    """Compute the RMS of the residuals of the readings, in standard deviations, clipped at `_OUTLIER`.
 
-    A dot that is seen and not predicted is an outlier.
+    An observed dot that the model does not predict counts as an outlier.
     """
     seen = np.isfinite(evidence.value)
     rest = np.abs((evidence.value - shown) / evidence.noise)[seen]

@@ -165,7 +165,7 @@ BAD: Final = 10.0
 _SLOW: Final = 0.85  # Part of the badness of the time before below which it pays to go on
 _LEAST_LAW: Final = 1e-2  # Least part of what is not explained that is put right
 _OTHERS: Final = 4  # Number of probable hammers for which corrections must not move apart
-_ALIKE: Final = 24  # Number of probable hammers that decide whether the table is handed out
+_ALIKE: Final = 24  # Number of probable hammers that decide whether the table is used
 _GAIN: Final = 0.02  # Least share of the dots that the table gains in the mean over these
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
 """Slots of the line that corrections are tried on, on hammers that are believed in: the cycle of order 6."""
@@ -193,9 +193,9 @@ class Verdict(NamedTuple):
     """Comparison of a table with the open loops on the hammers believed in."""
 
     gains: bool  # Whether the table is better than both open loops
-    loop: OpenLoop  # What is handed out otherwise
+    loop: OpenLoop  # The open loop that is used otherwise
     multiplier: float  # Largest absolute multiplier of rows printed with the table; NaN if no row is periodic
-    expected: float  # Mean fraction of dots within limits, with what is handed out
+    expected: float  # Mean fraction of dots within limits, with the drive that is used
     certainty: float  # Fraction of the hammers that print every dot within limits with it
 
 

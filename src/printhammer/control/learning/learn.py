@@ -46,7 +46,7 @@ class Progress(NamedTuple):
     cycle: Judgement  # Of `PRINTED`
     line: Judgement
     # What the readings say, arrays of shape (units,); NaN before there are any
-    learned: BoolArray  # Whether the learned table is handed out, not an open loop
+    learned: BoolArray  # Whether the learned table is used, not an open loop
     misfit: FloatArray  # RMS of the residuals of the readings, in standard deviations
     multiplier: FloatArray
     expected: FloatArray
@@ -107,7 +107,7 @@ def calibrate(
 
 
 def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Hammer) -> CompensationTable:
-    """Return what a learner hands out as a table for a hammer.
+    """Convert the drive that a learner has chosen, its table or an open loop, to a table for a hammer.
 
     `base` is the table that it started from, tuned on what a driver makes of the hammer.
     """
@@ -146,19 +146,19 @@ class Learning(Result, rows=_DOTS):
     limits: Limits = part("how far a dot may be off")
     dots: IntArray = coordinate("1", "dots of test lines printed before", "stage", name="dots_learned")
     learned: BoolArray = column(
-        "1", "whether the learned table is handed out, not an open loop", "stage", dtype=np.int8
+        "1", "whether the learned table is used, not an open loop", "stage", dtype=np.int8
     )
     misfit: FloatArray = column(
         "1",
         "RMS of the residuals of the readings, in standard deviations of their noise",
         "stage",
-        more="NaN before there are readings; above 2 no table is handed out",
+        more="NaN before there are readings; above 2 no table is used",
     )
     multiplier: FloatArray = column(
         "1",
         "largest multiplier of rows printed with the table by likely units",
         "stage",
-        more="NaN before there are readings, and where no row is periodic; above 1 no table is handed out",
+        more="NaN before there are readings, and where no row is periodic; above 1 no table is used",
     )
     expected: FloatArray = column(
         "1",
@@ -284,9 +284,9 @@ def learn(
     run to run the learner corrects advance, width and brakes of a table that was tuned on the nominal hammer
     for the stated variability. Offset and gain of the sensor are estimated beside the constants of the unit;
     their priors have standard deviations of 25 us, or the larger `offset` of the sensor, and 1 %. The first
-    line is printed in open loop. The table is handed out only if the readings are explained, and if no likely
+    line is printed in open loop. The table is used only if the readings are explained, and if no likely
     unit prints fewer dots of the test cycle and of rows of 200 slots with it, or a row in which errors grow.
-    Otherwise the better of two open loops is handed out: of the driver, or of the hammer's own pulse.
+    Otherwise the better of two open loops is used: that of the driver, or of the hammer's own pulse.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def learn(
         sensor shows nothing of them, it is what keeps them from growing.
     doubt : float, optional
         Which share of the hammers that are held for possible may print fewer dots within limits with
-        the table than in an open loop, for the table to be handed out; 0, none, by default.
+        the table than in an open loop, for the table to be used; 0, none, by default.
     serial : str, optional
         Serial number of the unit; the table is refused for another one.
     seed : int, optional

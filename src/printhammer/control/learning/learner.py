@@ -24,7 +24,7 @@ _STARTS: Final = 6  # Number of simulated hammers from which searches begin
 _OUTLIER: Final = 6.0  # Standard deviations from the median beyond which a reading is left out
 _FEWEST: Final = 3  # Readings of which the median says something
 MISFIT: Final = 2.0
-"""Largest misfit with which a table is handed out: RMS of the residuals, in standard deviations of the noise.
+"""Largest misfit with which a table is used: RMS of the residuals, in standard deviations of the noise.
 
 Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the sensor."""
 
@@ -44,7 +44,7 @@ class Mean(NamedTuple):
 class Learner:
     """Calibrates the table of one unit from run to run, by a law.
 
-    The better open loop is handed out until the first stage is over, and wherever no hammer of the production
+    The better open loop is used until the first stage is over, and wherever no hammer of the production
     explains the readings, or likely hammers speak against the table: more of them than the doubt that is
     allowed would print fewer dots within limits with it than in an open loop, or a row in which errors grow,
     or the gain is next to nothing.
@@ -80,12 +80,12 @@ class Learner:
 
     @property
     def learned(self) -> bool:
-        """Whether the learned table is handed out for printing, and not an open loop."""
+        """Whether the learned table is used for printing, and not an open loop."""
         return self.verdict.gains
 
     @property
     def printed(self) -> FloatArray:
-        """What is handed out for printing, shape (4, entries)."""
+        """Settings of the drive in use, table or open loop, shape (4, entries)."""
         return self.settings if self.learned else self.verdict.loop.settings
 
     @property

@@ -112,6 +112,7 @@ class Draft:
             self._judge_rows()
 
     def _judge_rows(self) -> None:
+        """Set the deviation of equal gaps to infinity where the multiplier of their row is not below 1."""
         task = self.task
         known: dict[tuple[float, float, float], Waveform] = {}
         cells = [
@@ -121,13 +122,10 @@ class Draft:
             if gap / rate <= task.single.settled
         ]
         drives = []
-        # From the firing before this one on the whole history is that of the row.
-        first = task.gaps + 1
+        first = task.gaps + 1  # The firing before it is the first one with the full history of the row.
         for row, history in cells:
-            settings, slots = (
-                Settings(*self.values[:4, row]),
-                range(0, history[0] * (first + MORE), history[0]),
-            )
+            settings, gap = Settings(*self.values[:4, row]), history[0]
+            slots = range(0, gap * (first + MORE), gap)
             pulses = pulses_of(settings, task.gaps, task.reach, slots, float(self.rates[row]))
             drives.append(sequence(pulses, task.pulse, known))
         growth = row_multipliers([task.hammers[0]] * len(cells), drives, task.effort, firing=first)

@@ -294,7 +294,7 @@ def grid_of(
     step: float | str | None,
     spacing: float = STEP,
 ) -> tuple[FloatArray, float]:
-    """Return a grid of rates and its step, Hz; for what is None that of the device.
+    """Return a grid of rates and its step, Hz; arguments that are None take the default of the device.
 
     `spacing` is the default step for the paper's hammer, Hz.
     """
