@@ -23,6 +23,7 @@ ROOMS = (
     "control/feedback",
     "control/impact_estimator",
     "control/impact_time",
+    "control/learning",
     "control/least_work",
     "control/pulses",
     "control/recorded_impacts",

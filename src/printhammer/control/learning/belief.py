@@ -1,14 +1,17 @@
-"""What a learner believes of a unit: constants that explain its readings, and how well they are known.
+"""Maximum a posteriori estimation of a unit's constants from its readings, with a Laplace approximation.
 
-The constants are in standard deviations of the production, so that before any reading each is 0 with a
-standard deviation of 1. Where the posterior probability (Bayes) is largest, found by the method of Levenberg
-and Marquardt, there is a mode; its covariance is that of the normal distribution that touches it there
-(Laplace). Readings may be explained in more than one way: a belief has modes, each with its probability. A
-reading that nothing explains counts for little: errors have the distribution of Student's t.
+The constants are in prior standard deviations: the prior is the standard normal distribution. Each mode of
+the posterior is found by the Levenberg-Marquardt method (Nocedal and Wright, *Numerical Optimization*, 2006,
+section 10.3) with Broyden's rank-one updates of the Jacobian (their section 11.1), and the posterior near it
+is approximated by a normal distribution (Laplace; MacKay, *Information Theory, Inference, and Learning
+Algorithms*, 2003, chapter 27). A belief is a mixture of these normal distributions, since readings may have
+more than one explanation. Errors follow Student's t distribution, so that outliers have little weight.
 
-Readings of a hammer that is fired while it still moves bend sharply with the constants, and a search that
-starts far away gets caught. It therefore begins where readings count by what is smooth in them, and lets
-them count for more from level to level; it ends at the last level that explains the readings.
+The readings of a hammer that is fired while it still moves are strongly nonlinear in the constants, and a
+search that starts far away stops at a local minimum. The estimation is therefore a continuation in the noise:
+at the first level the part of a reading that a quadratic function of the constants does not explain counts
+as noise; the following levels reduce that noise, down to the noise of the sensor. The search ends at the last
+level that explains the readings. A mode that no starting point leads to is missed.
 """
 
 from __future__ import annotations
@@ -27,62 +30,62 @@ if TYPE_CHECKING:
     T = TypeVar("T")
     Search: TypeAlias = Work[FloatArray, FloatArray, T]
 
-LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)  # How much of what is not smooth in a reading counts as noise
-_NEAR: Final = (0.1, 0.0)  # The same where the search begins at what was believed before
-_MODES: Final = 4  # At most
-_SHARE: Final = 0.01  # Probability below which a mode is left out, in parts of that of the best
-_CARE: Final = 1.3  # By how much wider than it says a covariance is taken to be, where harm may be done
-_FREEDOM: Final = 4.0  # Degrees of freedom of Student's t
-_LOST: Final = 12.0  # What a dot that is seen but not predicted adds to the objective, twice
-_STEP: Final = 0.1  # Of the differences by which a search finds its way, in standard deviations
-_FINE: Final = 0.01  # Of those that say how well constants are known: what explains readings is bent
-_ITERATIONS: Final = 10  # At most, at a level
-_STILL: Final = 0.03  # Step at which a level is over, in standard deviations
-_GAIN: Final = 0.01  # Of the objective, below which a step is none
-_OUTLIER: Final = 5.0  # Largest residual that counts in the misfit, in standard deviations; arbitrary
-_EXPLAINED: Final = 2.0  # Mean square of what is left of readings, in variances, that explains them
+LEVELS: Final = (1.0, 0.3, 0.1, 0.03, 0.0)  # Fraction of the surrogate's residual that counts as noise
+_NEAR: Final = (0.1, 0.0)  # Levels of a search that begins at a mode of the stage before
+_MODES: Final = 4  # Maximum number of modes of a belief
+_SHARE: Final = 0.01  # Modes below this probability, relative to the most probable mode, are dropped
+_CARE: Final = 1.3  # Factor by which standard deviations are widened in `Belief.draw`
+_FREEDOM: Final = 4.0  # Degrees of freedom of Student's t distribution of the errors
+_LOST: Final = 12.0  # Penalty, in 2 × negative log-likelihood, for an observed dot that is not predicted
+_STEP: Final = 0.1  # Finite-difference step of the Jacobian in a search, in prior standard deviations
+_FINE: Final = 0.01  # Finite-difference step for the covariance; small, since readings are curved
+_ITERATIONS: Final = 10  # Iteration limit of a level
+_STILL: Final = 0.03  # Step size below which a level has converged, in prior standard deviations
+_GAIN: Final = 0.01  # Smallest decrease of the objective with which a step is accepted
+_OUTLIER: Final = 5.0  # Clip of residuals in the misfit, in standard deviations; arbitrary
+_EXPLAINED: Final = 2.0  # Largest mean square residual, in variances, of a level that explains the readings
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Readings of a unit, in parts of the limits, arrays of shape (readings,); NaN where nothing was seen."""
+    """Readings of a unit, normalised by the limits, shape (readings,); NaN where no dot was seen."""
 
     value: FloatArray
     noise: FloatArray  # Standard deviation
-    rough: FloatArray  # Root of the mean square of what is not smooth in a reading
+    rough: FloatArray  # RMS residual of the quadratic surrogate of a reading
 
     def at(self, level: float) -> FloatArray:
-        """Return the standard deviations that count at a level."""
+        """Compute the standard deviations of the readings at a level of the continuation, (readings,)."""
         return np.asarray(np.hypot(self.noise, level * self.rough))
 
 
 @dataclass(frozen=True)
 class Mode:
-    """Constants that explain the readings, in standard deviations."""
+    """A mode of the posterior distribution of the constants, with its Laplace approximation."""
 
-    mean: FloatArray  # The most probable ones, (constants,)
+    mean: FloatArray  # Constants at the mode, in prior standard deviations, (constants,)
     covariance: FloatArray  # (constants, constants)
-    predicted: FloatArray  # Readings of a unit with these constants, (readings,)
-    level: float  # At which the readings are explained
-    objective: float  # Less the logarithm of the probability density, but for a constant
+    predicted: FloatArray  # Predicted readings of a unit with the constants of the mode, (readings,)
+    level: float  # Last level of the continuation that explains the readings
+    objective: float  # Negative log posterior density, up to a constant
     misfit: float = 0.0  # RMS of the residuals of the readings, in standard deviations of their noise
 
     def apart(self, other: Mode) -> float:
-        """Return how far another mode is off, in standard deviations of this one."""
+        """Compute the RMS Mahalanobis distance of another mode from this mode, per constant."""
         off = other.mean - self.mean
         return float(np.sqrt(off @ np.linalg.solve(self.covariance, off) / off.size))
 
 
 @dataclass(frozen=True)
 class Belief:
-    """What is believed of a unit: modes, the most probable first, and their probabilities."""
+    """Posterior distribution of a unit's constants: modes, the most probable first, and probabilities."""
 
     modes: tuple[Mode, ...]
     weights: FloatArray  # (modes,)
 
     @classmethod
     def of(cls, ends: Sequence[Mode]) -> Belief:
-        """Return the belief in the modes at which searches ended; those that are the same count once."""
+        """Build the belief from the modes at which searches ended; duplicate modes count once."""
         modes: list[Mode] = []
         for end in sorted(ends, key=lambda end: end.objective):
             if all(mode.apart(end) > 1.0 for mode in modes):
@@ -95,17 +98,17 @@ class Belief:
         return cls(chosen, weights[kept] / weights[kept].sum())
 
     def moments(self) -> tuple[FloatArray, FloatArray]:
-        """Return means and standard deviations of the constants over all modes, (constants,) each."""
+        """Compute means and standard deviations of the constants over all modes, (constants,) each."""
         means = np.array([mode.mean for mode in self.modes])
         spread = np.array([np.diag(mode.covariance) for mode in self.modes])
         mean = self.weights @ means
         return np.asarray(mean), np.sqrt(self.weights @ (spread + (means - mean) ** 2))
 
     def draw(self, count: int, seed: int) -> FloatArray:
-        """Return constants that a careful mind holds for possible, (count, constants).
+        """Draw samples of the constants from a widened posterior distribution, (count, constants).
 
-        Standard deviations count `_CARE` times, and the probability of a mode by its root: a normal
-        distribution that touches another one is too narrow where that is bent.
+        Standard deviations are multiplied by `_CARE`, and modes are drawn by the square roots of their
+        probabilities: where readings are curved, the Laplace approximation is too narrow.
         """
         normal = _CARE * np.random.default_rng(seed).standard_normal((count, self.modes[0].mean.size))
         shares = np.cumsum(np.sqrt(self.weights))
@@ -118,10 +121,10 @@ class Belief:
 def believe(
     evidence: Evidence, starts: Sequence[FloatArray], before: Sequence[FloatArray] = ()
 ) -> Search[Belief]:
-    """Return what the evidence says of a unit; asks for the readings of units.
+    """Estimate the constants of a unit from its readings; yields the constants whose readings are needed.
 
-    Searches begin at what was believed `before`; where there is nothing, or none of them ends at the finest
-    level, at each of `starts` too.
+    Searches begin at the modes `before` of the previous stage. If there is none, or if none of these searches
+    ends at the finest level, searches begin at each of `starts` too.
     """
     ends = yield from together([_descend(evidence, start, _NEAR) for start in before])
     if not any(end.level == LEVELS[-1] for end in ends):
@@ -130,12 +133,12 @@ def believe(
 
 
 class _Place(NamedTuple):
-    """Where a search is."""
+    """Current iterate of a Levenberg-Marquardt search."""
 
     constants: FloatArray  # (constants,)
-    shown: FloatArray  # (readings,)
-    slopes: FloatArray  # (readings, constants); NaN where a dot is lost
-    fresh: bool  # Whether the slopes are differences made here
+    shown: FloatArray  # Predicted readings, (readings,)
+    slopes: FloatArray  # Jacobian of the readings, (readings, constants); NaN where a dot is lost
+    fresh: bool  # Whether the Jacobian is by finite differences at this iterate, without Broyden updates
 
 
 def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> Search[Mode]:
@@ -154,7 +157,7 @@ def _descend(evidence: Evidence, start: FloatArray, levels: Sequence[float]) -> 
     up, down = np.split(moved, 2)
     place = place._replace(slopes=(up - down).T / (2.0 * _FINE))
     normal = _normal(place, evidence.value, evidence.at(level))[0]
-    # What is not explained is as much of a reason to doubt as noise is.
+    # A misfit beyond the noise widens the covariance, as an underestimated noise would.
     covariance = np.asarray(max(misfit, 1.0) * np.linalg.inv(normal), np.float64)
     finest = _objective(place.constants[None], place.shown[None], evidence.value, evidence.at(LEVELS[-1]))
     misfit = _misfit(place.shown, evidence)
@@ -173,13 +176,13 @@ def _misfit(shown: FloatArray, evidence: Evidence) -> float:
 
 
 def _look(constants: FloatArray, shown: FloatArray) -> Search[_Place]:
-    """Return a place with the slopes there, by differences."""
+    """Evaluate the Jacobian at an iterate by forward differences."""
     (moved,) = yield [constants + _STEP * np.eye(constants.size)]
     return _Place(constants, shown, np.asarray((moved - shown).T / _STEP), fresh=True)
 
 
 def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: FloatArray) -> FloatArray:
-    """Return what is least where constants are most probable, for each of (M, constants)."""
+    """Compute the negative log posterior density of constants (M, constants), up to a constant, (M,)."""
     rest = (value - shown) / noise
     each = (_FREEDOM + 1.0) * np.log1p(rest**2 / _FREEDOM)
     lost = np.isfinite(value) & ~np.isfinite(shown)
@@ -188,7 +191,7 @@ def _objective(places: FloatArray, shown: FloatArray, value: FloatArray, noise: 
 
 
 def _normal(place: _Place, value: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the inverse of the covariance, and the direction in which the probability grows."""
+    """Compute the Gauss-Newton matrix of the objective and its negative gradient, (constants,)."""
     rest = value - place.shown
     known = np.isfinite(rest) & np.isfinite(place.slopes).all(axis=1)
     rest, slopes = np.where(known, rest, 0.0), np.where(known[:, None], place.slopes, 0.0)
@@ -198,16 +201,16 @@ def _normal(place: _Place, value: FloatArray, noise: FloatArray) -> tuple[FloatA
 
 
 def _size(rest: FloatArray) -> float:
-    """Return the standard deviation of what is left of readings, as their median tells it."""
+    """Estimate the standard deviation of residuals robustly, from their median absolute value."""
     known = np.abs(rest[np.isfinite(rest)])
     return 1.4826 * float(np.median(known)) if known.size else 0.0
 
 
 def _climb(value: FloatArray, noise: FloatArray, place: _Place) -> Search[_Place]:
-    """Return where constants are most probable near a place."""
+    """Minimise the objective from an iterate by the Levenberg-Marquardt method with Broyden updates."""
     damping = 0.1
     for _ in range(_ITERATIONS):
-        # Far away all readings are wrong, and none of them counts for little.
+        # Far from the mode all residuals are large; without this scale all readings would count as outliers.
         wide = noise * max(1.0, _size((value - place.shown) / noise))
         best = _objective(place.constants[None], place.shown[None], value, wide)[0]
         normal, uphill = _normal(place, value, wide)
@@ -222,7 +225,7 @@ def _climb(value: FloatArray, noise: FloatArray, place: _Place) -> Search[_Place
                 break
             place = yield from _look(place.constants, place.shown)
             continue
-        # Broyden: what the step itself shows of the slopes.
+        # Broyden's rank-one update: the new Jacobian reproduces the readings after the step.
         move = places[k] - place.constants
         surprise = np.nan_to_num(readings[k] - place.shown - place.slopes @ move)
         slopes = place.slopes + surprise[:, None] * (move / (move @ move))

@@ -1,23 +1,22 @@
-"""The learning law: from what is believed of a unit to the entries of its table.
+"""Iterative learning control of the entries of a compensation table, from the posterior of a unit.
 
-After stage s the corrections u of the entries become
+After stage s the corrections u of the entries become (Bristow, Tharayil and Alleyne, *IEEE Control Systems
+Magazine* 26(3), 2006)
 
     u(s+1) = Q u(s) - L e(u(s)),    Q = 1 - forgetting,
 
-where e holds how far force and arrival of all dots of a line are off. That is iterative learning control,
-from run to run. What the sensor shows is one number a dot, or two, with noise; e is therefore what the
-hammers that are believed in print with these entries, in the mean over the modes, and a part a of what
-readings of the line differ from that, as far as noise does not explain it: of what the laws of the model do
-not hold. L = G+, where G is the sensitivity of e to the entries, of the most probable hammer, and G+ its
-regularised inverse, in which dots that are far off count for more. On hammers that are believed in nothing
-has to be printed: there the law is followed until it leads no further (Newton's method of norm-optimal
-learning control).
+where e holds the deviations of force and arrival of all dots of a line. The sensor measures one or two noisy
+numbers per dot, so e is estimated: the mean deviation of the posterior modes when they print with these
+entries, plus a fraction a of the model error, which is the difference between measured and predicted
+readings beyond the noise. L = G+ is the regularised pseudo-inverse of G, the sensitivity of e to the entries
+for the most probable hammer; dots with large deviations have a larger weight. Simulated hammers cost no
+paper: on them the law is iterated until it converges (norm-optimal learning control by Newton's method).
 
-Convergence: corrections that differ come together, or at least not apart, where no eigenvalue of Q - L (G +
-a (G' - G)) is beyond 1 in absolute value, G' being the sensitivity of the unit. It is not known; a, 1
-otherwise, is halved until this holds for hammers that are held for possible.
+Convergence: the difference of two corrections does not grow if no eigenvalue of Q - L (G + a (G' - G))
+exceeds 1 in absolute value, where G' is the sensitivity of the unit. G' is unknown; a starts at 1 and is
+halved until the condition holds for samples of the posterior.
 
-What a learner may change of a table, and within which bounds.
+`Adjustable` says which entries of a table a learner may change, and within which bounds.
 """
 
 from __future__ import annotations
@@ -57,16 +56,16 @@ if TYPE_CHECKING:
     from printhammer.control.learning.lines import Press, Printing
 
 STEP: Final = 1e-6  # Unit of the corrections, s
-_LARGEST: Final = 25.0  # Largest change of an entry after a stage, in this unit
-# How much later than the nominal hammer a unit may leave the pack; no pulse is fired before that, s
+_LARGEST: Final = 25.0  # Largest change of an entry after a stage, in units of `STEP`
+# Allowance for a unit that leaves the pack later than the nominal hammer; no pulse is fired before its end, s
 MARGIN: Final = 20e-6
-_LEAST: Final = 0.5  # Least width of a pulse, in parts of that of the hammer
-_LEAST_BRAKE: Final = 0.05  # Least width of a brake pulse, likewise
+_LEAST: Final = 0.5  # Smallest width of a pulse, as a fraction of the nominal width
+_LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of the nominal width
 ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
 class OpenLoop(NamedTuple):
-    """A pulse that is fired at every slot: its settings (4, entries), and its waveform."""
+    """Open-loop drive, the same pulse at every slot: its settings (4, entries) and its waveform."""
 
     settings: FloatArray
     pulse: Waveform
@@ -74,17 +73,17 @@ class OpenLoop(NamedTuple):
 
 @dataclass(frozen=True)
 class Adjustable:
-    """The entries of a table that are learned: advance, width, and brake where there is one.
+    """Entries of a table that are learned: advance, width, and the brake width where there is a brake pulse.
 
-    `base` (4, entries) are the settings that corrections are added to, at a rate, Hz, as times after the
-    slots of a hammer with its driver, s. Corrections are arrays (..., inputs), in units of `STEP`.
+    `base` (4, entries) are the settings to which corrections are added, at a rate in Hz, as times after the
+    slots for the hammer with its driver, s. Corrections are arrays (..., inputs), in units of `STEP`.
     """
 
     task: Task
     rate: float
     base: FloatArray
     own: OpenLoop | None = None
-    """The open loop of the hammer's own pulse; None if the pulse of the task is that, or it has no width."""
+    """Open loop of the hammer's own pulse; None if the task uses that pulse or the pulse has no width."""
 
     @cached_property
     def inputs(self) -> IntArray:
@@ -96,33 +95,33 @@ class Adjustable:
 
     @property
     def open_loop(self) -> FloatArray:
-        """The settings of the open loop, (4, entries): the same pulse at every slot."""
+        """Settings of the open loop, (4, entries): the same pulse at every slot."""
         settings = np.zeros_like(self.base)
         settings[WIDTH] = self.task.width
         return settings
 
     @property
     def loops(self) -> list[OpenLoop]:
-        """The open loops that there are: that of the pulse of the task, and of the hammer's own."""
+        """Open loops to compare with: the pulse of the task and, if present, the hammer's own pulse."""
         plain = OpenLoop(self.open_loop, self.task.pulse)
         return [plain] if self.own is None else [plain, self.own]
 
     def limited(self, before: FloatArray, change: FloatArray) -> FloatArray:
-        """Return corrections (inputs,) after a change, such that the settings keep to all bounds."""
+        """Add a change to corrections (inputs,) and clip the resulting settings to all bounds."""
         after = before + np.clip(change, -_LARGEST, _LARGEST)
         rows, columns = self.inputs
         return np.asarray((self._bounded(self._raw(after)) - self.base)[rows, columns] / STEP)
 
     def started_from(self, base: FloatArray) -> Adjustable:
-        """Return the entries of another table, (4, entries), moved to where they keep to all bounds."""
-        # No entry has the right to stay beyond a bound.
+        """Return a copy that starts from other settings, (4, entries), clipped to all bounds."""
+        # Unlike entries of the first table, entries of this table may not stay beyond a bound.
         strict, own = base.copy(), base.copy()
         strict[ADVANCE] = -np.inf
         own[ADVANCE] = np.maximum(own[ADVANCE], -self.task.latest(own[WIDTH]))
         return replace(self, base=replace(self, base=strict)._bounded(own))
 
     def settings(self, corrections: FloatArray) -> FloatArray:
-        """Return the settings with corrections (inputs,), shape (4, entries)."""
+        """Compute the settings with corrections (inputs,), shape (4, entries)."""
         shared = shared_numbers(self.task.gaps, self.task.reach)
         return np.asarray(self._raw(corrections)[:, shared])
 
@@ -132,7 +131,7 @@ class Adjustable:
         return settings
 
     def _bounded(self, settings: FloatArray) -> FloatArray:
-        """Keep to the bound of the current, and to no pulse before the armature has left the pack."""
+        """Clip settings to the current limit, and to firing times after the armature has left the pack."""
         task, base = self.task, self.base
         settings[WIDTH] = np.clip(settings[WIDTH], _LEAST * task.width, task.widest)
         brake = np.clip(settings[BRAKE], _LEAST_BRAKE * task.width, task.widest)
@@ -154,25 +153,25 @@ class Adjustable:
 
 
 RUNS: Final = (1, 1, 2, 4, 8, 24)  # Number of runs of each stage
-GATE: Final = 3.0  # Deviation, in parts of the limits, beyond which one counts as this
-_DAMPING: Final = 1e-3  # Of the inverse of G: mean square of deviations, in parts of the limits, per `STEP`
-_STEEP: Final = 2.0  # By how much more what is far off counts, for each square of the limits
-_SIZES: Final = (1.0, 0.5, 0.2)  # Parts of a change that are tried
-_NEWTON: Final = 10  # How often, at most, the law is applied to the hammer that is believed in, after a stage
+GATE: Final = 3.0  # Deviations are clipped at this multiple of the limits
+_DAMPING: Final = 1e-3  # Regularisation of G+: mean square deviation, normalised by the limits, per `STEP`
+_STEEP: Final = 2.0  # Weight of the quartic term of the objective relative to the quadratic term
+_SIZES: Final = (1.0, 0.5, 0.2)  # Step fractions of the line search
+_NEWTON: Final = 10  # Iteration limit of the law on simulated hammers after a stage
 BAD: Final = 10.0
-"""What is left over, as `Update` has it, beyond which another start is tried."""
+"""Value of `Update.left` above which another starting table is tried."""
 
-_SLOW: Final = 0.85  # Part of the badness of the time before below which it pays to go on
-_LEAST_LAW: Final = 1e-2  # Least part of what is not explained that is put right
-_OTHERS: Final = 4  # Number of probable hammers for which corrections must not move apart
-_ALIKE: Final = 24  # Number of probable hammers that decide whether the table is used
-_GAIN: Final = 0.02  # Least share of the dots that the table gains in the mean over these
+_SLOW: Final = 0.85  # The iteration stops if the objective exceeds this fraction of the value before
+_LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected
+_OTHERS: Final = 4  # Number of posterior samples on which the convergence condition is checked
+_ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared
+_GAIN: Final = 0.02  # Smallest mean gain of a table, as a fraction of the dots, with which it is used
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
-"""Slots of the line that corrections are tried on, on hammers that are believed in: the cycle of order 6."""
+"""Slots of the line on which corrections are evaluated by simulation: the de Bruijn cycle of order 6."""
 
 
 def _judged_slots() -> tuple[int, ...]:
-    """Return the slots of the cycle with its lead-in and, each from rest, of the rows of dots."""
+    """List the slots of the cycle with its lead-in, and of the rows of dots, each row from rest."""
     slots = slots_of(cycle_with_lead_in())
     for step in STEPS:
         slots += tuple(slots[-1] + 1 + SLOTS + slot for slot in row_of_dots(step))
@@ -180,23 +179,23 @@ def _judged_slots() -> tuple[int, ...]:
 
 
 PRINTED: Final = _judged_slots()
-"""Slots on which tables are judged: the cycle after its lead-in, and rows of 200 slots, each from rest."""
+"""Slots on which tables are judged: the cycle with its lead-in, and rows of 200 slots, each from rest."""
 
 JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
-"""Mask of the dots that count, (dots,)."""
+"""Mask of the dots that count, (dots,): all but those of the lead-in."""
 
 IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
-"""Mask of the dots of the cycle among these, (counted dots,)."""
+"""Mask of the dots of the cycle among the dots that count, (counted dots,)."""
 
 
 class Verdict(NamedTuple):
-    """Comparison of a table with the open loops on the hammers believed in."""
+    """Comparison of a table with the open loops on samples of the posterior."""
 
     gains: bool  # Whether the table is better than both open loops
     loop: OpenLoop  # The open loop that is used otherwise
     multiplier: float  # Largest absolute multiplier of rows printed with the table; NaN if no row is periodic
     expected: float  # Mean fraction of dots within limits, with the drive that is used
-    certainty: float  # Fraction of the hammers that print every dot within limits with it
+    certainty: float  # Fraction of the samples that print every dot within limits with the drive that is used
 
 
 class Update(NamedTuple):
@@ -205,39 +204,39 @@ class Update(NamedTuple):
     corrections: FloatArray  # (inputs,)
     contraction: float  # Largest eigenvalue of Q - L (G + a (G' - G))
     verdict: Verdict
-    left: float  # Deviations that remain on the hammers believed in, squared, as fractions of the limits
+    left: float  # Objective after the stage: squared deviations normalised by the limits, with a quartic term
 
 
 class _Unit(NamedTuple):
-    """What is believed of a unit, as hammers that print."""
+    """Posterior modes of a unit's constants, as hammers."""
 
     hammers: Sequence[Hammer]  # The most probable first
     weights: FloatArray  # Their probabilities
-    more: FloatArray  # How far dots are off beyond that, (2 dots,)
+    more: FloatArray  # Deviations due to the model error, (2 dots,)
 
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """What a learner knows: the production, the ladder, and what to do with readings. Nothing of a unit."""
+    """Learning law of a production: the prior, the ladder, and the update; it holds no data of a unit."""
 
     entries: Adjustable
     production: Production
     forgetting: float
-    # Share of the probable hammers that may print fewer dots with the table than in an open loop
+    # Fraction of the posterior samples that may print fewer dots with the table than in an open loop
     doubt: float
     seed: int
     rungs: tuple[Rung, ...]
-    # How readings depend on the constants, of the ladder and of a line in an open loop, times before forces
+    # Surrogates of the readings of the ladder and of a line in open loop, times before forces
     shown: tuple[Surrogate, ...]
-    rows: FloatArray  # Constants of simulated hammers, (members, size): where a search may begin
-    seen: FloatArray  # Their readings, (members, readings)
-    first: OpenLoop  # The better open loop in the mean over the production
+    rows: FloatArray  # Constants of simulated hammers, (members, size): starting points of searches
+    seen: FloatArray  # Readings of these hammers, (members, readings)
+    first: OpenLoop  # Open loop with the larger mean fraction of good dots over the production
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
-        """Return what is done after a stage; asks for what the hammers believed in print.
+        """Compute the corrections after a stage; yields the lines that simulated hammers have to print.
 
-        `unexplained` (2, dots) is by how much arrival and force of the dots of the line are off beyond what
-        is believed, in parts of the limits.
+        `unexplained` (2, dots) is the model error of arrival and force of the dots of the line, normalised by
+        the limits.
         """
         modes = self.production.hammers(np.array([mode.mean for mode in belief.modes]))
         there = np.array([hammer is not None for hammer in modes])
@@ -266,17 +265,17 @@ class LearningLaw:
         contraction, unit = largest(part), unit._replace(more=part * unit.more)
         left, found = yield from self._followed(unit, keep * corrections)
         if left > BAD and corrections.any():
-            # The table that learning starts from may lead to where what was learned does not.
+            # Starting over from the first table may converge where the learned corrections do not.
             other = yield from self._followed(unit, 0.0 * corrections)
             left, found = min((left, found), other, key=lambda end: end[0])
         verdict = yield from self._compared(alike, found)
         return Update(found, contraction, verdict, left)
 
     def started_anew(self, belief: Belief) -> LearningLaw | None:
-        """Return the same law, starting from a table that is tuned for the hammer believed in.
+        """Return a copy of the law that starts from a table tuned for the most probable hammer.
 
-        Its dots from rest are made as hard as those of the nominal hammer, and arrive when those do. There is
-        none where no table prints every dot.
+        The dots from rest of the tuned hammer have the force and the arrival times of the nominal hammer.
+        None if no table prints every dot.
         """
         task = self.entries.task
         (hammer,) = self.production.hammers(belief.modes[0].mean[None])
@@ -304,7 +303,7 @@ class LearningLaw:
         return None
 
     def _followed(self, unit: _Unit, corrections: FloatArray) -> Printing[tuple[float, FloatArray]]:
-        """Return to which corrections the law leads, and what they leave."""
+        """Iterate the law on simulated hammers; return the smallest objective and its corrections."""
         best = np.inf, corrections
         for _ in range(_NEWTON):
             (off,), slopes = yield from together(
@@ -322,7 +321,7 @@ class LearningLaw:
         return best
 
     def _by_history(self, unexplained: FloatArray) -> FloatArray:
-        """Return what a line shows of the histories of the dots of `TRIED`, (2 dots,)."""
+        """Average the deviations of a line by history, and assign them to the dots of `TRIED`, (2 dots,)."""
         task = self.entries.task
         shown, wanted = (histories_of(slots, task.gaps, task.reach)[:-1] for slots in (LINE, TRIED))
         sums = np.zeros((2, shown.max() + 1))
@@ -331,7 +330,7 @@ class LearningLaw:
         return np.asarray((sums / np.maximum(np.bincount(shown), 1))[:, wanted]).ravel()
 
     def _off(self, hammers: Sequence[Hammer], corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Return how far arrival and force of `TRIED` are off, in parts of the limits, (M, 2 dots)."""
+        """Simulate the deviations of arrival and force of `TRIED`, normalised by the limits, (M, 2 dots)."""
         press, limits = self.production.press(hammers), self.entries.task.limits
         known = {id(row): self.entries.settings(row) for row in corrections}
         _dots, judgement = yield from press.order_line([known[id(row)] for row in corrections], TRIED)
@@ -339,7 +338,7 @@ class LearningLaw:
         return np.clip(np.nan_to_num(np.concatenate(off, axis=1), nan=GATE), -GATE, GATE)
 
     def _expected(self, unit: _Unit, corrections: Sequence[FloatArray]) -> Printing[FloatArray]:
-        """Return how far dots are off in the mean over what is believed, (M, 2 dots)."""
+        """Compute the mean deviations over the posterior modes, plus the model error, (M, 2 dots)."""
         hammers = [hammer for _ in corrections for hammer in unit.hammers]
         rows = [row for row in corrections for _ in unit.hammers]
         off = yield from self._off(hammers, rows)
@@ -347,16 +346,16 @@ class LearningLaw:
         return np.asarray(np.einsum("m,kmd->kd", unit.weights, by_hammer) + unit.more)
 
     def _slopes(self, hammer: Hammer, corrections: FloatArray) -> Printing[FloatArray]:
-        """Return how far dots move with each input, (2 dots, inputs)."""
+        """Compute the sensitivity G of the deviations to each input by differences, (2 dots, inputs)."""
         rows = [corrections, *(corrections + np.eye(len(corrections)))]
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
 
     def _compared(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
-        """Compare a table with the open loops on probable hammers.
+        """Compare a table with the open loops on posterior samples.
 
-        The table gains if these print more dots with it than in either open loop, and none of them, but for
-        doubt, prints fewer, or has a row in which errors grow from dot to dot.
+        The table gains if the samples print more dots with it than in either open loop, and if no sample,
+        except for a fraction `doubt`, prints fewer dots or has a row in which errors grow from dot to dot.
         """
         press, settings = self.production.press(alike), self.entries.settings(corrections)
         table = yield from order_good(press, [settings] * len(alike))
@@ -374,13 +373,13 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether hammers (M,) print more dots in the mean than in other ways (ways, M), and none fewer."""
+        """Whether a drive prints more dots (M,) than others (drives, M) on average, fewer on no hammer."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 
 
 def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
-    """Return which dots of `PRINTED` are within limits, (M, dots), in each open loop, as `order_good`."""
+    """Compute the mask of dots of `PRINTED` within limits, (M, dots), for each open loop."""
     count = len(press.hammers)
     return (
         yield from together(
@@ -392,18 +391,18 @@ def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
 def order_good(
     press: Press, settings: Sequence[FloatArray], pulses: Sequence[Waveform] | None = None
 ) -> Printing[BoolArray]:
-    """Return which dots of `PRINTED` are within limits, (M, dots), those of the lead-in left out."""
+    """Compute the mask of dots of `PRINTED` within limits, without the lead-in, (M, dots)."""
     _dots, judgement = yield from press.order_line(settings, PRINTED, pulses)
     return np.asarray(judgement.good[:, JUDGED])
 
 
 def _badness(off: FloatArray) -> float:
-    """Return what corrections make least: the squares, and more of what is far off."""
+    """Compute the objective of the law: squared deviations plus weighted fourth powers."""
     return float(np.sum(off**2 + _STEEP * off**4))
 
 
 def _gain(off: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Return L of the law, (inputs, 2 dots): the inverse of a sensitivity, weighted as by `_badness`."""
+    """Compute L of the law, (inputs, 2 dots): a pseudo-inverse weighted as in `_badness`."""
     weight = 1.0 + 2.0 * _STEEP * off**2
     normal = slopes.T @ (weight[:, None] * slopes) + _DAMPING * len(TRIED) * np.eye(slopes.shape[1])
     return np.asarray(np.linalg.solve(normal, slopes.T * weight))

@@ -1,9 +1,4 @@
-"""Learn a table on a unit: what it prints before, while and after.
-
-Units that are calibrated side by side, each by a learner of its own.
-
-What a hammer prints while it learns its table.
-"""
+"""Run-to-run calibration of units, and its result: prints before, during and after learning."""
 
 from __future__ import annotations
 
@@ -40,13 +35,13 @@ from printhammer.support.threads import together
 
 
 class Progress(NamedTuple):
-    """Where units stand after some dots each: what they print when judged, and on the last test line."""
+    """State of the units after a number of dots each: judged dots, last test line, and decisions."""
 
     dots: int
-    cycle: Judgement  # Of `PRINTED`
-    line: Judgement
-    # What the readings say, arrays of shape (units,); NaN before there are any
-    learned: BoolArray  # Whether the learned table is used, not an open loop
+    cycle: Judgement  # Judgement of the slots `PRINTED`
+    line: Judgement  # Judgement of the test line
+    # Estimates from the readings, arrays of shape (units,); NaN before the first reading
+    learned: BoolArray  # Whether the learned table is used, rather than an open loop
     misfit: FloatArray  # RMS of the residuals of the readings, in standard deviations
     multiplier: FloatArray
     expected: FloatArray
@@ -54,11 +49,11 @@ class Progress(NamedTuple):
 
     @property
     def good(self) -> BoolArray:
-        """Whether dots are within limits, (units, dots), those of the lead-in left out."""
+        """Mask of the dots within limits, without those of the lead-in, (units, dots)."""
         return np.asarray(self.cycle.good[:, JUDGED])
 
 
-_SAID: Final = ("multiplier", "expected", "certainty")  # Of a `Verdict`, in the order of `Progress`
+_SAID: Final = ("multiplier", "expected", "certainty")  # Fields of `Verdict`, in the order of `Progress`
 
 
 def calibrate(
@@ -67,10 +62,10 @@ def calibrate(
     sensor: ImpactSensor,
     report: Callable[[], None] = lambda: None,
 ) -> tuple[list[Learner], list[Progress]]:
-    """Let a learner calibrate each of some units, hammers in which the pulse of the nominal one is fired.
+    """Calibrate units, each with a learner of its own; all units are fired with the pulse of the task.
 
-    A unit prints the same every time that it prints the same; so what one run of a stage prints, all do, and
-    only the readings differ. `report` is called after each stage.
+    The simulation is deterministic: the runs of a stage print identical dots, so each stage is simulated
+    once, and only the noise of the readings differs. `report` is called after each stage.
     """
     task = law.entries.task
     press = Press(task, law.entries.rate, [with_pulse(unit, task.pulse) for unit in units])
@@ -109,19 +104,19 @@ def calibrate(
 def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Hammer) -> CompensationTable:
     """Convert the drive that a learner has chosen, its table or an open loop, to a table for a hammer.
 
-    `base` is the table that it started from, tuned on what a driver makes of the hammer.
+    `base` is the starting table, tuned for the hammer as switched by `driver`.
     """
     entries = {key: row[np.newaxis] for key, row in zip(COLUMNS, learner.printed, strict=True)}
     table = replace(base, **entries, deviation=np.full_like(base.deviation, np.nan))
     own = learner.law.entries.own
     if own is not None and learner.pulse is own.pulse:
-        # In the time of the hammer itself: its own pulse is fired at the slot.
+        # The hammer's own pulse is fired at the slot, without advance.
         return replace(table, advance=np.zeros_like(table.advance)).delayed(0.0, "own", hammer)
     return table.fired_by(driver, hammer)
 
 
 _DOTS = "stage dot"
-_LIKELY: Final = 0.5  # Least fraction of the likely units that print every dot, for a unit to pass
+_LIKELY: Final = 0.5  # Smallest fraction of posterior samples that print every dot, for a unit to pass
 
 
 def _percent(share: float) -> str:
@@ -134,19 +129,21 @@ def _worst(values: FloatArray) -> float:
 
 
 class Learning(Result, rows=_DOTS):
-    """A unit that calibrates its table, and what it prints at each stage, first in an open loop."""
+    """Result of a run-to-run calibration: the learned table, and the dots at each stage."""
 
-    hammer: Hammer = part("the nominal hammer, all that the learner knows")
-    unit: Hammer = part("the hammer that is driven", repr=False)
-    table: CompensationTable = part("what is learned, for this unit", repr=False)
+    hammer: Hammer = part("the nominal hammer, known to the learner")
+    unit: Hammer = part("the simulated unit, unknown to the learner", repr=False)
+    table: CompensationTable = part("the learned table of the unit", repr=False)
     rate: float = scalar("Hz", "slots per second", name="rate_Hz")
-    driver: str = scalar("", "what switches the coil")
-    sensor: ImpactSensor = part("what the learner is shown")
-    variability: Variability = part("what is known of the production")
-    limits: Limits = part("how far a dot may be off")
-    dots: IntArray = coordinate("1", "dots of test lines printed before", "stage", name="dots_learned")
+    driver: str = scalar("", "driver of the coil")
+    sensor: ImpactSensor = part("the impact sensor")
+    variability: Variability = part("the variability of the production")
+    limits: Limits = part("the limits of force and arrival")
+    dots: IntArray = coordinate(
+        "1", "number of test dots printed before the stage", "stage", name="dots_learned"
+    )
     learned: BoolArray = column(
-        "1", "whether the learned table is used, not an open loop", "stage", dtype=np.int8
+        "1", "whether the learned table is used, rather than an open loop", "stage", dtype=np.int8
     )
     misfit: FloatArray = column(
         "1",
@@ -171,25 +168,27 @@ class Learning(Result, rows=_DOTS):
     )
     slot: IntArray = coordinate("1", "number of the slot", "dot", name="slot")
     force_deviation: FloatArray = column(
-        "1", "peak force less that of the single pulse, in parts of it", _DOTS
+        "1", "relative difference of the peak force from that of the single pulse", _DOTS
     )
-    arrival_deviation: FloatArray = column("s", "touch less slot time and single-pulse flight time", _DOTS)
+    arrival_deviation: FloatArray = column(
+        "s", "impact time minus slot time and single-pulse flight time", _DOTS
+    )
     good: BoolArray = column("1", "whether the dot is within limits", _DOTS, dtype=np.int8)
-    constants: tuple[str, ...] = coordinate("", "a constant that varies", "constant", name="constant")
-    believed: FloatArray = column("SI", "constant of the unit, as its readings tell it", "constant")
-    uncertainty: FloatArray = column("SI", "its standard deviation", "constant")
-    contraction: FloatArray = part("largest eigenvalue of the law at each update")
+    constants: tuple[str, ...] = coordinate("", "name of a constant that varies", "constant", name="constant")
+    believed: FloatArray = column("SI", "estimated constant of the unit", "constant")
+    uncertainty: FloatArray = column("SI", "standard deviation of the estimated constant", "constant")
+    contraction: FloatArray = part("largest eigenvalue of the learning law at each update")
     offset: float = scalar("s", "estimated offset of the sensor's times", name="sensor_offset")
-    offset_uncertainty: float = scalar("s", "its standard deviation")
+    offset_uncertainty: float = scalar("s", "standard deviation of the estimated offset")
     seed: int = scalar("1", "seed of the simulated hammers")
 
     @property
     def title(self) -> str:
-        """What it is, in a line."""
+        """Title of the result."""
         return f"{self.hammer.name} learns its table at {self.rate:g} Hz"
 
     def summary(self) -> Summary:
-        """Return what is printed at each stage, and what is believed of the constants in the end."""
+        """Summarise the dots at each stage and the final estimates of the constants."""
         stages = [
             Cells("test dots", self.dots),
             Cells(
@@ -248,7 +247,7 @@ class Learning(Result, rows=_DOTS):
         return bool(self.certainty[-1] >= _LIKELY)
 
     def notes(self) -> dict[str, Any]:
-        """Return limits, sensor noise and what is known of the production."""
+        """Return limits, sensor noise, variability and serial number, for the header of a file."""
         return {
             "limits": self.limits.text,
             "variability": self.variability.text,
@@ -278,48 +277,50 @@ def learn(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[AtFixedTolerance],
 ) -> Learning:
-    """Let a hammer that nobody has measured calibrate its compensation table, from one number a dot.
+    """Calibrate the compensation table of an unmeasured unit from run to run, from its impact times.
 
-    The unit prints test lines; a sensor measures when each dot struck, with noise, and perhaps how hard. From
-    run to run the learner corrects advance, width and brakes of a table that was tuned on the nominal hammer
-    for the stated variability. Offset and gain of the sensor are estimated beside the constants of the unit;
-    their priors have standard deviations of 25 us, or the larger `offset` of the sensor, and 1 %. The first
-    line is printed in open loop. The table is used only if the readings are explained, and if no likely
-    unit prints fewer dots of the test cycle and of rows of 200 slots with it, or a row in which errors grow.
-    Otherwise the better of two open loops is used: that of the driver, or of the hammer's own pulse.
+    The unit prints test lines; a sensor measures the impact time of each dot and, optionally, its force, with
+    noise. The constants of the unit are estimated from the readings by maximum a posteriori estimation with a
+    Laplace approximation, together with offset and gain of the sensor; the priors of these two have standard
+    deviations of 25 us, or the larger `offset` of the sensor, and 1 %. Iterative learning control then
+    corrects advance, width and brakes of a table that was tuned for the nominal hammer and the stated
+    variability. The first line is printed in open loop. The table is used only if the posterior explains the
+    readings, and if no sample of it prints fewer dots of the test cycle and of rows of 200 slots with the
+    table, or a row in which errors grow. Otherwise the better of two open loops is used: that of the driver,
+    or of the hammer's own pulse.
 
     Parameters
     ----------
     hammer : Hammer
-        The nominal hammer, which is all that the learner knows.
+        The nominal hammer; the learner knows no other.
     unit : Hammer, optional
-        The hammer that is driven; by default one drawn from the variability with the seed.
+        The unit to calibrate; by default drawn from the variability with the seed.
     rate : float or str
         Slots per second, Hz, or text with a unit.
     driver, limits, history, reach, largest_current
         As for `printhammer.tune`; by default a fast switch. "own" for a hammer whose coil a driver switches:
         advance and time on the rail are then learned.
     sensor : ImpactSensor, optional
-        By default one that tells times with a noise of 5 us.
+        Impact sensor; by default one that measures times with a standard deviation of 5 us.
     variability : Variability, optional
-        What is known of the production; by default `Variability.of(hammer)`.
+        Variability of the production; by default `Variability.of(hammer)`.
     members : int, optional
         Number of simulated hammers on which the ladder is chosen, 100 to 5000.
     forgetting : float, optional
-        By which part the corrections of the stages before are taken back at each stage, above 0: where the
-        sensor shows nothing of them, it is what keeps them from growing.
+        Fraction by which earlier corrections decay at each stage, above 0 and below 1. It keeps corrections
+        from growing that the readings do not determine.
     doubt : float, optional
-        Which share of the hammers that are held for possible may print fewer dots within limits with
-        the table than in an open loop, for the table to be used; 0, none, by default.
+        Largest fraction of the posterior samples that may print fewer dots within limits with the table
+        than in an open loop, for the table to be used (default: 0, none).
     serial : str, optional
-        Serial number of the unit; the table is refused for another one.
+        Serial number of the unit; the table is refused for any other unit.
     seed : int, optional
-        Of the simulated hammers, and of the unit where none is given.
+        Seed for the simulated hammers, and for the unit if `unit` is not given.
 
     Returns
     -------
     Learning
-        The table that is learned, and what the unit prints before, while and after.
+        The learned table, and the dots of the unit before, during and after learning.
     """
     speed = read_positive(rate, "Hz", "rate")
     largest = read_positive(largest_current, "A", "largest_current")

@@ -1,4 +1,4 @@
-"""The learner: it is shown readings of its sensor, and nothing else of the unit."""
+"""Run-to-run calibration of one unit from sensor readings alone: estimate, correct, decide, repeat."""
 
 from __future__ import annotations
 
@@ -18,41 +18,41 @@ if TYPE_CHECKING:
     from printhammer.control.learning.lines import Printing
     from printhammer.drive.waveforms.shapes import Waveform
 
-# How well the laws of the model hold, a standard deviation in parts of the limits
+# Standard deviation of the model error, normalised by the limits
 _FLOOR: Final = 0.01
 _STARTS: Final = 6  # Number of simulated hammers from which searches begin
-_OUTLIER: Final = 6.0  # Standard deviations from the median beyond which a reading is left out
-_FEWEST: Final = 3  # Readings of which the median says something
+_OUTLIER: Final = 6.0  # Readings farther from the median are rejected, in standard deviations
+_FEWEST: Final = 3  # Smallest number of readings whose median can expose an outlier
 MISFIT: Final = 2.0
 """Largest misfit with which a table is used: RMS of the residuals, in standard deviations of the noise.
 
 Arbitrary; units of the production leave 0.7 to 1.6, whatever the offset of the sensor."""
 
-_STARTED: Final = 3  # How often, at most, a table is tuned for the hammer believed in
+_STARTED: Final = 3  # Maximum number of tables tuned for the most probable hammer
 _LATE: Final = (
-    2  # Stages after which the belief is narrow enough to do that since rows do not hold; arbitrary
+    2  # Stages before an unstable row is a reason to tune another table: the belief is wide before; arbitrary
 )
 
 
 class Mean(NamedTuple):
-    """Means of the readings of some dots, in parts of the limits, and of how many, (measured, dots)."""
+    """Means of the readings of dots, normalised by the limits, and their counts, (measured, dots)."""
 
-    value: FloatArray  # NaN where nothing was seen
-    seen: FloatArray
+    value: FloatArray  # NaN where no dot was seen
+    seen: FloatArray  # Number of readings in each mean
 
 
 class Learner:
-    """Calibrates the table of one unit from run to run, by a law.
+    """Calibrates the table of one unit from run to run, by a learning law.
 
-    The better open loop is used until the first stage is over, and wherever no hammer of the production
-    explains the readings, or likely hammers speak against the table: more of them than the doubt that is
-    allowed would print fewer dots within limits with it than in an open loop, or a row in which errors grow,
-    or the gain is next to nothing.
+    The better open loop is used during the first stage, and afterwards in each of three cases: no hammer of
+    the production explains the readings; more posterior samples than the doubt allows would print fewer dots
+    within limits with the table than in an open loop, or a row in which errors grow; the mean gain is below
+    2 % of the dots.
 
     Parameters
     ----------
     law : LearningLaw
-        What to do with readings; where it leads nowhere, one that starts from another table takes its place.
+        Learning law of the production; replaced by a law with another starting table if it does not converge.
     """
 
     def __init__(self, law: LearningLaw) -> None:
@@ -74,13 +74,13 @@ class Learner:
 
     @property
     def settings(self) -> FloatArray:
-        """What the next test line is printed with, shape (4, entries)."""
+        """Settings of the next test line, shape (4, entries)."""
         entries = self.law.entries
         return entries.settings(self.corrections) if self.stage else entries.open_loop
 
     @property
     def learned(self) -> bool:
-        """Whether the learned table is used for printing, and not an open loop."""
+        """Whether the learned table is used for printing, rather than an open loop."""
         return self.verdict.gains
 
     @property
@@ -90,7 +90,7 @@ class Learner:
 
     @property
     def pulse(self) -> Waveform:
-        """The pulse that it is printed with."""
+        """Pulse of the drive in use."""
         return self.law.entries.task.pulse if self.learned else self.verdict.loop.pulse
 
     @property
@@ -99,12 +99,12 @@ class Learner:
         return float("nan") if self.belief is None else self.belief.modes[0].misfit
 
     def see(self, ladder: Readings, line: Readings) -> None:
-        """Take in the readings of a run: of the dots of the ladder, and of the line."""
+        """Store the readings of a run: of the dots of the ladder and of the line."""
         self._ladders.append(self._scaled(ladder))
         self._line.append(self._scaled(line))
 
     def _scaled(self, readings: Readings) -> FloatArray:
-        """Return readings in parts of the limits, (measured, dots)."""
+        """Normalise readings by the limits, (measured, dots)."""
         limits, shown = self.law.entries.task.limits, [readings.time]
         if self.law.production.measured > 1 and readings.force is not None:
             shown.append(readings.force)
@@ -113,7 +113,7 @@ class Learner:
         )
 
     def learn(self) -> Printing[None]:
-        """Make of what was seen what follows for the next stage; asks for what hammers believed in print."""
+        """Estimate the constants and update the table after a stage; yields the lines to simulate."""
         law = self.law
         noise = law.production.noise[:, None]
         line = mean(self._line, noise)
@@ -129,7 +129,7 @@ class Learner:
                 line.value - shown, noise / np.sqrt(np.maximum(line.seen, 1.0))
             )
         update = yield from law.update(self.belief, self.corrections, unexplained)
-        # Where rows of the unit do not hold with these ways to fire, a table for it may have others.
+        # If rows of the unit are unstable with these pulses, a table tuned for it may choose other pulses.
         grows = update.verdict.multiplier > 1.0 and self.stage >= _LATE
         if (update.left > BAD or grows) and self._started < _STARTED:
             self._started += 1
@@ -141,7 +141,7 @@ class Learner:
                     self.law, update = other, again
         self.corrections, self.verdict = update.corrections, update.verdict
         if self.misfit > MISFIT:
-            # A belief that does not explain the readings says nothing of the unit.
+            # A posterior that does not explain the readings is no basis for a decision.
             self.verdict = _unknown(law)
         self.contractions.append(update.contraction)
         self._line = []
@@ -154,7 +154,7 @@ class Learner:
         count = np.concatenate([each.seen for each in means], axis=1)
         noise = np.hypot(law.production.noise[:, None] / np.sqrt(np.maximum(count, 1.0)), _FLOOR)
         rough = np.array([each.rest for each in law.shown]).reshape(measured, -1)
-        # A line that is printed later counts as the one in the open loop does.
+        # A later line has the surrogate residual of the line in open loop.
         rough = np.concatenate([rough, rough[:, -len(LINE) :]], axis=1)[:, : value.shape[1]]
         evidence = Evidence(value.ravel(), noise.ravel(), rough.ravel())
 
@@ -162,7 +162,7 @@ class Learner:
             shown = yield from law.production.readings(np.concatenate(asked), law.rungs, settings)
             return np.split(shown, np.cumsum([len(rows) for rows in asked])[:-1])
 
-        # The simulated hammers that look most like the unit, where only what is smooth counts.
+        # Searches start at the simulated hammers whose readings are nearest, at the coarsest level.
         known = law.seen.shape[1] // measured
         shown = slice(None), slice(known)
         off = value[shown] - law.seen.reshape(-1, measured, known)
@@ -174,7 +174,7 @@ class Learner:
 
 
 def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
-    """Return the means of what is known, without outliers where there are enough readings to know them."""
+    """Average readings over runs, without NaN and, from `_FEWEST` runs on, without outliers."""
     values = np.stack(readings)
     known = np.isfinite(values)
     if len(values) >= _FEWEST:
@@ -186,12 +186,12 @@ def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
 
 
 def _unknown(law: LearningLaw) -> Verdict:
-    """Return the verdict on a unit of which nothing is known: the better open loop of the production."""
+    """Return the verdict before any reading: the better open loop of the production."""
     return Verdict(False, law.first, *[float("nan")] * 3)
 
 
 def _unexplained(rest: FloatArray, noise: FloatArray) -> FloatArray:
-    """Return what is left of readings (measured, dots) without what noise leaves of them; 0 if unseen."""
+    """Estimate the model error from residuals (measured, dots) by shrinking out the noise; 0 if unseen."""
     known = np.isfinite(rest).any(axis=1, keepdims=True)
     size = 1.4826 * np.nanmedian(np.where(known, np.abs(rest), 0.0), axis=1, keepdims=True)
     more = np.maximum(size**2 - noise**2, 0.0)

@@ -1,18 +1,16 @@
-"""What is printed while a table is learned: a ladder of pulses from rest, and a line at the rate.
+"""Test prints of a learner: the ladder, chosen by greedy A-optimal design, and the test line.
 
-Learning simulates many hammers, a few at a time; learners and what they do at once place their orders
-together, and all of these are run as one ensemble. What a hammer prints does not depend on that.
+The *ladder* is a set of pulses from rest, each called a rung: a single pulse or a pair. The impact times of
+single pulses of different widths separate the strength of the coil from the distance of the pack. They do not
+depend on the stiffness of the paper, since the armature touches before the paper resists. The time of a
+second impact does: the second pulse of a pair catches the rebounding armature and returns it to the paper
+(pump and probe). Rungs are added one at a time; each step takes the rung that most reduces the variance of
+the estimated single-pulse force, averaged over the production (greedy A-optimal design; Pukelsheim, *Optimal
+Design of Experiments*, 2006, chapter 6). A greedy choice can miss a better combination of rungs.
 
-The ladder: pulses from rest that show what a line does not, and how its rungs are chosen.
-
-A rung is one pulse, or two. From the times of single pulses of different widths the strength of the coil and
-the distance of the pack can be told apart. The stiffness of the paper does not show in them: the armature
-touches before it is felt. It shows in the time of a second impact, where a second pulse catches the armature
-on its way back and returns it to the paper: pump and probe. Which rungs tell most depends on the hammer. They
-are chosen one after the other, each for what it adds to the knowledge of the force of the single pulse (in
-the language of experimental design, greedy and optimal in the sense of A, averaged over the production).
-
-Readings as quadratic functions of the constants of a hammer: to start a search, and to plan with.
+`Surrogate` approximates a reading by a quadratic function of the constants, to plan the ladder and to start
+searches. Learners are coroutines that yield orders; `printed` runs all pending orders in few ensembles. The
+results do not depend on how orders are grouped.
 """
 
 from __future__ import annotations
@@ -45,21 +43,21 @@ if TYPE_CHECKING:
     T = TypeVar("T")
     Printing: TypeAlias = "Work[Order, Printed, T]"
 
-_RIDGE: Final = 1e-3  # Of the regression: mean square of a coefficient that is nothing but noise
+_RIDGE: Final = 1e-3  # Ridge parameter of the regression, added to the diagonal of the normal matrix
 
 
 @dataclass(frozen=True)
 class Surrogate:
-    """A reading as a quadratic function of constants, in standard deviations, and what that leaves over."""
+    """Quadratic approximation of a reading in the constants, in prior standard deviations."""
 
     constant: float
     slope: FloatArray  # (constants,)
     curvature: FloatArray  # (constants, constants), symmetric
-    rest: float  # Root of the mean square of what is not quadratic
+    rest: float  # RMS residual of the regression
 
     @classmethod
     def of(cls, rows: FloatArray, values: FloatArray) -> Surrogate:
-        """Return the regression of values (members,) on constants (members, constants); NaN left out."""
+        """Fit values (members,) to constants (members, constants) by ridge regression, without NaN."""
         known = np.isfinite(values)
         size = rows.shape[1]
         upper = np.triu_indices(size)
@@ -79,32 +77,32 @@ class Surrogate:
         )
 
     def value(self, rows: FloatArray) -> FloatArray:
-        """Return the reading for constants (M, constants)."""
+        """Evaluate the reading for constants (M, constants)."""
         bent = 0.5 * np.einsum("mi,ij,mj->m", rows, self.curvature, rows)
         return np.asarray(self.constant + rows @ self.slope + bent)
 
     def gradient(self, rows: FloatArray) -> FloatArray:
-        """Return its derivatives by the constants, (M, constants)."""
+        """Evaluate the derivatives of the reading by the constants, (M, constants)."""
         return np.asarray(self.slope + rows @ self.curvature)
 
 
 DOTS: Final = 9
 """Number of dots of a ladder."""
 
-# Widths of single pulses and of both pulses of a pair, in parts of that of the hammer
+# Widths of single pulses and of both pulses of a pair, as fractions of the nominal width
 _SINGLE: Final = (0.7, 0.85, 1.0, 1.15, 1.3, 1.45)
 _FIRST: Final = (0.8, 1.0, 1.3)
 _SECOND: Final = (1.0, 1.3, 1.5)
-# When the second pulse comes after the armature has left the pack, in parts of the flight time
+# Times of the second pulse after the armature has left the pack, as fractions of the flight time
 _LATER: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.2, 1.6, 2.0, 2.4)
-_CLEAR: Final = 20e-6  # How much later than the nominal hammer a unit may leave the pack, s
-_SEEN: Final = 0.97  # Least share of the simulated hammers that print all dots of a rung
-_RUNS: Final = 8.0  # Number of runs after which knowledge is to be largest
-_POINTS: Final = 24  # Number of simulated hammers about which it is looked at
+_CLEAR: Final = 20e-6  # Allowance for a unit that leaves the pack later than the nominal hammer, s
+_SEEN: Final = 0.97  # Smallest fraction of the simulated hammers that have to print all dots of a rung
+_RUNS: Final = 8.0  # Number of runs after which the design is optimal
+_POINTS: Final = 24  # Number of simulated hammers over which the design is averaged
 
 
 class Rung(NamedTuple):
-    """A pulse from rest, and perhaps a second one some time, s, later; widths in parts of the hammer's."""
+    """A single pulse, or a pair `later` s apart; widths are fractions of the nominal width."""
 
     first: float
     later: float = 0.0
@@ -112,12 +110,12 @@ class Rung(NamedTuple):
 
     @property
     def dots(self) -> int:
-        """Number of dots."""
+        """Number of dots of the rung."""
         return 2 if self.later else 1
 
 
 def candidates(task: Task) -> list[Rung]:
-    """Return the rungs to choose from; in none a pulse is fired while the armature is in the pack."""
+    """List the rungs to choose from; no rung fires a pulse while the armature is in the pack."""
     hammer, widest = task.hammers[0], task.widest / task.width
     rungs = [Rung(part) for part in _SINGLE if part <= widest]
     for first in _FIRST:
@@ -148,27 +146,27 @@ def choose(
     noise: float,
     offset: float,
 ) -> list[Rung]:
-    """Return the rungs of a ladder, `DOTS` dots in all.
+    """Select the rungs of a ladder with `DOTS` dots by greedy A-optimal design.
 
     Parameters
     ----------
     times
-        Rungs to choose from, and the times of impact of their dots, in parts of the limit, (members, dots).
+        Candidate rungs, and the impact times of their dots, normalised by the limit, (members, dots).
     line
-        How the times of a line in an open loop depend on the constants.
+        Surrogates of the impact times of a line in open loop.
     force
-        How the force of the single pulse does.
+        Surrogate of the force of the single pulse.
     rows
-        The constants of the members, in standard deviations, (members, constants).
+        Constants of the members, in prior standard deviations, (members, constants).
     noise, offset
-        Standard deviations of one reading of a time, and of the offset of all, as fractions of the limit.
+        Standard deviations of a single time reading and of the sensor's offset, normalised by the limit.
     """
     points, variance = rows[:_POINTS], noise**2 / _RUNS
     wanted = np.pad(force.gradient(points), ((0, 0), (0, 1)))
     same = np.full((len(points), 1), offset)
 
     def information(readings: Sequence[Surrogate]) -> FloatArray:
-        # What is not smooth in the constants counts as noise: it cannot be followed far.
+        # The surrogate's residual counts as noise, since a search cannot use it from far away.
         slopes = [
             np.hstack([each.gradient(points), same]) / np.sqrt(variance + each.rest**2) for each in readings
         ]
@@ -198,7 +196,7 @@ def choose(
     return sorted(chosen)
 
 
-_MOST: Final = 4096  # Hammers in an ensemble
+_MOST: Final = 4096  # Maximum number of hammers in an ensemble; bounds the memory
 _STEPS: Final = (1, 2)  # Slots from dot to dot of the rows of which multipliers are computed
 
 LINE: Final = slots_of(cycle_with_lead_in(5, 0))
@@ -206,30 +204,30 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 
 
 class Order(NamedTuple):
-    """What hammers are to print."""
+    """A request to print: hammers, a drive for each, and the end time."""
 
     hammers: Sequence[Hammer]  # (M,)
-    drives: Sequence[PulseSequence]  # One each
+    drives: Sequence[PulseSequence]  # One drive per hammer, (M,)
     end: float  # s
 
 
 class Printed(NamedTuple):
-    """What they have printed."""
+    """Result of an order."""
 
-    dots: DotTable  # (M, most firings of any)
-    ok: BoolArray  # Which runs went as asked, (M,)
+    dots: DotTable  # (M, largest number of firings of a drive)
+    ok: BoolArray  # Mask of the runs that completed, (M,)
 
 
 @dataclass(frozen=True)
 class Press:
-    """Hammers with their driver, and what they print at a rate, Hz: they are units, or stand for some."""
+    """Prints ladders and lines with hammers, real units or simulated, at a rate in Hz."""
 
     task: Task
     rate: float
     hammers: Sequence[Hammer]
 
     def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
-        """Return flight times, s, and forces in parts of the nominal one, of the dots of rungs, (M, dots)."""
+        """Simulate a ladder: flight times, s, and forces normalised by the nominal force, (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
     def line(
@@ -238,17 +236,17 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> tuple[DotTable, Judgement]:
-        """Print a line, each hammer with its settings (4, entries); return dots, and how far off they are.
+        """Simulate a line, each hammer with its settings (4, entries); return dots and their deviations.
 
-        The pulses are those of the task unless each hammer gets its own.
+        `pulses` are the waveforms, one per hammer; by default that of the task.
         """
         return printed(self.order_line(settings, slots, pulses), self.task)
 
     def multipliers(self, settings: FloatArray) -> FloatArray:
         """Compute the multipliers of rows printed with settings (4, entries), for each hammer, (M,).
 
-        That is the largest absolute value of rows with a dot in every slot, and in every second one; see
-        `printhammer.derivatives.rows.row_multipliers`. NaN if neither row is a periodic orbit.
+        A multiplier is the largest absolute Floquet multiplier of two rows, with a dot in every slot and in
+        every second slot; see `printhammer.derivatives.rows.row_multipliers`. NaN if neither row is periodic.
         """
         task, count, drives = self.task, len(self.hammers), []
         for step in _STEPS:
@@ -259,7 +257,7 @@ class Press:
         return np.asarray(np.fmax.reduce(np.abs(growth).reshape(len(_STEPS), count)))
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
-        """Return what `ladder` returns; asks for it to be printed."""
+        """Compute the result of `ladder` as a coroutine that yields the order."""
         task, count = self.task, len(self.hammers)
         drives = []
         for rung in rungs:
@@ -285,7 +283,7 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> Printing[tuple[DotTable, Judgement]]:
-        """Return what `line` returns; asks for it to be printed."""
+        """Compute the result of `line` as a coroutine that yields the order."""
         task, due = self.task, slot_times(slots, self.rate)
         fired = [task.pulse] * len(settings) if pulses is None else pulses
         known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}
@@ -303,12 +301,12 @@ class Press:
 
 
 def printed(work: Printing[T], task: Task) -> T:
-    """Do a work to its end, and print what it asks for."""
+    """Run a coroutine to its end, simulating the orders that it yields."""
     return answered(work, partial(_run, effort=task.effort))
 
 
 def _run(orders: Sequence[Order], effort: Effort) -> list[Printed]:
-    """Print what is ordered, in few ensembles."""
+    """Simulate orders in as few ensembles of at most `_MOST` hammers as possible."""
     done: list[Printed] = []
     while len(done) < len(orders):
         batch: list[Order] = []

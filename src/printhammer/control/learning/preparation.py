@@ -1,4 +1,4 @@
-"""What is prepared before a unit is there: the robust table to start from, and the learning law."""
+"""Preparation of learning for a production: the robust starting table, the ladder and the learning law."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import together
 
-FORGETTING: Final = 0.02  # By default
-DOUBT: Final = 0.0  # By default
+FORGETTING: Final = 0.02  # Default of `forgetting`
+DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may lose
 MEMBERS: Final = 400
 """Number of simulated hammers on which a ladder is chosen."""
-_FEW: Final = 24  # Number of these on which open loops are compared
+_FEW: Final = 24  # Number of simulated hammers on which the open loops are compared
 
 
 def law_for(
@@ -51,7 +51,7 @@ def law_for(
     threads: int | None = None,
     report: Callable[[], None] = lambda: None,
 ) -> tuple[LearningLaw, CompensationTable]:
-    """Return the learning law for a hammer at a rate, Hz, and the robust table that it starts from.
+    """Prepare the learning law for a hammer at a rate, Hz, and the robust table that it starts from.
 
     Arguments are those of `learn`.
     """
@@ -93,7 +93,7 @@ def law_for(
 def _law(
     production: Production, entries: Adjustable, members: int, seed: int, forgetting: float, doubt: float
 ) -> LearningLaw:
-    """Choose the ladder, and find how what it shows depends on the constants of a hammer."""
+    """Choose the ladder, and fit surrogates of its readings to simulated hammers."""
     task, constants = production.task, production.constants
     drawn = production.variability.draw_rows(production.nominal, members, seed)
     press = production.press([hammer for _row, hammer in drawn])
@@ -124,7 +124,7 @@ def _law(
 
 
 def _own_loop(hammer: Hammer, task: Task, base: FloatArray) -> OpenLoop | None:
-    """Return the open loop of the hammer's own pulse, which arrives when that of the driver does."""
+    """Build the open loop of the hammer's own pulse, shifted to arrive when the driver's pulse does."""
     pulse: Any = hammer.waveform
     if not isinstance(getattr(pulse, "width", None), float):
         return None

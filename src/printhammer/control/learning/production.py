@@ -1,4 +1,4 @@
-"""What is known of a unit before it is there: the design, and how far a production is spread about it."""
+"""Prior of a learner: the nominal hammer, the variability of the production, and the sensor's errors."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ if TYPE_CHECKING:
     from printhammer.control.learning.lines import Printing
 
 SCALE: Final = 0.01
-"""Standard deviation of the gain error of a sensor, relative: its prior."""
+"""Prior standard deviation of the relative gain error of a sensor."""
 
 OFFSET: Final = 25e-6
-"""Standard deviation of the offset of a sensor's times, s: its prior, unless the sensor states a larger one.
+"""Prior standard deviation of the offset of a sensor's times, s, unless the sensor states a larger value.
 
 Sound takes 20 us for 7 mm of air before a microphone."""
 
 
 @dataclass(frozen=True)
 class Production:
-    """Hammers by their constants, in standard deviations, and what a sensor shows of them.
+    """Hammers of a production, addressed by their constants, and their readings by a sensor.
 
-    A row of constants is followed by the errors of the sensor itself, in standard deviations too: the gain of
-    its times, that of its forces if it has any, and the offset of its times.
+    A row holds the constants in prior standard deviations, followed by the errors of the sensor in prior
+    standard deviations: gain of its times, gain of its forces if it measures forces, offset of its times.
     """
 
     task: Task
@@ -46,7 +46,7 @@ class Production:
 
     @property
     def nominal(self) -> Hammer:
-        """The hammer as it was designed, with its driver."""
+        """Nominal hammer with its driver."""
         return self.task.hammers[0]
 
     @cached_property
@@ -66,31 +66,31 @@ class Production:
 
     @property
     def measured(self) -> int:
-        """How many numbers a dot the sensor shows: 1, or 2 with forces."""
+        """Number of readings per dot: 1, or 2 with forces."""
         return 1 if self.sensor.force is None else 2
 
     @property
     def noise(self) -> FloatArray:
-        """Standard deviation of a reading of each of them, in parts of the limits."""
+        """Standard deviations of a time and a force reading, normalised by the limits, (measured,)."""
         limits = self.task.limits
         return np.array([self.sensor.noise / limits.arrival, (self.sensor.force or 0.0) / limits.force])[
             : self.measured
         ]
 
     def hammers(self, rows: FloatArray) -> list[Hammer | None]:
-        """Return the hammers of rows (M, size), none where there is no such hammer."""
+        """Build the hammers of rows (M, size); None for constants that no hammer can have."""
         return self.variability.hammers(self.nominal, rows[:, : self.constants])
 
     def press(self, hammers: Sequence[Hammer]) -> Press:
-        """Return hammers that print."""
+        """Return a press for hammers at the rate of the production."""
         return Press(self.task, self.rate, hammers)
 
     def readings(
         self, rows: FloatArray, rungs: Sequence[Rung], lines: Sequence[FloatArray]
     ) -> Printing[FloatArray]:
-        """Return what is shown of hammers (M, size): of the ladder, and of lines printed with settings.
+        """Predict the readings of hammers (M, size): of the ladder, and of lines printed with settings.
 
-        The result, shape (M, measured * dots), is in parts of the limits; NaN where a dot is lost.
+        The result, shape (M, measured * dots), is normalised by the limits; NaN where a dot is lost.
         """
         hammers = self.hammers(rows)
         there = [k for k, hammer in enumerate(hammers) if hammer is not None]
@@ -114,6 +114,6 @@ class Production:
 def _told(
     line: Printing[tuple[DotTable, Judgement]], force: float
 ) -> Printing[tuple[FloatArray, FloatArray]]:
-    """Return flight times, s, and forces, in parts of one, of a line."""
+    """Extract the flight times, s, and the forces of a line, normalised by `force`."""
     dots, _judgement = yield from line
     return dots.flight_time, dots.peak_force / force

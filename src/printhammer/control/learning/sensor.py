@@ -1,7 +1,7 @@
-"""What is measured of a dot: the time from firing to impact, and, if asked for, its force.
+"""Impact sensor of a learner: the time from firing to impact and, optionally, the force, with noise.
 
-A microphone, a piezo element or the coil itself (`printhammer.impact_time`) gives the time; a load cell or
-the darkness of the dot the force. The noise depends on seed, unit and run only.
+A microphone, a piezo element or the coil itself (`printhammer.impact_time`) measures the time; a load cell
+or the darkness of the dot the force. The noise depends on seed, unit and run only.
 """
 
 from __future__ import annotations
@@ -17,29 +17,27 @@ from printhammer.support.arrays import FloatArray
 
 
 class Readings(NamedTuple):
-    """What a sensor shows of some dots, in the order of their firings; NaN where it saw no impact."""
+    """Sensor readings of dots, in the order of their firings; NaN where no impact was detected."""
 
-    time: FloatArray  # From firing to impact, s
-    force: FloatArray | None  # Largest force, in parts of what the nominal hammer does; None if not measured
+    time: FloatArray  # Time from firing to impact, s
+    force: FloatArray | None  # Peak force, normalised by the nominal force; None if not measured
 
 
 class ImpactSensor(Declared):
-    """A sensor that tells a time a dot, and a force where its noise is given."""
+    """Sensor of one impact time per dot and, if the noise of the force is given, one force."""
 
     noise: float = scalar("s", "standard deviation of the time of impact", default=5e-6)
     force: float | None = part(
-        "standard deviation of the force, relative; None where it is not measured", default=None
+        "standard deviation of the force, relative; None if it is not measured", default=None
     )
-    colour: float = part("correlation of the noise of a dot with that of the dot before", default=0.0)
-    gain: float = part("error of the scale of times and forces, relative", default=0.0)
-    missed: float = part("share of the impacts that are not seen", default=0.0)
-    false: float = part("share of the impacts before which something else is taken for one", default=0.0)
-    seed: int = part("of the noise", default=0)
-    delay: float = scalar(
-        "s", "constant error of the time of impact, which the learner has to find", default=0.0
-    )
+    colour: float = part("correlation of the noise of consecutive dots", default=0.0)
+    gain: float = part("relative gain error of times and forces", default=0.0)
+    missed: float = part("fraction of impacts that are not detected", default=0.0)
+    false: float = part("fraction of impacts with a false detection before them", default=0.0)
+    seed: int = part("seed of the noise", default=0)
+    delay: float = scalar("s", "constant error of the impact time, unknown to the learner", default=0.0)
     offset: float = scalar(
-        "s", "standard deviation over units of an error that is the same for every dot of a unit", default=0.0
+        "s", "standard deviation, over units, of an error common to all dots of a unit", default=0.0
     )
 
     def __post_init__(self) -> None:
@@ -67,7 +65,7 @@ class ImpactSensor(Declared):
             )
 
     def read(self, flight: FloatArray, force: FloatArray, unit: int, run: int) -> Readings:
-        """Return what is shown of dots (N,) by their true flight times, s, and forces; NaN if lost."""
+        """Simulate readings of dots (N,) from true flight times, s, and forces; NaN for lost dots."""
         rng = np.random.default_rng((self.seed, unit, run))
         time = (1.0 + self.gain) * flight + self.delay + self.noise * self._noise(rng, flight.size)
         if self.offset:
@@ -82,7 +80,7 @@ class ImpactSensor(Declared):
         return Readings(time, np.where(unseen | early, np.nan, shown))
 
     def _noise(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return noise of standard deviation 1, each number correlated with the one before."""
+        """Draw noise of standard deviation 1 as a first-order autoregressive process."""
         white = rng.standard_normal(count)
         if not self.colour:
             return white
