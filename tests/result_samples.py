@@ -183,8 +183,9 @@ def recorded_impacts(hammer: Hammer) -> Result:
 
     from printhammer.control.recorded_impacts import RecordedImpacts
 
-    times, sizes = np.array([2.6e-4, np.nan]), np.array([80.0, 2.0])
-    return RecordedImpacts(hammer, "current", 2.65e-4, ("1.csv", "2.csv"), times, sizes, ("", "unseen"))
+    times, errors, sizes = np.array([2.6e-4, np.nan]), np.array([2e-6, 9e-6]), np.array([80.0, 2.0])
+    names, flags = ("1.csv", "2.csv"), ("", "unseen")
+    return RecordedImpacts(hammer, "current", 2.65e-4, names, times, errors, sizes, flags)
 
 
 def thermal_duty(hammer: Hammer) -> Result:

@@ -1,17 +1,20 @@
 """Impact time from samples of coil current or voltage, by a matched filter with nuisance parameters.
 
 The moving armature induces a voltage in its coil, which changes at the impact: the current, which had dipped,
-turns, or the open-circuit voltage of a coil with a permanent magnet falls. Two simulations of the nominal
-hammer, with and without its pack, give the expected signature: their difference d(t) is zero up to the touch.
-The samples y minus the signal without pack are modelled as
+turns, or the open-circuit voltage of a coil with a permanent magnet falls. The samples y are modelled as
 
-  a d(t - shift) + b0 + b1 t + noise
+  a s(t - shift) + r(t) + b0 + b1 t + noise
 
 in a window around the touch, and the estimate is the shift with the least residual. For each shift, a, b0 and
 b1 are a linear least-squares fit, so the score is a filter with fixed weights (a matched filter, the
 generalised likelihood ratio; S. M. Kay, *Fundamentals of Statistical Signal Processing: Detection Theory*,
 1998, ch. 7). The straight line absorbs slow differences between a unit and the nominal hammer: resistance,
-temperature, rail.
+temperature, rail. The signature s and the reference r come from simulations of the nominal hammer:
+
+- where the driver holds its voltage throughout the search, the signal depends on the motion alone and moves
+  with the impact: s is the signal, r is 0;
+- where the driver switches, its edges stay: r is the signal of the hammer without its pack, and s is the
+  difference that the pack makes, which is zero up to the touch.
 
 The estimator knows the samples, the fired pulse and the nominal hammer, but nothing of the unit. Delay and
 bandwidth of the probe, if known, are part of the template. An estimate is flagged if the samples do not
@@ -39,7 +42,7 @@ from printhammer.printing.dots.nominal import pulse_of
 from printhammer.results import Declared, part, scalar
 from printhammer.run.motion import Motion
 from printhammer.run.simulate import simulate
-from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import BoolArray, FloatArray
 
 PHASES: Final = 8  # Number of trial shifts per sampling interval
 BEFORE: Final = 1.0  # Length of the window before the touch, in contact times
@@ -53,6 +56,7 @@ _SPAN: Final = 1.5  # Range of the converter, relative to the largest value arou
 _FLOWING: Final = 0.02  # Current at the touch below which it counts as decayed, relative to its largest
 _MOST_BEFORE: Final = 0.5  # Largest length of the window before the touch, in flight times
 _AROUND: Final = 0.2  # Largest shift within a window, in contact times
+_STEADY: Final = 1e-9  # Relative change of the coil voltage below which no driver switches
 _FINEST: Final = 400  # Largest number of shifts per contact time
 _MOVES: Final = 3  # Maximum number of window positions tried
 _FIRM: Final = ("pack.stiffness", "pack.damping")
@@ -145,15 +149,22 @@ class ImpactEstimator:
             )
         fine = np.asarray(self.step / PHASES * np.arange(PHASES * self.count), np.float64)
         run = simulate(hammer, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
-        free = self._without_pack(sampling, fine)
         true = sampling.shown(fine, sampling.of(run))
         touch = round(self._shown_at / self.step * PHASES)
-        # The open-circuit voltage may exceed the signature of the impact by far.
-        ahead = before if sampling.signal == "current" else 0
-        around = slice(max(touch - PHASES * ahead, 0), touch + PHASES * after)
+        reach = math.ceil(REACH * self.flight / self.step)
+        search = slice(max(touch - PHASES * (before + reach), 0), touch + PHASES * (after + reach))
+        # An early end of clipping resembles an impact, so the range covers the current of the whole search.
+        # The open-circuit voltage before the touch may exceed the signature of the impact by far.
+        first = search.start if sampling.signal == "current" else touch
+        around = slice(first, touch + PHASES * after)
         self.sampling = sampling.scaled_to(_SPAN * max(float(true[around].max()), 0.0) or 1.0)
-        self._free = self.sampling.clipped(free)[::PHASES]
-        self._template = self.sampling.clipped(true) - self.sampling.clipped(free)
+        supply = run.voltage[search]
+        held = supply.size > 0 and float(np.ptp(supply)) <= _STEADY * float(np.abs(supply).max())
+        free = np.zeros(fine.size) if held else self._without_pack(fine)
+        self._free = free[::PHASES]
+        self._template = self.sampling.clipped(true) - free
+        beside = slice(max(touch - PHASES * before, 0), touch + PHASES * after)
+        self._unclipped = not self._is_clipped(true[beside])
         self._currents = float(np.abs(run.current).max()), float(run.current[touch])
         self._check_signal()
 
@@ -176,10 +187,15 @@ class ImpactEstimator:
 
         `samples`, A or V, begin at the firing; samples beyond the first `count` are ignored.
         """
-        left = np.asarray(samples, np.float64)[: self.count] - self._free
+        samples = np.asarray(samples, np.float64)
+        left = samples[: self.count] - self._free
         windows = sliding_window_view(left, self._size)
         touches = self.step * (self._before + np.arange(len(windows)))
         near = np.flatnonzero(np.abs(touches - self._shown_at) <= REACH * self.flight)
+        if self._unclipped:
+            near = near[~self._is_clipped(sliding_window_view(samples[: self.count], self._size)[near])]
+        if not near.size:
+            return ImpactEstimate(math.nan, UNSEEN, 0.0)
         place = int(near[np.argmax(self._likeness(windows[near]))])
         shifts, weights, sizes = self._filters
         for _ in range(_MOVES):
@@ -203,6 +219,11 @@ class ImpactEstimator:
             edges = self.pulse.segments()[1:, 0] + self.sampling.delay
             flag = EDGE if ((edges > first) & (edges < last)).any() else UNLIKE
         return ImpactEstimate(shown - self.sampling.delay, flag, clearness)
+
+    def _is_clipped(self, windows: FloatArray) -> BoolArray:
+        """Whether windows contain readings at the upper end of the range."""
+        full_scale = self.sampling.full_scale or math.inf
+        return np.asarray((windows >= full_scale - self.sampling.step).any(axis=-1))
 
     def _energy(self, windows: FloatArray) -> FloatArray:
         """Return the sums of squares of windows after removal of their straight-line fits."""
@@ -247,14 +268,14 @@ class ImpactEstimator:
             expected="a hammer that prints",
         )
 
-    def _without_pack(self, sampling: Sampling, fine: FloatArray) -> FloatArray:
-        """Simulate the signal without a pack, A or V, held at its last value if the simulation ends early."""
+    def _without_pack(self, fine: FloatArray) -> FloatArray:
+        """Simulate the readings without a pack, A or V, held at their last value if the run ends early."""
         known = self.hammer.constants
         away = self.hammer.replace({key: _SOFT * known[key].si for key in _FIRM if key in known})
         run = simulate(away, PulseTrain(self.pulse), duration=float(fine[-1]) + self.step, times=fine)
-        values = sampling.of(run)
+        values = self.sampling.of(run)
         whole = np.concatenate([values, np.full(fine.size - values.size, values[-1])])
-        return sampling.shown(fine, whole)
+        return self.sampling.clipped(self.sampling.shown(fine, whole))
 
     def _check_signal(self) -> None:
         sampling, (largest, now) = self.sampling, self._currents

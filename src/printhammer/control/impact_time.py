@@ -21,6 +21,8 @@ from printhammer.results.summary import (
     Cells,
     Grid,
     Summary,
+    quantity,
+    styled,
 )
 from printhammer.run.simulate import simulate
 from printhammer.support.arguments import checked
@@ -51,6 +53,7 @@ class ImpactTime(Result, rows=_CELLS):
     signal: str = part("sampled signal, current or voltage")
     variability: Variability = part("variability of the units")
     flight_time: float = scalar("s", "flight time of the nominal hammer")
+    flight_deviation: float = scalar("s", "RMS deviation of the units from this flight time")
     dots: int = part("number of dots per setting")
     noise: FloatArray = coordinate("", "standard deviation of a sample, A or V", "noise")
     sampling_rate: FloatArray = coordinate("Hz", "sampling rate", "sampling_rate")
@@ -89,7 +92,14 @@ class ImpactTime(Result, rows=_CELLS):
             Cells("missed", [f"{100.0 * missed:.0f} %" for missed in self.unit_missed.ravel()]),
             Cells("flagged", [f"{100.0 * flagged:.0f} %" for flagged in self.unit_flagged.ravel()]),
         ]
-        return Summary([Grid(columns, self.title, most=24)])
+        said = (
+            f"nominal flight time {quantity(self.flight_time, 's')}, from which the units deviate by"
+            f" {quantity(self.flight_deviation, 's')} (RMS)"
+        )
+        errors = np.hypot(self.unit_bias, self.unit_deviation)
+        if np.isfinite(errors).any() and not (errors < self.flight_deviation).any():
+            said += "; " + styled("bad", "estimates of units are no better than that time")
+        return Summary([Grid(columns, self.title, most=24), said])
 
     def entries(self) -> Entries:
         """Return the arrays, with the noise in the unit of the signal."""
@@ -215,7 +225,7 @@ def impact_time(
     rng = np.random.default_rng((first, 1))
     names = ("bias", "deviation", "missed", "flagged")
     arrays = {f"{prefix}{name}": np.full(shape, np.nan) for prefix in ("", "unit_") for name in names}
-    flight, done = np.nan, 0
+    flight, deviation, done = np.nan, np.nan, 0
     for j, rate in enumerate(rates.tolist()):
         records: list[Any] = []
         for i, k in itertools.product(range(levels.size), range(widths.size)):
@@ -226,9 +236,10 @@ def impact_time(
             estimator = ImpactEstimator(hammer, assumed)
             flight = estimator.flight
             if not records:
-                records = [_record(unit, estimator, probe) for unit in (hammer, *drawn)]
-            own = _errors(estimator, records[:1], many, rng)
-            all_units = _errors(estimator, records[1:], many, rng)
+                records = [unit_record(unit, estimator, probe) for unit in (hammer, *drawn)]
+                deviation = flight_deviation(estimator, records[1:])
+            own = errors_of(estimator, records[:1], many, rng)
+            all_units = errors_of(estimator, records[1:], many, rng)
             for prefix, (errors, believed) in (("", own), ("unit_", all_units)):
                 shown = np.isfinite(errors)
                 seen = errors[shown & believed]
@@ -245,6 +256,7 @@ def impact_time(
         signal=signal,
         variability=spread,
         flight_time=flight,
+        flight_deviation=deviation,
         dots=many,
         noise=levels,
         sampling_rate=rates,
@@ -271,7 +283,7 @@ def _largest_current(hammer: Hammer) -> float:
     return float(np.abs(motion.current).max())
 
 
-def _record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
+def unit_record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
     """Simulate the probe signal, A or V, of one dot of a unit, and its impact time, s."""
     each = PHASES if probe.delay or probe.bandwidth is not None else 1
     times = np.asarray(estimator.step / each * np.arange(each * estimator.count), np.float64)
@@ -284,12 +296,12 @@ def _record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[
     return probe.shown(times, whole)[::each], np.nan if flight is None else float(flight)
 
 
-def _errors(
+def errors_of(
     estimator: ImpactEstimator, records: Sequence[Any], dots: int, rng: np.random.Generator
 ) -> tuple[FloatArray, BoolArray]:
     """Return the errors of estimated impact times, s, and a mask of the estimates that are not flagged.
 
-    The dots cycle through the records.
+    The dots cycle through the records, which are those of `unit_record`.
     """
     errors, believed = [], []
     for number in range(dots):
@@ -298,3 +310,14 @@ def _errors(
         errors.append(estimate.time - flight)
         believed.append(not estimate.flag)
     return np.array(errors), np.array(believed)
+
+
+def flight_deviation(estimator: ImpactEstimator, records: Sequence[Any]) -> float:
+    """Return the RMS deviation of the flight times of records from the nominal flight time, s."""
+    return root_mean_square(np.array([flight for _true, flight in records]) - estimator.flight)
+
+
+def root_mean_square(errors: FloatArray) -> float:
+    """Return the root mean square of the errors that are numbers; NaN if none is."""
+    known = errors[np.isfinite(errors)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else np.nan

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from printhammer.control.impact_estimator import UNITS, ImpactEstimator, Sampling, Signal
+from printhammer.control.impact_time import errors_of, flight_deviation, root_mean_square, unit_record
 from printhammer.drive.input import read_number, read_positive
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.identify.lowpass import bandwidth_of
 from printhammer.identify.noise import noise_of_record
+from printhammer.printing.rates.variability import Variability
 from printhammer.results import Result, column, coordinate, part, scalar
 from printhammer.results.summary import Cells, Grid, Summary
 from printhammer.support.arrays import FloatArray
@@ -22,6 +25,11 @@ from printhammer.support.tables.readings import Readings, read_table
 
 _BITS: Final = 24
 """Resolution of a converter without noticeable rounding; a record's rounding is part of its noise."""
+
+_UNITS: Final = 20  # Number of simulated units behind an uncertainty; arbitrary
+
+VAGUE: Final = "vague"
+"""Flag of an estimate whose uncertainty is no smaller than that of the nominal flight time."""
 
 _QUIET: Final = 1e-4
 """Smallest noise of a sample, as a fraction of the largest value."""
@@ -31,13 +39,22 @@ _UNEVEN: Final = 0.01
 
 
 class RecordedImpacts(Result, rows="record"):
-    """Impact times in records of one single shot each."""
+    """Impact times in records of one single shot each.
+
+    The uncertainty is that of the estimator, from 20 simulated units of `Variability.of(hammer)` with the
+    noise of the record; an estimate that is no better than the nominal flight time has the flag "vague".
+    """
 
     hammer: Hammer = part("nominal hammer")
     signal: str = part("recorded signal, current or voltage")
     flight_time: float = scalar("s", "flight time of the nominal hammer")
     record: tuple[str, ...] = coordinate("", "file of the record", "record")
     time: FloatArray = column("s", "time from firing to impact", "record", more="NaN if no impact shows")
+    uncertainty: FloatArray = column(
+        "s",
+        "RMS error of estimates that are not flagged, over simulated units of the production",
+        "record",
+    )
     clearness: FloatArray = column("1", "size of the impact's signature over the noise of a sample", "record")
     flag: tuple[str, ...] = column(
         "", "reason to doubt the estimate", "record", more="empty without a reason"
@@ -53,6 +70,7 @@ class RecordedImpacts(Result, rows="record"):
         columns = [
             Cells("record", list(self.record), left=True),
             self.cells("time"),
+            self.cells("uncertainty", "±"),
             Cells("size / noise", self.clearness, "", ".3g"),
             Cells("flag", list(self.flag), left=True),
         ]
@@ -94,7 +112,8 @@ def recorded_impacts(
         raise InputError.of("signal", signal, " or ".join(UNITS))
     late = read_number(delay, "s", "delay")
     width = None if bandwidth is None else read_positive(bandwidth, "Hz", "bandwidth")
-    estimates, flight = [], math.nan
+    estimates, errors, flight = [], [], math.nan
+    units = Variability.of(hammer).draw(hammer, _UNITS, 0)
     for path in paths:
         table = read_table(path, {"time": "s", signal: UNITS[signal]})
         table.check_times()
@@ -108,9 +127,11 @@ def recorded_impacts(
                 key="time",
                 expected=f"one from the firing at 0 s to {last:.4g} s",
             )
-        estimates.append(
-            estimator.estimate(estimator.sampling.clipped(np.interp(estimator.times, t, values)))
-        )
+        samples = estimator.sampling.clipped(np.interp(estimator.times, t, values))
+        estimate = estimator.estimate(samples)
+        error, nominal = _errors_of_units(estimator, units)
+        estimates.append(estimate if estimate.flag or error < nominal else replace(estimate, flag=VAGUE))
+        errors.append(error)
         flight = estimator.flight
     if not estimates:
         raise InputError("no records", key="records", expected="one or more")
@@ -120,9 +141,17 @@ def recorded_impacts(
         flight_time=flight,
         record=tuple(Path(path).name for path in paths),
         time=np.array([each.time for each in estimates]),
+        uncertainty=np.array(errors),
         clearness=np.array([each.clearness for each in estimates]),
         flag=tuple(each.flag for each in estimates),
     )
+
+
+def _errors_of_units(estimator: ImpactEstimator, units: Sequence[Hammer]) -> tuple[float, float]:
+    """Return the RMS errors over units of estimates that are not flagged and of the nominal time, s."""
+    records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
+    errors, believed = errors_of(estimator, records, len(records), np.random.default_rng(0))
+    return root_mean_square(errors[believed]), flight_deviation(estimator, records)
 
 
 def _estimator(

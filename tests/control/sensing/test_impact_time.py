@@ -9,7 +9,9 @@ from tests.errors import refused
 
 import printhammer as ph
 from printhammer.control.impact_estimator import ImpactEstimator, Sampling
+from printhammer.control.impact_time import errors_of, root_mean_square, unit_record
 from printhammer.control.recorded_impacts import recorded_impacts
+from printhammer.printing.rates.variability import Variability
 
 
 @pytest.fixture(scope="module")
@@ -151,6 +153,65 @@ def test_what_the_study_flags_is_not_used(wire: ph.Hammer) -> None:
     assert abs(known.bias[0, 0, 0]) < 1e-6
 
 
+def test_an_armature_that_reaches_its_pole_makes_no_impact_of_its_own() -> None:
+    """The current of the relay begins far above that at the touch, and without a pack it meets its pole.
+
+    Both bent the signal like an impact: units erred by up to 1 ms, and nothing was flagged.
+    """
+    study = ph.impact_time(ph.load("relay-5v"), noise=["0.2 mA"], dots=24, units=12)
+    assert np.hypot(study.unit_bias, study.unit_deviation)[0, 0, 0] < 4e-6
+    assert study.flight_deviation > 1e-4
+    assert not study.unit_flagged.any()
+    assert not study.unit_missed.any()
+
+
+DEVICES = ("relay-5v", "pot-magnet", "pinball-coil", "dot-peen", "impact-wire", "braille-embosser")
+SMOOTH = "braille-embosser"  # Its soft contact is most of the flight: the current hardly tells the impact
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DEVICES)
+def test_estimates_of_random_devices_are_right_or_flagged(name: str) -> None:
+    """Mass, resistance and gap of a device are drawn, then units of that device."""
+    base, rng = ph.load(name), np.random.default_rng(34)
+    for _ in range(4):
+        factors = {"mass": 2.0, "coil.resistance": 1.2, "pack.front": 1.1}
+        device = base.replace(
+            {key: base.constants[key].si * most ** rng.uniform(-1, 0) for key, most in factors.items()}
+        )
+        scale = float(np.abs(ph.simulate(device, ph.PulseTrain(device.waveform)).current).max())
+        try:
+            estimator = ImpactEstimator(device, Sampling("current", 1e-3 * scale))
+        except ph.InputError:
+            continue  # The current is over before the impact.
+        units = Variability.of(device).draw(device, 28, 1)
+        records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
+        errors, believed = errors_of(estimator, records, len(records), rng)
+        stated = root_mean_square(errors[:20][believed[:20]])
+        worst = float(np.abs(errors[20:][believed[20:]]).max(initial=0.0))
+        assert worst < (4.0 * stated if name == SMOOTH else 0.25 * estimator.contact)
+        assert believed.mean() > 0.5 or name == "impact-wire"
+
+
+def test_clipped_readings_are_not_searched() -> None:
+    relay = ph.load("relay-5v")
+    estimator = ImpactEstimator(relay, Sampling(noise=2e-4, full_scale=0.045))
+    units = Variability.of(relay).draw(relay, 6, 0)
+    records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
+    errors, believed = errors_of(estimator, records, len(records), np.random.default_rng(0))
+    assert np.abs(errors[believed & np.isfinite(errors)]).max(initial=0.0) < 1e-5
+
+
+def test_an_estimate_no_better_than_the_nominal_time_is_vague(tmp_path: Path) -> None:
+    """The current of the embosser, whose contact is longer than half its flight, shows the impact poorly."""
+    embosser = ph.load(SMOOTH)
+    soft = embosser.replace("pack.stiffness", 0.2 * embosser.constants["pack.stiffness"].si)
+    path = tmp_path / "shot.csv"
+    ph.measure("current", soft, sensor={"sampling_rate": "100 kHz"}, duration="20 ms").write(path)
+    impacts = recorded_impacts(soft, [path])
+    assert impacts.flag[0] or impacts.uncertainty[0] > 3e-5
+
+
 def test_impacts_in_recorded_files(wire: ph.Hammer, tmp_path: Path) -> None:
     paths = [tmp_path / f"{k}.csv" for k in range(2)]
     sensor = {"sampling_rate": "1 MHz", "bandwidth": "100 kHz"}
@@ -160,6 +221,8 @@ def test_impacts_in_recorded_files(wire: ph.Hammer, tmp_path: Path) -> None:
     assert impacts.record == ("0.csv", "1.csv")
     np.testing.assert_allclose(impacts.time, impacts.flight_time, atol=2e-6)
     assert set(impacts.flag) == {""}
+    assert (impacts.uncertainty > 1e-6).all()
+    assert (impacts.uncertainty < 5e-6).all()
     paths[0].write_text("time [us],current [A]\n" + "\n".join(f"{k},0.5" for k in range(90)), "utf-8")
     with refused("time"):
         recorded_impacts(wire, paths)
