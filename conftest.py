@@ -10,10 +10,10 @@ from time import perf_counter
 
 import pytest
 from hypothesis import settings
-from numba.core import event
 from tests.hammers import CRUDE
 
 import printhammer as ph
+from printhammer.run.simulate import watch_compiling
 
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -75,31 +75,26 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-class Compiling(event.Listener):
-    """Count the functions that numba compiles in this process, and the time spent on them.
+class Compiling:
+    """Count the entry points that are compiled in this process, and the time spent on them.
 
     Attributes
     ----------
     functions : int
-        Number of compiled functions that a test called; the functions inlined into them are not counted.
+        Number of compiled entry points of the kernel.
     seconds : float
         Wall-clock time of the compilations, s.
     """
 
     def __init__(self) -> None:
         self.functions, self.seconds = 0, 0.0
-        self._depth, self._begun = 0, 0.0
+        self._begun = 0.0
 
-    def on_start(self, _event: event.Event) -> None:
-        """Start the clock at the outermost compilation."""
-        if self._depth == 0:
+    def __call__(self, begins: bool) -> None:
+        """Start the clock when a compilation begins, stop it when it ends."""
+        if begins:
             self._begun = perf_counter()
-        self._depth += 1
-
-    def on_end(self, _event: event.Event) -> None:
-        """Stop the clock at the outermost compilation."""
-        self._depth -= 1
-        if self._depth == 0:
+        else:
             self.functions += 1
             self.seconds += perf_counter() - self._begun
 
@@ -133,7 +128,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Compile what most tests need once, before workers of their own do it side by side."""
-    event.register("numba:compile", COMPILING)
+    watch_compiling(COMPILING)
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
     if config.getoption("numprocesses", None) and not hasattr(config, "workerinput") and not compiled():
@@ -156,12 +151,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def compiled() -> bool:
     """Tell whether the machine code for the hammer of most tests is on disk."""
-    from printhammer.kernel.compile.specialise import is_ready, specialise
+    from printhammer.kernel.compile.specialise import specialise
     from printhammer.run.problem import laws_of
 
     hammer = ph.load(CRUDE)
     assert hammer.waveform is not None
-    return is_ready(specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).run)
+    return specialise(laws_of(hammer, ph.PulseTrain(hammer.waveform))).is_ready("run")
 
 
 @pytest.fixture(scope="session")

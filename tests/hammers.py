@@ -281,8 +281,15 @@ def interpreted() -> Iterator[None]:
 
 @functools.cache
 def _plain(laws: Any) -> specialise.Kernel:
-    # What all kernels share must be compiled as usual, for those that are.
-    for name in ("methods.hermite", "methods.landing", "lanes.batch"):
+    # What is lowered needs these compiled; imported for the first time in here, they would be plain for good.
+    import_module("printhammer.kernel.compile.lower")
+    for name in (
+        "methods.crossing",
+        "methods.hermite",
+        "methods.landing",
+        "single.stretch",
+        "variational.slopes",
+    ):
         import_module(f"printhammer.kernel.{name}")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)

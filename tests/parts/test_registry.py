@@ -170,7 +170,7 @@ def test_part_is_frozen_and_travels(part: Part) -> None:
 def test_machine_code_agrees_with_python(part: Part) -> None:
     import numba
 
-    from printhammer.kernel.compile.specialise import compile_law
+    from printhammer.kernel.compile.templates import compile_law
 
     c = np.array(part.packed(5e-5))
     values = {

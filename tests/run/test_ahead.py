@@ -21,28 +21,15 @@ from printhammer.run.simulate import announce_compiling
 
 
 def entry(name: str) -> Any:
-    """A compiled entry point whose machine code is nowhere yet."""
-
-    def function() -> None: ...
-
-    function.__module__ = "module"
-    return SimpleNamespace(
-        py_func=function,
-        signatures=[],
-        targetctx=None,
-        _cache=SimpleNamespace(cache_path="nowhere", holds=lambda _target: False),
-        name=name,
-        __module__="module",
-    )
+    """An entry point whose machine code is nowhere yet."""
+    code = SimpleNamespace(with_it=(), can_be_kept=True)
+    return SimpleNamespace(name=name, code=code, is_ready=lambda: False, function=lambda: name)
 
 
 @pytest.fixture
 def kernel() -> Kernel:
     names = ("run", "members", *AHEAD)
-    module: Any = SimpleNamespace(__name__="module", **{name: entry(name) for name in names})
-    made = Kernel({"module": module}, "some laws", {}, "digest")
-    made.laws = Laws("", "", "", "", "absent")
-    return made
+    return Kernel(Laws("", "", "", "", "absent"), "some laws", [entry(name) for name in names])
 
 
 def test_the_second_process_begins_with_the_run_and_is_waited_for_once(
@@ -56,7 +43,7 @@ def test_the_second_process_begins_with_the_run_and_is_waited_for_once(
 
     monkeypatch.setattr(specialise, "begin_ahead", begin)
     for name in ("members", "run", "members", "peaks", "quadratures"):
-        assert getattr(kernel, name).name == name
+        assert getattr(kernel, name) == name
         happened.append(name)
     laws = kernel.laws
     assert happened == ["members", laws, "run", "members", "waited", "peaks", "quadratures"]
@@ -71,7 +58,7 @@ def test_no_process_begins_unasked(kernel: Kernel, monkeypatch: pytest.MonkeyPat
     end = announce_compiling(lambda _sentence: None)
     assert specialise.begin_ahead is never
     end()
-    assert kernel.run.name == "run"
+    assert kernel.run == "run"
 
 
 def test_laws_that_the_second_process_cannot_import_are_no_trouble() -> None:
@@ -84,7 +71,7 @@ def test_what_is_made_ahead_is_what_a_motion_loads(hammer: ph.Hammer, tmp_path: 
     where = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     told = json.dumps(asdict(laws))
     subprocess.run([sys.executable, "-m", ahead.__name__, told], env=where, check=True)
-    made = {path.name for path in tmp_path.rglob("*.nbc")}
+    made = {path.name for path in tmp_path.rglob("*.code")}
     assert len(made) == len(AHEAD)
     hammer.save(tmp_path / "hammer.toml")
     code = f"""
@@ -94,5 +81,5 @@ motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
 _ = motion.dots, motion.energy
 """
     subprocess.run([sys.executable, "-c", code], env=where, check=True)
-    fresh = {path.name for path in tmp_path.rglob("*.nbc")} - made
-    assert [name.partition(".")[2].partition("_")[0] for name in fresh] == ["run"]
+    fresh = {path.name for path in tmp_path.rglob("*.code")} - made
+    assert [name.partition("_")[0] for name in fresh] == ["run"]

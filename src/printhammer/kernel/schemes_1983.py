@@ -182,7 +182,7 @@ def _program(functions: tuple[Callable[..., float], ...], implicit: bool) -> Cal
     """Compile the program of 1983 for a set of laws; `model` is packed constants, drive, options, places."""
     import numba
 
-    from printhammer.kernel.compile.specialise import compile_law
+    from printhammer.kernel.compile.templates import compile_law
 
     options: dict[str, Any] = {"error_model": "numpy"}
     magnet_force, spring_force, pack_loading, pack_memory, pack_unloading, elastic, viscous, rebound = (

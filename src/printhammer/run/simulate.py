@@ -122,6 +122,13 @@ def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) 
     return end
 
 
+def watch_compiling(callback: Callable[[bool], None]) -> None:
+    """Register a callback for the beginning (true) and the end (false) of every compilation."""
+    from printhammer.kernel.compile import cache
+
+    cache.watchers.add(callback)
+
+
 def end_of_run(hammer: Hammer, drive: Drive, duration: float | str | None) -> float:
     """Return the end of a run, s: `duration`, or the window of the device after the last firing.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,16 +32,9 @@ def seconds() -> float:
 @cache
 def measure() -> None:
     """Start measuring the compilation time of this process."""
-    from numba.core import event
+    from printhammer.run.simulate import watch_compiling
 
-    class Listener(event.Listener):
-        def on_start(self, _event: Any) -> None:
-            _begin()
-
-        def on_end(self, _event: Any) -> None:
-            _end()
-
-    event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
+    watch_compiling(lambda begins: _begin() if begins else _end())
 
 
 def listen(tell: Callable[[str], None]) -> None:

@@ -1,15 +1,14 @@
-"""Where machine code is kept, and what is said while it is made.
+"""Where machine code and modules are kept, and what is said while they are made.
 
-Machine code lies in a folder: that of NUMBA_CACHE_DIR, `__pycache__` beside the kernel, numba's folder of the
-user, or a temporary one of the user. In a container there may be none that can be written to, the disk may be
-full, a file cut short, a folder copied from another machine. None of this is a reason not to run: what can
-only be read is read, what cannot be kept or does not fit is made again.
+They lie in a folder: that of NUMBA_CACHE_DIR, `__pycache__` beside the kernel, numba's folder of the user,
+or a temporary one of the user. In a container there may be none that can be written to, the disk may be full,
+a file cut short, a folder copied from another machine. None of this is a reason not to run: what can only be
+read is read, what cannot be kept or does not fit is made again.
 """
 
 from __future__ import annotations
 
 import hashlib
-import inspect
 import os
 import stat
 import sys
@@ -18,27 +17,25 @@ from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from time import thread_time
-from typing import TYPE_CHECKING, Any
-
-from numba.core import caching, config
-from numba.misc import appdirs
+from typing import TYPE_CHECKING, Final
 
 from printhammer.kernel.compile import records
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-# Numba's own types are not complete.
-_config: Any = config
-_caching: Any = caching
-_user_folder: Any = appdirs.user_cache_dir
-
 listeners: set[Callable[[str], None]] = set()
 """Called with a sentence before machine code is made, and where its folder is of no use."""
 
+watchers: set[Callable[[bool], None]] = set()
+"""Called with true when machine code begins to be made, with false when it is there or has failed."""
+
 _NAME = "printhammer"
 _USER = f"{_NAME}-{os.getuid() if hasattr(os, 'getuid') else os.environ.get('USERNAME', 'user')}"
-_OTHER = "NUMBA_CACHE_DIR names another folder"
+_WANTED = "NUMBA_CACHE_DIR"
+_OTHER = f"{_WANTED} names another folder"
+_MARK: Final = b"printhammer 1\n"
+"""Beginning of a file; the SHA-256 digest of what follows is next."""
 _said: set[str] = set()
 
 
@@ -47,38 +44,39 @@ def _say(sentence: str) -> None:
         listener(sentence)
 
 
-def _say_once(sentence: str) -> None:
+def say_once(sentence: str) -> None:
+    """Tell the listeners a sentence, unless they have heard it in this process."""
     if sentence not in _said:
         _said.add(sentence)
         _say(sentence)
-
-
-def keep(function: Any, kind: str = "", label: str = "") -> Any:
-    """Have a compiled function's machine code kept on disk, where that can be; return the function.
-
-    `kind` is the kind of code in the records, and `label` says what it computes, for who waits for it.
-    """
-    # Plain Python where NUMBA_DISABLE_JIT is set.
-    if hasattr(function, "py_func"):
-        function._cache = Cache(function.py_func, kind, label)
-    return function
 
 
 def _temporary_folder() -> Path:
     return Path(tempfile.gettempdir()) / _USER
 
 
+def _user_folder() -> Path:
+    """Return where the operating system wants caches of programs."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "numba" / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "numba"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "numba"
+
+
 def _folders() -> Iterator[Path]:
-    """Return where machine code may be, the folder that is wanted most first."""
-    if _config.CACHE_DIR:
-        yield Path(_config.CACHE_DIR) / _NAME
+    """Yield the folders where machine code may be, the folder that is wanted most first."""
+    if wanted := os.environ.get(_WANTED):
+        yield Path(wanted) / _NAME
     yield Path(__file__).parents[1] / "__pycache__"
-    yield Path(_user_folder("numba", appauthor=False)) / _NAME
+    with suppress(RuntimeError):
+        # Without a home.
+        yield _user_folder() / _NAME
     yield _temporary_folder()
 
 
 def _is_safe(folder: Path) -> bool:
-    """Tell whether nobody else can have put code, which would be run, into the temporary folder."""
+    """Whether nobody else can have put code, which would be run, into the temporary folder."""
     if folder != _temporary_folder():
         return True
     try:
@@ -101,156 +99,127 @@ def _can_be_written(folder: Path) -> bool:
         return False
 
 
-class _Locator(_caching._SourceFileBackedLocatorMixin, _caching._CacheLocator):  # type: ignore[misc]
-    """Keeps machine code in one folder, whichever place the program is in: it can be copied."""
-
-    def __init__(self, function: Any, folder: Path) -> None:
-        self._py_file = inspect.getfile(function)
-        self._lineno = function.__code__.co_firstlineno
-        self._folder = folder
-
-    def get_cache_path(self) -> str:
-        return str(self._folder)
-
-
-class _Results(_caching.CompileResultCacheImpl):  # type: ignore[misc]
-    """Turns what was compiled into the content of files, and back."""
-
-    def __init__(self, function: Any, folder: Path) -> None:
-        self._locator = _Locator(function, folder)
-        self._lineno = self._locator._lineno
-        name = f"{Path(self._locator._py_file).stem}.{function.__qualname__}"
-        self._filename_base = self.get_filename_base(name, getattr(sys, "abiflags", ""))
+def _content(path: Path) -> bytes | None:
+    """Return what a file holds; None if there is none, or not all of it."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    head = len(_MARK) + hashlib.sha256().digest_size
+    mark, payload = content[:head], content[head:]
+    return payload if mark == _MARK + hashlib.sha256(payload).digest() else None
 
 
-class _Files(_caching.IndexDataCacheFile):  # type: ignore[misc]
-    """An index and files of machine code, each named after what it is for.
+def _write(path: Path, payload: bytes) -> None:
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        draft.write_bytes(_MARK + hashlib.sha256(payload).digest() + payload)
+        draft.replace(path)
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
 
-    Numba counts them: two processes that compile for different processors at once would take the same number.
+
+class File:
+    """A file that holds what was made once, under a name that says from what; trouble with it is nobody's.
+
+    It is read from the folders that can only be read, up to the first one that can be written to, and kept in
+    that one.
     """
 
-    def save(self, key: Any, data: Any) -> None:
-        name = self._data_name(int(hashlib.sha256(repr(key).encode()).hexdigest()[:12], 16))
-        self._save_data(name, data)
-        entries = self._load_index()
-        entries[key] = name
-        self._save_index(entries)
-
-
-class _Folder(_caching.FunctionCache):  # type: ignore[misc]
-    """The machine code of one function in one folder."""
-
-    def __init__(self, function: Any, folder: Path) -> None:
-        self.folder = folder
-        self._py_func = function
-        self._name = repr(function)
-        self._impl = _Results(function, folder)
-        self._cache_path = str(folder)
-        stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = _Files(self._cache_path, self._impl.filename_base, stamp)
-        self.enable()
-
-    def holds(self, target: Any) -> bool:
-        """Tell whether there is machine code of the function for this processor."""
-        try:
-            entries = self._cache_file._load_index()
-        except Exception:  # noqa: BLE001 - what unpickling a file cut short raises is not known
-            return False
-        return any(key[1] == target.codegen().magic_tuple() for key in entries)
-
-
-class Cache(_caching._Cache):  # type: ignore[misc]
-    """The machine code of a function on disk; trouble with its files is never that of who calls it.
-
-    It is read from the folders that can only be read, up to the first one that can be written to, and kept
-    in that one.
-    """
-
-    def __init__(self, function: Any, kind: str, label: str) -> None:
-        self._function = function
-        self.kind, self.label = kind, label
-        self.with_it: tuple[Cache, ...] = ()
-        """What is often needed after it."""
-        self._begun = 0.0
-        self._enabled = True
+    def __init__(self, name: str) -> None:
+        self.name = name
 
     @cached_property
-    def _written(self) -> _Folder | None:
-        folders = (folder for folder in _folders() if _can_be_written(folder))
-        return next((_Folder(self._function, folder) for folder in folders), None)
+    def _written(self) -> Path | None:
+        """The folder that it goes to; None if no folder can be written to."""
+        return next((folder for folder in _folders() if _can_be_written(folder)), None)
 
     @cached_property
-    def _read(self) -> list[_Folder]:
-        folders: list[_Folder] = []
+    def _read(self) -> list[Path]:
+        folders: list[Path] = []
         for folder in _folders():
-            if self._written is not None and folder == self._written.folder:
-                return [*folders, self._written]
+            if folder == self._written:
+                return [*folders, folder]
             if folder.is_dir() and _is_safe(folder):
-                folders.append(_Folder(self._function, folder))
+                folders.append(folder)
         return folders
 
     @property
-    def cache_path(self) -> str | None:
-        """The folder that machine code goes to; None if no folder can be written to."""
-        return None if self._written is None else self._written.cache_path
+    def can_be_kept(self) -> bool:
+        """Whether a folder can be written to."""
+        return self._written is not None
 
-    def enable(self) -> None:
-        """Use the files."""
-        self._enabled = True
+    def read(self) -> bytes | None:
+        """Return the content; None if it is not there, or damaged."""
+        contents = (_content(folder / self.name) for folder in self._read)
+        return next((content for content in contents if content is not None), None)
 
-    def disable(self) -> None:
-        """Use no files."""
-        self._enabled = False
-
-    def flush(self) -> None:
-        """Forget the machine code in the folder that can be written to."""
-        if self._written is not None:
-            self._try(self._written.flush)
-
-    def holds(self, target: Any) -> bool:
-        """Tell whether machine code of the function is on disk, for this processor and these versions."""
-        return any(folder.holds(target) for folder in self._read)
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return machine code that is kept; None, and say what comes, where there is none that fits."""
-        for folder in self._read if self._enabled else ():
-            try:
-                result = folder.load_overload(sig, target_context)
-            except Exception:  # noqa: BLE001 - what unpickling a file cut short raises is not known
-                if folder is self._written:
-                    self.flush()
-            else:
-                if result is not None:
-                    return result
-        if listeners:
-            self._tell(target_context)
-        self._begun = thread_time()
-        return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep machine code, and how long it took; say once in this process where it cannot be."""
-        seconds = thread_time() - self._begun
-        if self._written is None or not self._enabled:
+    def keep(self, content: bytes) -> None:
+        """Keep the content; say once in this process where it cannot be."""
+        if self._written is None:
             return
-        self._try(self._written.save_overload, sig, data)
-        if self.kind:
-            with suppress(OSError):
-                records.note(self._written.folder, self.kind, seconds)
-
-    def _try(self, write: Callable[..., None], *arguments: Any) -> None:
         try:
-            write(*arguments)
+            _write(self._written / self.name, content)
         except OSError as error:
-            _say_once(f"{self.cache_path}: machine code cannot be kept ({error.strerror or error}); {_OTHER}")
+            say_once(f"{self._written}: machine code cannot be kept ({error.strerror or error}); {_OTHER}")
 
-    def _tell(self, target: Any) -> None:
+    def get(self, make: Callable[[], bytes]) -> bytes:
+        """Return the content, made and kept if it is not there."""
+        content = self.read()
+        if content is None:
+            content = make()
+            self.keep(content)
+        return content
+
+
+class Code(File):
+    """The machine code of an entry point on disk, made when it is wanted.
+
+    `kind` is the kind of code in the records, and `label` says what it computes, for who waits for it.
+    """
+
+    def __init__(self, name: str, kind: str, label: str) -> None:
+        super().__init__(name)
+        self.kind, self.label = kind, label
+        self.with_it: tuple[Code, ...] = ()
+        """What is often needed after it."""
+        self.is_begun = False
+
+    def exists(self) -> bool:
+        """Whether the machine code is on disk, for this processor and these versions."""
+        return self.read() is not None
+
+    def get(self, make: Callable[[], bytes]) -> bytes:
+        """Return machine code; where there is none, say what comes, make it, and note how long that took."""
+        code = self.read()
+        if code is not None:
+            return code
+        if listeners:
+            self._announce()
+        self.is_begun = True
+        begun = thread_time()
+        for watcher in tuple(watchers):
+            watcher(True)
+        try:
+            code = make()
+        finally:
+            for watcher in tuple(watchers):
+                watcher(False)
+        self.keep(code)
+        if self._written is not None:
+            with suppress(OSError):
+                records.note(self._written, self.kind, thread_time() - begun)
+        return code
+
+    def _announce(self) -> None:
         """Say what is about to be compiled, how long that takes, and what may follow."""
-        folders = [folder.folder for folder in self._read]
+        folders = self._read
         for folder in folders:
             if reason := records.mismatch(folder):
-                _say_once(f"{folder}: the machine code there {reason}; it is made anew")
+                say_once(f"{folder}: the machine code there {reason}; it is made anew")
         seconds = records.expected(folders, self.kind)
-        later = [other for other in self.with_it if not (other._begun or other.holds(target))]
+        later = [other for other in self.with_it if not (other.is_begun or other.exists())]
         rest = sum(records.expected(folders, other.kind) for other in later)
         more = f", then at most {rest:.0f} s for {', '.join(other.kind for other in later)}" if later else ""
         what = f"{self.kind} ({self.label})"
@@ -263,8 +232,8 @@ class Cache(_caching._Cache):  # type: ignore[misc]
         """Where the machine code is kept, in a few words."""
         if self._written is None:
             return f"kept nowhere, since no folder for it can be written to; {_OTHER}"
-        wanted, folder = next(_folders()), self._written.folder
-        if _config.CACHE_DIR and folder != wanted:
+        wanted, folder = next(_folders()), self._written
+        if os.environ.get(_WANTED) and folder != wanted:
             return f"once, kept in {folder}, since {wanted} cannot be written to"
         if folder == _temporary_folder():
             return f"once, kept in {folder}, since no other folder can be written to; {_OTHER}"

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numba
 from numba.core.registry import CPUDispatcher
 
-from printhammer.kernel.compile.cache import keep
-from printhammer.kernel.compile.linking import KeptCompiler, PartCompiler, WholeCompiler
+from printhammer.kernel.compile.linking import KeptCompiler, OpenCompiler, PartCompiler, WholeCompiler
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -81,10 +80,10 @@ def called(function: Function) -> Function:
 
 
 def entry(function: Function) -> Function:
-    """Compile an entry point lazily and keep its machine code on disk.
+    """Compile an entry point lazily, as the last part of its template."""
+    return _helper(function, PartCompiler, _CALLED)
 
-    The cache on disk goes by file and qualified name, which all kernels share; the digest of the kernel's
-    sources, that :mod:`printhammer.kernel.compile.specialise` defines in a template module, keeps them apart.
-    """
-    function.__qualname__ += "_" + function.__globals__["DIGEST"]
-    return keep(numba.njit(pipeline_class=WholeCompiler, **_CALLED)(function))  # type: ignore[no-any-return]
+
+def opened(function: Function) -> Function:
+    """Compile the calls of a function, and leave open what it does."""
+    return _helper(function, OpenCompiler, _CALLED)

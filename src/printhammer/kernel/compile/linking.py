@@ -1,9 +1,9 @@
-"""Compilers for the functions of a kernel: helpers stay parts, an entry point is made a whole of them, once.
+"""Compilers for the functions of a kernel: each stays a part, and a template is all parts that it calls.
 
 Numba compiles each function to machine code of its own, with all that it calls, and then links and optimises
 the same functions again in whatever calls it: a helper five calls deep is compiled five times over, and the
-machine code of four is never run. Here the module of a helper is kept as it was lowered, and an entry point
-links all of its helpers before anything is optimised.
+machine code of four is never run. Here the module of a helper is kept as it was lowered, and all helpers of
+an entry point are linked before anything is optimised.
 """
 
 from __future__ import annotations
@@ -37,15 +37,37 @@ class _Part(JITCodeLibrary):
         return self._final_module
 
     def link_callees(self, module: Any) -> None:
-        """Link all that this library calls, directly or through others, into a module."""
+        """Link all that this library calls, directly or through others, into a module, but for laws."""
+        for library in self._callees():
+            if not isinstance(library, Open):
+                alone = isinstance(library, _Part) and not isinstance(library, _Whole)
+                module.link_in(
+                    library.own_module() if alone else library._get_module_for_linking(), preserve=True
+                )
+
+    def with_callees(self, function: str, symbol: str) -> Any:
+        """Return the module of a helper with all that it calls.
+
+        From outside only `function` is seen, under the name `symbol`. Laws stay open, under the names of
+        their stubs.
+        """
+        module = self.own_module().clone()
+        self.link_callees(module)
+        module.get_function(function).name = symbol
+        laws = {law.function: law.name for law in self._callees() if isinstance(law, Open)}
+        for one in (*module.functions, *module.global_variables):
+            if one.is_declaration:
+                one.name = laws.get(one.name, one.name)
+            else:
+                one.linkage = "external" if one.name == symbol else "internal"
+        return module
+
+    def _callees(self) -> list[Any]:
+        """Return the libraries that this one calls, directly or through others."""
         ordered: dict[Any, None] = {}
         self._add_callees(ordered)
         # The linker takes a function only if what is there already calls it: callers come first.
-        for library in reversed(ordered):
-            alone = isinstance(library, _Part) and not isinstance(library, _Whole)
-            module.link_in(
-                library.own_module() if alone else library._get_module_for_linking(), preserve=True
-            )
+        return list(reversed(ordered))
 
     def _add_callees(self, ordered: dict[Any, None]) -> None:
         """Add the libraries that this one calls, directly or through others, each after those it calls."""
@@ -63,6 +85,15 @@ class _Part(JITCodeLibrary):
         return self._shared_module
 
 
+class Open(_Part):
+    """The stub of a law, of which callers know the name, and which no module has."""
+
+    @property
+    def function(self) -> str:
+        """Symbol of the stub in what calls it."""
+        return next(str(one.name) for one in self._final_module.functions if not one.is_declaration)
+
+
 class _Kept(_Part):
     """The module of a helper that stays a function."""
 
@@ -70,7 +101,7 @@ class _Kept(_Part):
 
 
 class _Whole(_Part):
-    """The module of an entry point, with all that it calls."""
+    """The module of a helper that Python calls, with all that it calls."""
 
     def finalize(self) -> None:
         """Link, optimise and make machine code."""
@@ -117,6 +148,12 @@ class _LowerKept(_LowerPart):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
+class _LowerOpen(_LowerPart):
+    _name = "lower_open"
+    kind = Open
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)  # type: ignore[no-untyped-call]
 class _LowerWhole(NativeLowering):
     _name = "lower_whole"
 
@@ -153,7 +190,13 @@ class KeptCompiler(_Lowered):
     lowering = _LowerKept
 
 
+class OpenCompiler(_Lowered):
+    """Compiler of stubs of laws."""
+
+    lowering = _LowerOpen
+
+
 class WholeCompiler(_Lowered):
-    """Compiler of entry points, which Python calls."""
+    """Compiler of helpers that Python calls."""
 
     lowering = _LowerWhole

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
-import numba
-from numba.core.registry import cpu_target
+import llvmlite
 
 from printhammer import __version__
+from printhammer.kernel.compile.link import processor as this_processor
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -39,12 +38,10 @@ _ANOTHER: Final = 5.0
 
 def maker() -> dict[str, str]:
     """Return what machine code made by this process depends on, apart from the sources of its kernel."""
-    # What numba files machine code under.
-    system, processor, features = cpu_target.target_context.codegen().magic_tuple()
+    system, processor, features = this_processor()
     return {
         "printhammer": __version__,
-        "numba": numba.__version__,
-        "Python": platform.python_version().rpartition(".")[0],
+        "llvmlite": llvmlite.__version__,
         "system": system,
         "processor": processor,
         "features": features,
@@ -98,7 +95,7 @@ def mismatch(folder: Path) -> str:
     if not entries or _own(entries, mine) is not None:
         return ""
     nearest = max(entries, key=lambda entry: sum(entry[key] == mine[key] for key in mine))
-    for key in ("printhammer", "numba", "Python", "system", "processor"):
+    for key in ("printhammer", "llvmlite", "system", "processor"):
         if nearest[key] != mine[key]:
             return f"is for {key} {nearest[key]}, this is {mine[key]}"
     return f"is for a {mine['processor']} with other instructions than this one has"

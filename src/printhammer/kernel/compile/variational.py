@@ -7,12 +7,12 @@ once for derivatives with respect to states and once more, forced, for those wit
 from __future__ import annotations
 
 import functools
-import hashlib
 
-from printhammer.kernel.compile.specialise import Kernel, execute_all, one_at_a_time, source_file
+from printhammer.kernel.compile.bindings import bindings_of
+from printhammer.kernel.compile.modules import Entry, one_at_a_time
+from printhammer.kernel.compile.specialise import Kernel, is_interpreted
+from printhammer.kernel.compile.templates import VARIATIONAL, execute_all
 from printhammer.kernel.variational.layout import changing, electric_row
-
-TEMPLATES = ("slopes", "circuit", "forcing", "supply", "columns", "steps", "switches", "flow")
 
 
 def variational(plain: Kernel, *, forced: bool) -> Kernel:
@@ -26,13 +26,13 @@ def variational(plain: Kernel, *, forced: bool) -> Kernel:
 
 @functools.cache
 def _built(plain: Kernel, forced: bool) -> Kernel:
-    sources = hashlib.sha256(repr((plain.digest, forced)).encode())
-    sources.update(source_file("variational.layout").read_bytes())
-    namespace = {
-        **plain.namespace,
-        "FORCED": forced,
-        "CHANGING": changing(forced, plain.namespace["HAS_DAMPING"], plain.namespace["HAS_CIRCUIT"]),
-        "ELECTRIC_ROW": electric_row(forced),
-    }
+    bindings = bindings_of(plain.laws)
+    circuit, damped = bindings.choices["HAS_CIRCUIT"], bindings.choices["HAS_DAMPING"]
+    choices = {"CHANGING": changing(forced, damped, circuit)}
+    variant = {"HAS_CIRCUIT": circuit, "FORCED": forced}
     label = f"{plain.label}, by {'constants' if forced else 'states'}"
-    return execute_all([f"variational.{name}" for name in TEMPLATES], namespace, sources, label)
+    kernel = Kernel(plain.laws, label, [Entry("flow", variant, bindings, choices, label)])
+    if is_interpreted():
+        own = {**choices, "FORCED": forced, "ELECTRIC_ROW": electric_row(forced)}
+        kernel.interpret(execute_all(VARIATIONAL, {**plain.namespace, **own}, f"{id(kernel):x}"))
+    return kernel

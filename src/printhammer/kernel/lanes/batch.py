@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from printhammer.kernel.compile.compiling import inlined
-from printhammer.kernel.model.layout import Control, Train
-
 
 class Batch(NamedTuple):
     """M members.
@@ -89,19 +86,3 @@ class Kept(NamedTuple):
     dots: Any
     strobes: Any
     x: Any
-
-
-@inlined
-def control_of(batch: Batch, row: int) -> Control:
-    """Return the `control` of the hammer in a row."""
-    controls = batch.controls
-    return controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3]
-
-
-@inlined
-def train_of(batch: Batch, m: int, under_way: Any, live: Any) -> Train:
-    """Return the drive of a member, with working space."""
-    begin, end = batch.firing_starts[m], batch.firing_starts[m + 1]
-    wave = batch.waveform_of[m]
-    pieces = batch.pieces[batch.piece_starts[wave] : batch.piece_starts[wave + 1]]
-    return Train(batch.firings[begin:end], batch.begins[begin:end], pieces, batch.replace, under_way, live)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, entry, inlined
 from printhammer.kernel.lanes import layout as R
-from printhammer.kernel.lanes.batch import control_of, train_of
 from printhammer.kernel.model.layout import (
     BACKSTOP_PART,
     DAMPING,
@@ -43,6 +42,7 @@ if TYPE_CHECKING:
         place,
     )
     from printhammer.kernel.lanes.landing import GOES_ON, aim, guess, land
+    from printhammer.kernel.lanes.members import control_of, train_of
     from printhammer.kernel.lanes.steps import (
         contact_block,
         free_block,

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from printhammer.kernel.compile.compiling import entry
-from printhammer.kernel.lanes.batch import control_of, train_of
+from printhammer.kernel.compile.compiling import entry, inlined
+from printhammer.kernel.model.layout import Control, Train
 from printhammer.kernel.model.modes import BACKSTOP, PAUSED
 from printhammer.kernel.single import carry as C
 from printhammer.kernel.single.stretch import ELECTRIC_WIDTH
@@ -19,6 +19,22 @@ if TYPE_CHECKING:
     from printhammer.kernel.model.laws import HAS_CIRCUIT
     from printhammer.kernel.single.run import run
     from printhammer.kernel.single.stretch import blank_states, clear_dots, note_dots, note_states
+
+
+@inlined
+def control_of(batch: Batch, row: int) -> Control:
+    """Return the `control` of the hammer in a row."""
+    controls = batch.controls
+    return controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3]
+
+
+@inlined
+def train_of(batch: Batch, m: int, under_way: Any, live: Any) -> Train:
+    """Return the drive of a member, with working space."""
+    begin, end = batch.firing_starts[m], batch.firing_starts[m + 1]
+    wave = batch.waveform_of[m]
+    pieces = batch.pieces[batch.piece_starts[wave] : batch.piece_starts[wave + 1]]
+    return Train(batch.firings[begin:end], batch.begins[begin:end], pieces, batch.replace, under_way, live)
 
 
 @entry

@@ -1,9 +1,9 @@
-"""Laws to which a compiled kernel is bound, and choices fixed at compile time.
+"""Laws to which a kernel is bound, and choices fixed before it is optimised.
 
 The functions and flags below are declarations. The modules listed in
-:data:`printhammer.kernel.compile.specialise.TEMPLATES` import them for the type checker only; at run time
-`specialise` of the same module puts the chosen laws in their place and compiles one kernel for each
-combination of laws, so that a replaced part costs nothing at run time.
+:data:`printhammer.kernel.compile.templates.TEMPLATES` import them for the type checker only. They stay
+open when these modules are lowered, and are linked for each combination of laws before LLVM optimises the
+whole, so that a replaced part costs nothing at run time.
 """
 
 from __future__ import annotations
@@ -57,6 +57,28 @@ class Laws:
     backstop_pulls: bool = True
     reload_along_unloading: bool = False
 
+
+LAW_FUNCTIONS = {
+    "magnet": (
+        "magnet_force",
+        "magnet_energy",
+        "magnet_linkage",
+        "magnet_emf",
+        "magnet_inductance",
+        "magnet_current",
+    ),
+    "spring": ("spring_force", "spring_energy"),
+    "pack": ("pack_loading", "pack_memory", "pack_unloading", "pack_switch"),
+    "backstop": (
+        "backstop_elastic",
+        "backstop_viscous",
+        "backstop_energy",
+        "backstop_switch",
+        "backstop_rebound",
+    ),
+    "damping": ("damping_force",),
+}
+"""Names of the law functions of each part."""
 
 HAS_PACK: bool
 HAS_BACKSTOP: bool

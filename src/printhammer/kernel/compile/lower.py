@@ -1,0 +1,195 @@
+"""Lowering: from Python to bitcode of LLVM, by numba.
+
+The template of an entry point is the module of all that it calls, with its laws and choices left open, so
+that one serves every hammer; the laws of a part are a module of their own. The types must be those of every
+hammer: with a coil's circuit and without there are two templates.
+"""
+
+from __future__ import annotations
+
+import functools
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any
+
+import llvmlite.binding as llvm
+from numba import types
+
+from printhammer.kernel.compile import opening
+from printhammer.kernel.compile.compiling import all_inlined, compiled, inlined
+from printhammer.kernel.compile.link import ENTRY, LAW
+from printhammer.kernel.compile.signatures import RESULTS, signature_of
+from printhammer.kernel.compile.templates import TEMPLATES, VARIATIONAL, compile_law, execute, execute_all
+from printhammer.kernel.lanes import layout as lane_layout
+from printhammer.kernel.lanes import math as lane_math
+from printhammer.kernel.model import laws as declared
+from printhammer.kernel.model.laws import LAW_FUNCTIONS
+from printhammer.kernel.variational.layout import electric_row
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+_LANE = "lane."
+"""How the symbol of a law for lanes goes on after that of laws."""
+
+_LAYOUT = ("INVERSE_MASS", "POSITION", "FRONT", "DAMPING", "SPRING", "PACK", "BACKSTOP_PART", "MAGNET")
+
+_NUMBERS = {"f": types.float64, "s": types.float32, "i": types.int64, "b": types.boolean}
+
+
+def template(entry: str, variant: Mapping[str, bool]) -> bytes:
+    """Return the template of an entry point, as bitcode.
+
+    The variant says whether the hammer `HAS_CIRCUIT`, and whether columns are `FORCED`.
+    """
+    if entry == "lanes":
+        namespace = _lanes()
+    elif entry == "flow":
+        namespace = _flow(variant["HAS_CIRCUIT"], variant["FORCED"])
+    else:
+        namespace = _plain(variant["HAS_CIRCUIT"])
+    arguments = tuple(_types(each) for each in signature_of(entry, variant))
+    library, symbol, kind = _lowered(namespace[entry], arguments)
+    expected = {0: types.none, 1: types.int64}.get(RESULTS[entry], _tuple([types.int64] * RESULTS[entry]))
+    if kind != expected:
+        raise TypeError(f"{entry} returns {kind}, expected {expected}")
+    return bytes(library.with_callees(symbol, ENTRY).as_bitcode())
+
+
+def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool) -> bytes:
+    """Return the law functions of a part, as bitcode of one module."""
+    whole = llvm.parse_assembly("")
+    for name in LAW_FUNCTIONS[role]:
+        constants: Any = types.Array(types.float64, 1, "C")
+        function = functions[name]
+        if for_lanes:
+            constants = _tuple([types.float64] * lane_layout.PLACES[role][1])
+            helper = _lane_law(function)
+        else:
+            helper = compile_law(function, compiled)
+        library, symbol, kind = _lowered(helper, (constants, *(types.float64,) * _floats(name)))
+        if kind != types.float64:
+            raise TypeError(f"{function.__module__}.{name} returns {kind}, expected a float")
+        whole.link_in(library.with_callees(symbol, LAW + (_LANE if for_lanes else "") + name))
+    return bytes(whole.as_bitcode())
+
+
+def _floats(name: str) -> int:
+    """Return the number of arguments of a law after the constants."""
+    return int(declared.__annotations__[name].removeprefix("Law"))
+
+
+def _lowered(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str, Any]:
+    """Return the library of a function for types of arguments, its symbol, and the type of its result."""
+    function.compile(arguments)
+    result = function.overloads[arguments]
+    return result.library, result.fndesc.llvm_func_name, result.signature.return_type
+
+
+def _types(signature: Any) -> Any:
+    """Return numba's types of a signature."""
+    if isinstance(signature, str):
+        number = _NUMBERS[signature[0]]
+        return types.Array(number, int(signature[1]), "C") if len(signature) == 2 else number
+    named = type(signature) if hasattr(signature, "_fields") else None
+    return _tuple([_types(element) for element in signature], named)
+
+
+def _tuple(elements: list[Any], named: type | None = None) -> Any:
+    return types.BaseTuple.from_types(tuple(elements), named)  # type: ignore[no-untyped-call]
+
+
+def _opened() -> dict[str, Any]:
+    """Return the laws and choices that stay open, by name."""
+    namespace: dict[str, Any] = {}
+    for name, kind in declared.__annotations__.items():
+        if kind in ("bool", "int"):
+            namespace[name] = opening.Choice(name, types.boolean if kind == "bool" else types.int64)
+    for name in (name for functions in LAW_FUNCTIONS.values() for name in functions):
+        namespace[name] = opening.law(name, LAW + name, _floats(name))
+    return namespace
+
+
+@functools.cache
+def _plain(circuit: bool) -> dict[str, Any]:
+    namespace = {**_opened(), "HAS_CIRCUIT": circuit}
+    return execute_all(TEMPLATES, namespace, f"template_{int(circuit)}")
+
+
+@functools.cache
+def _flow(circuit: bool, forced: bool) -> dict[str, Any]:
+    own = {"FORCED": forced, "ELECTRIC_ROW": electric_row(forced)}
+    return execute_all(VARIATIONAL, {**_plain(circuit), **own}, f"template_{int(circuit)}{int(forced)}")
+
+
+@functools.cache
+def _lanes() -> dict[str, Any]:
+    vector: dict[str, Any] = {
+        name: value for name, value in _opened().items() if isinstance(value, opening.Choice)
+    }
+    for name in (name for functions in LAW_FUNCTIONS.values() for name in functions):
+        vector[name] = opening.law(name, LAW + _LANE + name, _floats(name))
+    return _execute_lanes(_plain(False), {**vector, "HAS_CIRCUIT": False})
+
+
+def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, Any]:
+    """Execute the templates of lanes, bound to laws without branches or calls.
+
+    The force sum and the steps are those of the plain kernel, with :mod:`printhammer.kernel.lanes.math` in
+    the place of :mod:`math`, the drive in closed form, the constants of a hammer as a tuple, and everything
+    inlined; what looks after switches is scalar and uses the plain kernel. `plain` holds the names of the
+    plain templates, `vector` the laws for lanes and the choices.
+    """
+    scalar, vector = dict(plain), dict(vector)
+
+    def module(name: str, namespace: dict[str, Any], kind: str) -> ModuleType:
+        return execute(name, f"{kind}_template", namespace)
+
+    with all_inlined():
+        vector["drive_value"] = module("lanes.drive", vector, "lanes").drive_value
+        forces = _with_lane_layout(module("model.forces", vector, "lanes"))
+        vector["acceleration"] = forces.acceleration
+        vector["backstop_acceleration"] = forces.backstop_acceleration
+        vector["nystrom_step"] = module("methods.nystrom8", vector, "lanes").nystrom_step
+        dop853 = module("methods.dop853", vector, "lanes")
+        vector["contact_step"], vector["time_step"] = dop853.contact_step, dop853.time_step
+    steps = module("lanes.steps", vector, "lanes")
+    scalar["add_up"] = module("lanes.drive", scalar, "plain").add_up
+    scalar.update(
+        {
+            name: value
+            for name, value in vars(steps).items()
+            if hasattr(value, "py_func") and (name.startswith("lane_") or name.endswith("_block"))
+        }
+    )
+    for name in ("lanes.events", "lanes.landing"):
+        events = module(name, scalar, "lanes")
+        scalar.update(
+            {
+                name: value
+                for name, value in vars(events).items()
+                if hasattr(value, "py_func") or (name.isupper() and name not in scalar)
+            }
+        )
+    return {"lanes": module("lanes.lanes", scalar, "lanes").lanes}
+
+
+def _with_lane_layout(module: ModuleType) -> ModuleType:
+    """Have a template look for the constants of a hammer where lanes have them."""
+    for name in _LAYOUT:
+        if hasattr(module, name):
+            setattr(module, name, getattr(lane_layout, name))
+    return module
+
+
+def _lane_law(function: Any) -> Any:
+    """Compile a law, and the helpers of its module that it calls, for lanes."""
+    scope = dict(function.__globals__)
+    scope["math"] = lane_math
+    scope.update(
+        {
+            name: _lane_law(value)
+            for name in function.__code__.co_names
+            if isinstance(value := function.__globals__.get(name), FunctionType)
+        }
+    )
+    return inlined(FunctionType(function.__code__, scope, function.__name__, function.__defaults__))

@@ -1,0 +1,192 @@
+"""The modules of an entry point: where its template and its laws are, and the machine code that they become.
+
+A module is named after a digest of the sources that it is made of. It is lowered by numba when it is first
+wanted, and kept with the machine code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import lzma
+import threading
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from printhammer.kernel.compile import calls, link
+from printhammer.kernel.compile.cache import Code, File, say_once
+from printhammer.kernel.compile.signatures import RESULTS, signature_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from printhammer.kernel.compile.bindings import Bindings
+
+KINDS: Final = {
+    "run": "runs",
+    "resample": "curves",
+    "quadratures": "energies",
+    "peaks": "peaks",
+    "members": "many runs",
+    "lanes": "many runs side by side",
+    "flow": "derivatives",
+}
+"""Names of the entry points, and what each of them computes."""
+
+KERNEL: Final = Path(__file__).parents[1]
+SHIPPED: Final = KERNEL / "modules"
+"""Folder of the modules that the wheel holds."""
+
+_PLAIN: Final = (
+    "model",
+    "methods",
+    "single",
+    "compile/compiling.py",
+    "compile/linking.py",
+    "compile/lower.py",
+)
+_SOURCES: Final = {
+    "lanes": (*_PLAIN, "lanes"),
+    "members": (*_PLAIN, "lanes"),
+    "flow": (*_PLAIN, "variational"),
+}
+
+one_at_a_time: Final = threading.RLock()
+
+
+@cache
+def _digest_of(places: tuple[str, ...]) -> str:
+    """Return the digest of the sources in folders of the kernel."""
+    digest = hashlib.sha256()
+    for place in (*places, "compile/opening.py", "compile/signatures.py", "compile/templates.py"):
+        path = KERNEL / place
+        for file in sorted(path.glob("*.py")) if path.is_dir() else (path,):
+            # Without the carriage returns of a checkout on another system.
+            digest.update(file.read_bytes().replace(b"\r\n", b"\n"))
+    return digest.hexdigest()
+
+
+@cache
+def _lowering() -> str:
+    """Return what lowers here, and may do so in its own way: versions of numba and of LLVM."""
+    versions = []
+    for name in ("numba", "llvmlite"):
+        try:
+            versions.append(f"{name}{version(name)}")
+        except PackageNotFoundError:
+            versions.append(f"no-{name}")
+    return "-".join(versions)
+
+
+class Module:
+    """Bitcode of a template or of the laws of a part; `make` lowers it."""
+
+    def __init__(self, kind: str, sources: str, make: Callable[[], bytes]) -> None:
+        self.name = f"{kind}_{hashlib.sha256(sources.encode()).hexdigest()[:24]}"
+        self._make = make
+
+    @property
+    def shipped(self) -> Path:
+        """The file of the wheel that it is in, if it ships."""
+        return SHIPPED / f"{self.name}.bc.xz"
+
+    def identity(self) -> str:
+        """Return what tells this module from others, without reading it."""
+        return self.name if self.shipped.exists() else f"{self.name}_{_lowering()}"
+
+    def bitcode(self) -> bytes:
+        """Return the bitcode, from the wheel, from disk, or made now."""
+        if self.shipped.exists():
+            with suppress(OSError, EOFError, lzma.LZMAError):
+                content = lzma.decompress(self.shipped.read_bytes())
+                if link.is_readable(content):
+                    return content
+            say_once(f"{self.shipped}: the module cannot be read; it is made anew")
+        return File(f"{self.name}_{_lowering()}.bc").get(self._make)
+
+
+def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
+    """Return the template of an entry point."""
+
+    def make() -> bytes:
+        from printhammer.kernel.compile import lower
+
+        return lower.template(entry, variant)
+
+    sources = _digest_of(_SOURCES.get(entry, _PLAIN))
+    return Module(entry, f"{entry} {sorted(variant.items())} {sources}", make)
+
+
+def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:
+    """Return the law functions of a part, for arrays of constants or for lanes."""
+
+    def make() -> bytes:
+        from printhammer.kernel.compile import lower
+
+        return lower.laws(role, bindings.names, for_lanes)
+
+    sources = _digest_of(("compile/compiling.py", "compile/linking.py", "compile/lower.py", "model/laws.py"))
+    if for_lanes:
+        sources += _digest_of(("lanes/layout.py", "lanes/math.py"))
+    return Module(role, f"{role} {for_lanes} {sources} {bindings.digests[role]}", make)
+
+
+class Entry:
+    """An entry point of the kernel for certain laws; its machine code is made, or loaded, when it is wanted.
+
+    Parameters
+    ----------
+    name : str
+        One of `KINDS`.
+    variant : mapping
+        Which template it has, see :func:`printhammer.kernel.compile.lower.template`.
+    bindings : Bindings
+        The laws, and choices of the hammer.
+    choices : mapping
+        Further choices.
+    label : str
+        The laws in words, for who waits.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        variant: Mapping[str, bool],
+        bindings: Bindings,
+        choices: Mapping[str, int],
+        label: str,
+    ) -> None:
+        self.name = name
+        self._variant = dict(variant)
+        self._choices = {**bindings.choices, **choices}
+        flavours = (False, True) if name == "lanes" else (False,)
+        self._template = template_of(name, variant)
+        self._laws = [laws_of(role, bindings, lanes) for lanes in flavours for role in bindings.digests]
+        self._function: Callable[..., Any] | None = None
+        parts = [module.identity() for module in (self._template, *self._laws)]
+        here = (*link.processor(), version("llvmlite"), _digest_of(("compile/link.py", "compile/calls.py")))
+        digest = hashlib.sha256(repr((parts, sorted(self._choices.items()), here)).encode())
+        self.code = Code(f"{name}_{digest.hexdigest()[:24]}.code", KINDS[name], label)
+
+    def is_ready(self) -> bool:
+        """Whether it is loaded, or has machine code on disk."""
+        return self._function is not None or self.code.exists()
+
+    def function(self) -> Callable[..., Any]:
+        """Return the function that Python calls, compiled if need be."""
+        with one_at_a_time:
+            if self._function is None:
+                address = link.load(self.code.get(self._make))
+                self._function = calls.caller(address, self._signature, RESULTS[self.name])
+        return self._function
+
+    @property
+    def _signature(self) -> Any:
+        return signature_of(self.name, self._variant)
+
+    def _make(self) -> bytes:
+        calling = calls.calling_code(link.ENTRY, self._signature, link.CALL)
+        laws = [module.bitcode() for module in self._laws]
+        return link.emit(link.link(self._template.bitcode(), laws, self._choices, calling))

@@ -1,0 +1,96 @@
+"""One kernel for each combination of laws.
+
+The kernel's template modules are ordinary source files whose law functions are names without a value. They
+are executed once more under a module name of their own, with something put in the place of these names: where
+they are lowered, see :mod:`printhammer.kernel.compile.lower`, functions that stay open; where the kernel runs
+as plain Python, the laws of a hammer. What is lowered is linked with the laws of a hammer before it is
+optimised, so that LLVM sees every call and can inline it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING, Any
+
+from printhammer.kernel.compile.bindings import helpers_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+TEMPLATES = (
+    "model.pulses",
+    "model.circuit",
+    "model.forces",
+    "methods.nystrom8",
+    "methods.dop853",
+    "methods.crossing",
+    "methods.landing",
+    "methods.contact",
+    "single.record",
+    "single.rest",
+    "single.around",
+    "single.phases",
+    "single.steps",
+    "single.switches",
+    "single.run",
+    "single.resample",
+    "methods.quadrature",
+    "single.stretch",
+    "lanes.members",
+)
+"""Template modules of the kernel in the order in which they use one another."""
+
+VARIATIONAL = tuple(
+    f"variational.{name}"
+    for name in ("slopes", "circuit", "forcing", "supply", "columns", "steps", "switches", "flow")
+)
+"""Those of variational equations, which follow."""
+
+
+def source_file(name: str) -> Path:
+    """Return the file of a module of the kernel, named from there, such as "model.forces"."""
+    return Path(__file__).parents[1].joinpath(*name.split(".")).with_suffix(".py")
+
+
+def execute_all(templates: Sequence[str], namespace: dict[str, Any], tag: str) -> dict[str, Any]:
+    """Execute templates one after the other, each with the functions of those before it; return all names."""
+    names = dict(namespace)
+    for name in templates:
+        module = execute(name, tag, names)
+        names.update(_functions_of(module))
+    return names
+
+
+def _functions_of(module: ModuleType) -> dict[str, Any]:
+    """Return the functions that a template defines or has been given, by name."""
+    return {
+        name: value
+        for name, value in vars(module).items()
+        if hasattr(value, "py_func")
+        or (isinstance(value, FunctionType) and value.__module__ == module.__name__)
+    }
+
+
+def compile_law(function: Callable[..., Any], compiled: Callable[..., Any]) -> Any:
+    """Compile a law, together with the helpers that it calls."""
+    if isinstance(function, FunctionType) and (helpers := helpers_of(function)):
+        scope = dict(function.__globals__)
+        scope.update({name: compile_law(helper, compiled) for name, helper in helpers.items()})
+        function = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
+    return compiled(function)
+
+
+def execute(template: str, tag: str, namespace: dict[str, Any]) -> ModuleType:
+    """Execute a template as a module of its own, told by `tag`, in which `namespace` is already defined."""
+    path, name = source_file(template), f"printhammer.kernel.{template}_{tag}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} cannot be loaded as a template of the kernel")
+    module = importlib.util.module_from_spec(spec)
+    vars(module).update(namespace)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module

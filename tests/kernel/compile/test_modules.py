@@ -1,0 +1,135 @@
+"""Modules of an entry point: found, made again, told apart; and the kernel that is linked from them."""
+
+import lzma
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import printhammer as ph
+from printhammer.kernel.compile import cache, calls, link, modules
+from printhammer.kernel.compile.bindings import bindings_of
+from printhammer.kernel.compile.modules import Entry, Module
+from printhammer.kernel.compile.signatures import RESULTS, signature_of
+from printhammer.kernel.compile.templates import TEMPLATES, compile_law, execute_all
+from printhammer.kernel.model.laws import Laws
+from printhammer.run.problem import Problem, laws_of
+
+HERTZ = Laws(
+    "", "printhammer.parts.spring.linear", "", "printhammer.parts.backstop.hertz", "printhammer.parts.absent"
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of modules, an empty one, and no module that ships."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(modules, "SHIPPED", tmp_path / "shipped")
+    (tmp_path / "shipped").mkdir()
+    return tmp_path
+
+
+def unmade() -> bytes:
+    raise AssertionError
+
+
+def bitcode_of(value: int) -> bytes:
+    import llvmlite.binding as llvm
+
+    return bytes(llvm.parse_assembly(f"@value = constant i64 {value}").as_bitcode())
+
+
+def test_a_module_is_made_once(folder: Path) -> None:
+    assert Module("spring", "its source", lambda: bitcode_of(1)).bitcode() == bitcode_of(1)
+    assert Module("spring", "its source", unmade).bitcode() == bitcode_of(1)
+    assert Module("spring", "other source", lambda: bitcode_of(2)).bitcode() == bitcode_of(2)
+    assert Module("pack", "its source", lambda: bitcode_of(3)).bitcode() == bitcode_of(3)
+
+
+def test_a_module_that_ships_is_not_made(folder: Path) -> None:
+    module = Module("spring", "its source", unmade)
+    before = module.identity()
+    module.shipped.write_bytes(lzma.compress(bitcode_of(1)))
+    assert module.bitcode() == bitcode_of(1)
+    # Machine code of the one that was made here is not that of the one that ships.
+    assert module.identity() != before
+
+
+@pytest.mark.parametrize(
+    "content", [b"", lzma.compress(b"BC of another LLVM"), lzma.compress(bitcode_of(1))[:-9]]
+)
+def test_a_shipped_module_that_cannot_be_read_is_made_again_and_said_once(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
+) -> None:
+    sentences: list[str] = []
+    monkeypatch.setattr(cache, "_said", set())
+    monkeypatch.setattr(cache, "listeners", {sentences.append})
+    module = Module("spring", "its source", lambda: bitcode_of(2))
+    module.shipped.write_bytes(content)
+    assert [module.bitcode(), module.bitcode()] == [bitcode_of(2)] * 2
+    (sentence,) = sentences
+    assert sentence == f"{module.shipped}: the module cannot be read; it is made anew"
+
+
+@pytest.mark.parametrize(
+    "change", [{"spring": ""}, {"backstop_pulls": False}, {"circuit": True}, {"force_drive": True}]
+)
+def test_machine_code_is_named_after_laws_and_choices(change: dict[str, Any]) -> None:
+    def name(laws: Laws) -> str:
+        variant = {"HAS_CIRCUIT": laws.circuit}
+        return Entry("run", variant, bindings_of(laws), {}, "laws").code.name
+
+    other = Laws(**{**vars(HERTZ), **change})
+    assert name(HERTZ) == name(HERTZ)
+    assert name(HERTZ) != name(other)
+
+
+def test_with_machine_code_on_disk_nothing_of_numba_is_loaded(hammer: ph.Hammer, tmp_path: Path) -> None:
+    hammer.save(tmp_path / "hammer.toml")
+    code = f"""
+import sys
+import printhammer as ph
+hammer = ph.load({str(tmp_path / "hammer.toml")!r})
+motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
+_ = motion.dots, motion.energy, motion.x
+drives = [ph.PulseTrain(hammer.waveform, rate=rate) for rate in (900.0, 1000.0)]
+ph.Ensemble(hammer, drives, 3e-3).run(dots=True)
+print([name for name in sys.modules if name.partition(".")[0] == "numba"])
+"""
+    done = ""
+    # The first one makes what is not there.
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert done.strip() == "[]"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bouncing-ball", "relay-5v", "dot-peen"])
+def test_what_is_linked_gives_the_bits_of_what_is_compiled_with_its_laws(name: str) -> None:
+    from printhammer.kernel.compile import lower
+    from printhammer.kernel.compile.compiling import compiled
+
+    hammer = ph.load(name)
+    drive = ph.PulseTrain(hammer.waveform, rate=0.2 / hammer.waveform.duration, pulses=5)
+    laws = laws_of(hammer, drive)
+    bindings = bindings_of(laws)
+    bound = {law: compile_law(function, compiled) for law, function in bindings.names.items()}
+    signature = signature_of("run", {})
+    end = float(drive.times[-1]) + hammer.waveform.duration
+    arguments = tuple(lower._types(each) for each in signature)
+    run = execute_all(TEMPLATES, {**bound, **bindings.choices}, f"bound_{name}")["run"]
+    library, symbol, _ = lower._lowered(run, arguments)
+    whole = library.with_callees(symbol, link.ENTRY).as_bitcode()
+    calling = calls.calling_code(link.ENTRY, signature, link.CALL)
+    address = link.load(link.emit(link.link(whole, [], {}, calling)))
+    problem = Problem(hammer, drive, (hammer.position or 0.0, 0.0), 0.0, 1e-9)
+    linked = problem.run(end)
+    problem.kernel.__dict__["run"] = calls.caller(address, signature, RESULTS["run"])
+    whole_record = problem.run(end)
+    del problem.kernel.__dict__["run"]
+    assert linked.steps == whole_record.steps > 50
+    np.testing.assert_array_equal(linked.nodes, whole_record.nodes)
+    np.testing.assert_array_equal(linked.contacts, whole_record.contacts)
