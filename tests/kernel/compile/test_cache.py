@@ -1,10 +1,12 @@
 """Where machine code is kept and read, and what is said while it is made; trouble is no reason not to run."""
 
 import errno
+import fcntl
 import json
 import multiprocessing
 import os
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -193,10 +195,14 @@ def test_what_may_follow_is_told_until_it_is_there(folder: Path, said: list[str]
 
 
 def run_elsewhere(number: int, results: Any) -> None:
-    results.put(kept().get(lambda: bytes([number]) * 100_000))
+    def make() -> bytes:
+        time.sleep(0.1)
+        return bytes([number]) * 100_000
+
+    results.put(kept().get(make))
 
 
-def test_two_processes_compile_the_same_at_once(folder: Path) -> None:
+def test_of_several_processes_one_makes_the_code_and_the_others_wait(folder: Path) -> None:
     context = multiprocessing.get_context("fork")
     results = context.Queue()
     processes = [context.Process(target=run_elsewhere, args=(number, results)) for number in range(4)]
@@ -205,11 +211,22 @@ def test_two_processes_compile_the_same_at_once(folder: Path) -> None:
     made = [results.get(timeout=60) for _ in processes]
     for process in processes:
         process.join()
-    # Whole, whoever was last.
-    assert kept().get(unmade) in made
+    assert made == [kept().get(unmade)] * 4
     assert [path.name for path in (folder / "printhammer").iterdir() if path.suffix != ".json"] == [
         "curves.code"
     ]
+
+
+def test_processes_that_cannot_lock_a_file_make_it_each_for_itself(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def unsupported(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", unsupported)
+    assert kept().get(make) == CODE
+    assert kept().get(unmade) == CODE
+    assert [path.name for path in (folder / "printhammer").glob(".*")] == []
 
 
 def test_a_full_disk_is_told_once(folder: Path, monkeypatch: pytest.MonkeyPatch, said: list[str]) -> None:

@@ -13,7 +13,7 @@ import os
 import stat
 import sys
 import tempfile
-from contextlib import suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import cached_property
 from pathlib import Path
 from time import thread_time
@@ -23,6 +23,7 @@ from printhammer.kernel.compile import records
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
 
 listeners: set[Callable[[str], None]] = set()
 """Called with a sentence before machine code is made, and where its folder is of no use."""
@@ -120,6 +121,33 @@ def _write(path: Path, payload: bytes) -> None:
             draft.unlink(missing_ok=True)
 
 
+@contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    """Wait until no other process makes the content of a file; do not wait where files cannot be locked."""
+    lock = path.with_name(f".{path.name}.lock")
+    handle = -1
+    try:
+        import fcntl
+
+        while handle < 0:
+            handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            # The process that has locked it before has deleted it, and a third one may lock its successor.
+            if os.fstat(handle).st_nlink == 0:
+                os.close(handle)
+                handle = -1
+    except (ImportError, OSError):
+        # Two processes then make the same, and the last one replaces the file.
+        pass
+    try:
+        yield
+    finally:
+        if handle >= 0:
+            with suppress(OSError):
+                lock.unlink()
+            os.close(handle)
+
+
 class File:
     """A file that holds what was made once, under a name that says from what; trouble with it is nobody's.
 
@@ -168,9 +196,16 @@ class File:
         """Return the content, made and kept if it is not there."""
         content = self.read()
         if content is None:
-            content = make()
-            self.keep(content)
+            with self._alone():
+                content = self.read()
+                if content is None:
+                    content = make()
+                    self.keep(content)
         return content
+
+    def _alone(self) -> AbstractContextManager[None]:
+        """Have no other process make the same; the file may be there when the context begins."""
+        return nullcontext() if self._written is None else _alone(self._written / self.name)
 
 
 class Code(File):
@@ -198,15 +233,18 @@ class Code(File):
         if listeners:
             self._announce()
         self.is_begun = True
-        begun = thread_time()
         for watcher in tuple(watchers):
             watcher(True)
         try:
-            code = make()
+            return super().get(lambda: self._noted(make))
         finally:
             for watcher in tuple(watchers):
                 watcher(False)
-        self.keep(code)
+
+    def _noted(self, make: Callable[[], bytes]) -> bytes:
+        """Make machine code, and note how long that took."""
+        begun = thread_time()
+        code = make()
         if self._written is not None:
             with suppress(OSError):
                 records.note(self._written, self.kind, thread_time() - begun)
