@@ -1,6 +1,8 @@
 """Every device in every verb: defaults of the device, refusals that name what is missing and the option."""
 
 import math
+import re
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -76,6 +78,34 @@ def test_the_bound_on_the_current_is_that_of_the_device() -> None:
     strong = hammer.replace({"waveform.amplitude": 3.0})
     assert strong.waveform.peak <= current_bound(strong) <= strong.waveform.peak + 0.11
     assert current_bound(strong, "1.5 A") == 1.5
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "relay-5v"),
+        ("map", "relay-5v", "--rates", "2", "--times", "4"),
+        ("quality", "relay-5v", "--rate", "10 Hz", "--pattern", "11"),
+        ("strobe", "relay-5v", "--period", "60 ms", "--points", "3", "--no-verdict"),
+        ("basins", "relay-5v", "--quench", "--gaps", "10 ms, 20 ms, 2", "--widths", "10 ms, 20 ms, 2"),
+    ],
+)
+def test_answers_about_a_relay_speak_of_closings(cli: Callable[..., Any], words: tuple[str, ...]) -> None:
+    done = cli(*words)
+    assert done.status == 0
+    assert not re.search(r"\b(dots?|print(s|ed)?|paper|engraved)\b", done.out + done.err)
+    assert words[0] == "strobe" or "closing" in done.out
+
+
+def test_the_noun_for_a_strike_is_no_physics() -> None:
+    relay = ph.load("relay-5v")
+    assert relay.strike == "closing"
+    assert hammers.crude().strike == "dot"
+    other = relay.replace("strike", "click")
+    assert other.strike == "click"
+    assert other.fingerprint == relay.fingerprint
+    with refused("strike"):
+        relay.replace("strike", "Two words")
 
 
 def test_a_burst_needs_a_current() -> None:

@@ -189,12 +189,14 @@ class Job:
         """Show the answer, write its files, print its complaints; return the exit status."""
         if answer.shown or answer.note:
             self.show(*answer.shown, note=answer.note)
+        from printhammer.results.summary import worded
+
         for name, content in answer.files.items():
             for path in self.wanted.get(name, []):
                 content.write(path)
                 self.wrote(path)
         for complaint in answer.complaints:
-            complain(complaint)
+            complain(complaint if self.hammer is None else worded(complaint, self.hammer.strike))
         if answer.interrupted:
             return INTERRUPTED
         return int(bool(answer.complaints) or answer.failed)

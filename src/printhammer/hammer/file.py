@@ -1,7 +1,7 @@
 """Hammer files: parsing of TOML into parts, constants and waveform, and the JSON schema.
 
-A file has ``format = 1``, ``name``, optionally ``title`` and ``note``, the constants ``mass`` and ``platen``,
-and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``, ``[backstop]`` and
+A file has ``format = 1``, ``name``, optionally ``title``, ``note`` and ``strike``, the constants ``mass`` and
+``platen``, and a table for each part: ``[magnet]``, ``[coil]``, ``[spring]``, ``[pack]``, ``[backstop]`` and
 ``[damping]`` with their ``law``, ``[waveform]`` with its ``shape``, and ``[uncertainty]`` with standard
 errors of constants (`printhammer.hammer.uncertainty`). All but name and mass are optional. A constant is ``{
 value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the unit "1" for a pure number.
@@ -10,6 +10,7 @@ value = 0.008, unit = "in", status = "stated", source = "Fig. 3" }``, with the u
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -46,8 +47,11 @@ TEXTS: Final = {
     "name": "short name of the hammer",
     "title": "one line that says what it is",
     "note": "what a reader must know about the constants",
+    "strike": "noun for what a pulse makes, as summaries name it; 'dot' if missing",
 }
 """Text entries of a hammer file and their meanings."""
+
+_NOUN: Final = re.compile("[a-z]+(-[a-z]+)*")
 
 SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape"}
 """Tables of a hammer file, with the key that selects the law or shape of each."""
@@ -74,6 +78,7 @@ class Contents:
     name: str
     title: str
     note: str
+    strike: str
     body: Body
     parts: dict[str, Part]
     waveform: Waveform | None
@@ -157,6 +162,14 @@ def _build(
             )
     if not texts["name"].strip():
         raise InputError("name is missing", key="name", expected="a short name of the hammer")
+    if texts["strike"] and not _NOUN.fullmatch(texts["strike"]):
+        raise InputError.of(
+            "strike",
+            texts["strike"],
+            "a noun in lower case whose plural ends in s, such as 'closing'",
+            written=shown(texts["strike"]),
+            said=": expected",
+        )
     constants: dict[str, Constant] = {}
     top = {key: document[key] for key in quantities(Body) if key in document}
     body = _read(Body, top, "", constants, folder, before, known)

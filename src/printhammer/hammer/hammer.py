@@ -147,6 +147,11 @@ class Hammer:
         return self._contents.note
 
     @property
+    def strike(self) -> str:
+        """Noun for what a pulse makes, such as "closing" of a relay; "dot" by default."""
+        return self._contents.strike or "dot"
+
+    @property
     def path(self) -> str:
         """Path of the hammer file for messages; for a modified hammer, a remark says so."""
         return self._where

@@ -185,7 +185,7 @@ def summary_of(chart: xr.Dataset, beside: xr.Dataset | None = None) -> Summary:
         ("status", f"{failed} of {rates.size} runs did not reach their end" if failed else "ok"),
         ("measured", None if beside is None else _difference(chart, beside)),
     ]
-    return Summary([Facts(rows)])
+    return Summary([Facts(rows)]).worded(chart.attrs.get("strike", "dot"))
 
 
 def _difference(chart: xr.Dataset, beside: xr.Dataset) -> str:

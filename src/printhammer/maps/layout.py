@@ -87,6 +87,7 @@ def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
     guessed = [status for status in ("reconstructed", "assumed") if status in statuses]
     places = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
     return {
+        **({} if hammer.strike == "dot" else {"strike": hammer.strike}),
         "hammer_constants": f"in part {' and '.join(guessed)}" if guessed else "measured or stated",
         **{PLACES[name]: float(place) for name, place in places.items() if place is not None},
     }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan
 from typing import Any, Final, Literal
 
@@ -37,6 +37,7 @@ SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
 """Unit shown and number format in either unit system, by SI unit."""
 _SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
 
+_DOT: Final = re.compile(r"(?<![-\w])dot(?=s?(?![-\w]| matrix))")
 _QUANTITY: Final = re.compile("⟦([^ ⟧]*) ([^⟧!]*)(!?)⟧")
 _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
@@ -167,6 +168,10 @@ class Summary(tuple[str | Facts | Grid, ...]):
 
     __slots__ = ()
 
+    def worded(self, strike: str) -> Summary:
+        """Return the summary with another noun for a dot, such as "closing"."""
+        return self if strike == "dot" else Summary(worded(each, strike) for each in self)
+
     def text(self, system: System = "si") -> str:
         """Return the summary as plain text."""
         lines: list[str] = []
@@ -186,6 +191,19 @@ class Summary(tuple[str | Facts | Grid, ...]):
     def _repr_html_(self) -> str:
         """Return the HTML repr."""
         return "".join(_html(each) for each in self if each)
+
+
+def worded(each: Any, strike: str) -> Any:
+    """Replace the noun "dot" in texts, and in the texts of facts, tables, sequences and other objects."""
+    if isinstance(each, str):
+        return _DOT.sub(strike, each)
+    if isinstance(each, Facts):
+        return Facts(worded(each.rows, strike), worded(each.title, strike))
+    if isinstance(each, Grid):
+        return Grid(worded(each.columns, strike), worded(each.title, strike), each.most)
+    if isinstance(each, Cells):
+        return replace(each, heading=worded(each.heading, strike), values=worded(each.values, strike))
+    return type(each)(worded(part, strike) for part in each) if isinstance(each, list | tuple) else each
 
 
 def _plain_head(column: Cells, system: System) -> str:

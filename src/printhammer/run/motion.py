@@ -376,7 +376,7 @@ class Motion(Result, fields=False):
             ),
             Cells("", [_remark(dot) for dot in self.dots], left=True),
         ]
-        return Summary([Grid(columns, most=MOST_DOTS), "", energies])
+        return Summary([Grid(columns, most=MOST_DOTS), "", energies]).worded(self.hammer.strike)
 
     def _energy_facts(self) -> list[FactRow]:
         """Return the energies of the run and the residual of the ledger, for the summary."""

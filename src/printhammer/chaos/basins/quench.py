@@ -99,14 +99,14 @@ class QuenchMap(Result):
         struck, lost = self.struck, int(self.lost.sum())
         first = f"{quantity(self.single_force, 'N')}, flight time {quantity(self.single_flight_time, 's')}"
         rows: list[FactRow] = [
-            ("second dots", f"{int(struck.sum())} printed, {lost} of {self.status.size} lost"),
+            ("second dots", f"{int(struck.sum())} struck, {lost} of {self.status.size} lost"),
             ("first alone", first),
         ]
         if struck.any() and np.isfinite(self.single_force):
             ratio = self.force_ratio[struck]
             rows.append(("force ratio", f"{ratio.min():.3f} to {ratio.max():.3f}"))
             rows.append(("flies shorter by", interval(self.flight_gain[struck], "s")))
-        return Summary([Facts(rows)])
+        return Summary([Facts(rows)]).worded(self.hammer.strike)
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -117,7 +117,8 @@ class TableReport(Result, rows=_AXES):
             Cells("worst arrival", self.arrival[1].max(axis=(1, 2)), "s"),
             Cells("multiplier\nof rows", growth, "", ".2f"),
         ]
-        return Summary([Grid(columns, f"On patterns it was not tuned on, {span}")])
+        said = f"On patterns it was not tuned on, {span}"
+        return Summary([Grid(columns, said)]).worded(self.hammer.strike)
 
     def notes(self) -> dict[str, Any]:
         """Return the limits."""

@@ -293,6 +293,8 @@ def _head(sheet: DataSheet, magnet: SheetMagnet, current: float) -> str:
     if "title" in sheet.texts:
         document["title"] = sheet.texts["title"]
     document["note"] = tomlkit.string("".join(f"{line}\n" for line in lines), multiline=True)
+    if "strike" in sheet.texts:
+        document["strike"] = sheet.texts["strike"]
     constant = 'mass = { value = 1, unit = "kg", status = "assumed", source = "to be replaced" }'
     return f"{tomlkit.dumps(document)}\n{constant}\n"
 

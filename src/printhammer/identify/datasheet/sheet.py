@@ -19,7 +19,8 @@ the end of
 at the
   end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of the
   struck object;
-- `on_time`; `driver`, a waveform table without its voltage; `title` and `note`.
+- `on_time`; `driver`, a waveform table without its voltage; `title`, `note` and `strike`, the noun for what a
+  pulse makes.
 
 `assumed` lists the keys whose values the reader of the sheet has guessed, and ``[why]`` states a source for
 single keys.
@@ -39,7 +40,7 @@ from printhammer.support.constants import shown
 from printhammer.support.files import read_text
 from printhammer.units import describe, split, to_si
 
-TEXTS: Final = {"name": True, "source": True, "title": False, "note": False}
+TEXTS: Final = {"name": True, "source": True, "title": False, "note": False, "strike": False}
 """Text keys of a sheet, and whether they are required."""
 
 QUANTITIES: Final = {

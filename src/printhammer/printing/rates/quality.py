@@ -135,6 +135,7 @@ class Quality(Result):
             (name.replace("_", " "), getattr(self, f"{name}_spread").said(unit, alone.get(name)))
             for name, unit in _SPREADS.items()
         ]
+        prints = self.hammer.strike == "dot"
         matrix, engraved = "arrivals within 200 µs of each other", "arrivals within 30 µs of each other"
         rows = [
             ("pattern", f"{what}, {count} dots judged, {self.rate:g} Hz, {self.strategy}"),
@@ -148,8 +149,8 @@ class Quality(Result):
                 ),
             ),
             *spreads,
-            ("dot matrix", _verdict(self.dot_matrix, matrix)),
-            ("engraved", _verdict(self.engraved, engraved)),
+            ("dot matrix", _verdict(self.dot_matrix, matrix) if prints else None),
+            ("engraved", _verdict(self.engraved, engraved) if prints else None),
             (
                 "backstop",
                 (
@@ -159,7 +160,7 @@ class Quality(Result):
             ),
             ("coil", f"{quantity(self.work, 'J')} a dot, {self.mean_power:.3f} W in the mean{heat}"),
         ]
-        return Summary([Facts(rows)])
+        return Summary([Facts(rows)]).worded(self.hammer.strike)
 
     def notes(self) -> dict[str, Any]:
         """Return the figures of the report, by names that end in their units."""

@@ -126,7 +126,7 @@ class ToleranceYield(Result):
         known = self.safe_rates[~np.isnan(self.safe_rates)]
         if known.size:
             rows.append(("safe rates", f"{known.min():g} to {known.max():g} Hz"))
-        return Summary([Facts(rows)])
+        return Summary([Facts(rows)]).worded(self.hammer.strike)
 
     def notes(self) -> dict[str, Any]:
         """Return the limits, the spreads, the rate grid, and the rate of the test if there is one."""
