@@ -25,8 +25,8 @@ from printhammer.printing.dots.trial import Case, Trial, attempt
 from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
-SAFE = 850.0
-"""Open-loop safe rate of the shipped hammer, Hz."""
+SHARE = 1.5
+"""Rate of the tables for one rate, in open-loop safe rates."""
 TICKS = (None, "1 us", "2 us", "5 us", "10 us", "20 us")
 ROOMS = (
     *MOTION,
@@ -59,9 +59,9 @@ def worst(trial: Trial) -> float:
     return float(np.fmax(force, arrival).max())
 
 
-def measure(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
+def measure(hammer: ph.Hammer, units: list[ph.Hammer], rate: float) -> list[list[Cell]]:
     """Return a row a tick."""
-    whole, rate, rows = ph.tune(hammer, history=1), 1.5 * SAFE, []
+    whole, rows = ph.tune(hammer, history=1), []
     tables = {driver: ph.tune(hammer, rate=rate, driver=driver) for driver in ("own", "switch")}
     for tick in TICKS:
         ticked = {name: table if tick is None else table.quantised(tick) for name, table in tables.items()}
@@ -83,26 +83,27 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
 def curves(path: Path) -> None:
     """Draw safe rate and worst dot by tick."""
     style = import_module("printhammer.figures.elements.style")
-    rows = read("ticks").rows
+    measured = read("ticks")
+    rows, safe, rate = measured.rows, measured.settings["safe rate"], measured.settings["rate"]
     ticks = [0.0 if row[0] == "exact" else float(str(row[0]).split()[0]) for row in rows]
     with style.in_style():
         figure = style.new_figure(3.2)
         left, right = figure.subplots(1, 2)
         left.plot(ticks, [row[1] for row in rows], color=style.BLUE, marker="o")
-        left.axhline(SAFE, color=style.MUTED, linestyle="--")
-        left.annotate("open loop", (ticks[-1], SAFE), ha="right", va="bottom", fontsize=style.SMALL)
+        left.axhline(safe, color=style.MUTED, linestyle="--")
+        left.annotate("open loop", (ticks[-1], safe), ha="right", va="bottom", fontsize=style.SMALL)
         left.set_ylim(0.0, None)
         left.set_ylabel("Safe rate of a table over all rates  [Hz]")
         for column, name, colour in ((3, "own pulse", style.ORANGE), (5, "fast switch", style.BLUE)):
             right.plot(ticks, [row[column] for row in rows], color=colour, marker="o", label=name)
         right.axhline(1.0, color=style.MUTED, linestyle="--")
         right.set_ylim(0.0, None)
-        right.set_ylabel("Worst dot at 1,275 Hz  [limits]")
+        right.set_ylabel(f"Worst dot at {rate:,g} Hz  [limits]")
         right.legend(fontsize=style.SMALL, frameon=False)
         for ax in (left, right):
             ax.margins(x=0.05)
             ax.set_xlabel("Tick of the timer  [µs]")
-        style.foot(figure, "hendriks-1983")
+        style.foot(figure, next(iter(measured.hammers)))
         drawn = BytesIO()
         figure.savefig(drawn, dpi=110)
     path.write_bytes(drawn.getvalue())
@@ -119,17 +120,25 @@ def main() -> None:
         curves(asked.curves)
         return
     hammer = ph.load("hendriks-1983")
-    rows = measure(hammer, Variability().draw(hammer, asked.units, asked.seed))
+    safe = ph.safe_rate(hammer).rate
+    rate = SHARE * safe
+    rows = measure(hammer, Variability().draw(hammer, asked.units, asked.seed), rate)
     heads = [
         Column(name="tick"),
         Column(name="safe rate", unit="Hz", format="g"),
         Column(name="table over all rates", unit="bytes"),
-        Column(name="1,275 Hz, own pulse: worst dot, in parts of the limits", format=".2f"),
+        Column(name=f"{rate:,g} Hz, own pulse: worst dot, as a multiple of the limits", format=".2f"),
         Column(name="its units' dots within limits", unit="%", format=".1f"),
-        Column(name="1,275 Hz, fast switch: worst dot, in parts of the limits", format=".2f"),
+        Column(name=f"{rate:,g} Hz, fast switch: worst dot, as a multiple of the limits", format=".2f"),
         Column(name="its units' dots within limits, switch", unit="%", format=".1f"),
     ]
-    write("ticks", heads, rows, {"units": asked.units, "seed": asked.seed}, ROOMS)
+    write(
+        "ticks",
+        heads,
+        rows,
+        {"units": asked.units, "seed": asked.seed, "safe rate": safe, "rate": rate},
+        ROOMS,
+    )
 
 
 if __name__ == "__main__":
