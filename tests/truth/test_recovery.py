@@ -155,7 +155,7 @@ def count_all(found: list[Recovery]) -> dict[str, int]:
 def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
     """Run as printed, through files, as `docs/measure/recipe.py` does a hundred times."""
     path = Path(__file__).parents[2] / "docs" / "measure"
-    count = 10
+    count = 5
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(path))
         script = importlib.import_module("recipe")
@@ -168,11 +168,16 @@ def test_the_recipe_of_the_page_in_a_few_laboratories() -> None:
 
 
 @pytest.mark.slow
-def test_a_hundred_laboratories() -> None:
-    """Each constant lies in its 95 % interval in 89 to 99 of 100 laboratories."""
-    counts = count_all([recover(HAMMER, seed) for seed in range(100)])
-    print(counts)
-    assert {key: n for key, n in counts.items() if not 89 <= n <= 99} == {}
+def test_forty_laboratories() -> None:
+    """Intervals are neither too narrow nor too wide; `docs/measure/recovery.py` counts a hundred laboratories.
+
+    No constant misses its 95 % interval more often than chance allows, nor do all constants together hit theirs.
+    """
+    labs = 40
+    counts = count_all([recover(HAMMER, seed) for seed in range(labs)])
+    allowed = binom.isf(CHANCE, labs, 0.05)
+    assert {key: n for key, n in counts.items() if labs - n > allowed} == {}
+    assert 0.92 < sum(counts.values()) / (labs * len(counts)) < 0.98
 
 
 @pytest.mark.slow

@@ -1,10 +1,15 @@
 """The impact sensor: what is stated of its noise holds, and what is missed is not a number."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 from tests.errors import refused
 
 import printhammer as ph
+from printhammer.control.learning.production import OFFSET, Production
+from printhammer.control.table.task import Task
+from printhammer.printing.rates.variability import Variability
 
 FLIGHT = np.full(20_000, 240e-6)
 FORCE = np.ones(20_000)
@@ -60,8 +65,15 @@ def test_noise_depends_on_seed_unit_and_run_only() -> None:
         ("gain", -1.0),
         ("missed", 1.5),
         ("delay", float("inf")),
+        ("offset", -1e-6),
     ],
 )
 def test_bad_numbers_are_refused(key: str, value: float) -> None:
     with refused(key, value):
         ph.ImpactSensor(**{key: value})  # type: ignore[arg-type]
+
+
+def test_an_offset_that_is_stated_is_the_prior_of_the_learner() -> None:
+    task, variability = cast("Task", None), Variability()
+    for stated, prior in ((None, OFFSET), (0.0, 0.0), (3e-6, 3e-6)):
+        assert Production(task, 1e3, variability, ph.ImpactSensor(offset=stated)).offset == prior

@@ -163,15 +163,16 @@ def test_it_gains_with_other_sensors_than_it_was_designed_for(
     first, *others = calibrate(law, units, ImpactSensor(**{"force": 0.03, **options}))[1]
     before, after = (stage.good[:, IN_CYCLE].mean() for stage in (first, others[-1]))
     assert after > 0.93
-    assert after > before + 0.05
+    assert after > before + 0.1
     for stage in others:
         # A single dot of the cycle may be lost on the way.
         assert (stage.good.mean(axis=1) >= first.good.mean(axis=1) - 0.005).all()
 
 
 class Timed(NamedTuple):
-    """What two units learn from times alone."""
+    """Four units that learn from times alone."""
 
+    law: LearningLaw
     rows: list[np.ndarray]  # Their constants, in standard deviations
     units: list[ph.Hammer]
     learners: list[Learner]
@@ -179,40 +180,41 @@ class Timed(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def timed(by_time: LearningLaw) -> Timed:
-    rows, units = zip(*Variability().draw_rows(nominal(), 2, 5), strict=True)
-    return Timed(list(rows), list(units), *calibrate(by_time, units, ImpactSensor()))
+def timed() -> Timed:
+    """Return what the units learn with a sensor that is known to have no offset."""
+    sensor = ImpactSensor(offset=0.0)
+    law = law_for(nominal(), RATE, sensor=sensor, members=150)[0]
+    rows, units = zip(*Variability().draw_rows(nominal(), 4, 5), strict=True)
+    return Timed(law, list(rows), list(units), *calibrate(law, units, sensor))
 
 
 @pytest.mark.slow
-def test_times_tell_the_force_that_they_do_not_show(by_time: LearningLaw, timed: Timed) -> None:
-    """After 1,000 dots, better than single pulses without noise could, 3.2 %, beside an unknown offset."""
-    production = by_time.production
+def test_times_tell_the_force_that_they_do_not_show(timed: Timed) -> None:
+    """After 1,000 dots, better than single pulses could (3.2 %)."""
+    production = timed.law.production
     known = [
         production.hammers(each.belief.modes[0].mean[None])[0]
         for each in timed.learners
         if each.belief is not None
     ]
-    task = by_time.entries.task
+    task = timed.law.entries.task
     force, told = (
         Press(task, RATE, hammers).ladder([Rung(1.0)])[1][:, 0]
         for hammers in ([with_pulse(unit, task.pulse) for unit in timed.units], known)
     )
-    assert np.sqrt(np.mean((told / force - 1.0) ** 2)) < 0.032
+    assert np.sqrt(np.mean((told / force - 1.0) ** 2)) < 0.02
 
 
 @pytest.mark.slow
-def test_units_print_all_dots_and_none_fewer_than_in_the_better_open_loop(
-    by_time: LearningLaw, timed: Timed
-) -> None:
+def test_units_print_all_dots_and_none_fewer_than_in_the_better_open_loop(timed: Timed) -> None:
     for number, unit in enumerate(timed.units):
-        assert (worse(by_time, unit, timed.stages, number) <= 0.0).all()
+        assert (worse(timed.law, unit, timed.stages, number) <= 0.0).all()
     assert timed.stages[-1].good.mean() > 0.98
 
 
 @pytest.mark.slow
 def test_constants_lie_where_they_are_said_to_lie(timed: Timed) -> None:
-    """Of 16 constants; 95 of 100 within two standard deviations."""
+    """Of 32 constants; 95 of 100 within two standard deviations."""
     off = [np.abs(apart(each, row)) for each, row in zip(timed.learners, timed.rows, strict=True)]
-    assert (np.concatenate(off) < 2.0).mean() > 0.8
+    assert (np.concatenate(off) < 2.0).mean() > 0.88
     assert (np.concatenate(off) < 3.0).mean() > 0.95

@@ -282,7 +282,7 @@ def learn(
     The unit prints test lines; a sensor measures the impact time of each dot and, optionally, its force, with
     noise. The constants of the unit are estimated from the readings by maximum a posteriori estimation with a
     Laplace approximation, together with offset and gain of the sensor; the priors of these two have standard
-    deviations of 25 us, or the larger `offset` of the sensor, and 1 %. Iterative learning control then
+    deviations of 25 us, or the `offset` that the sensor states, and 1 %. Iterative learning control then
     corrects advance, width and brakes of a table that was tuned for the nominal hammer and the stated
     variability. The first line is printed in open loop. The table is used only if the posterior explains the
     readings, and if no sample of it prints fewer dots of the test cycle and of rows of 200 slots with the

@@ -26,7 +26,7 @@ SCALE: Final = 0.01
 """Prior standard deviation of the relative gain error of a sensor."""
 
 OFFSET: Final = 25e-6
-"""Prior standard deviation of the offset of a sensor's times, s, unless the sensor states a larger value.
+"""Prior standard deviation of the offset of a sensor's times, s, where the sensor states none.
 
 Sound takes 20 us for 7 mm of air before a microphone."""
 
@@ -62,7 +62,7 @@ class Production:
     @property
     def offset(self) -> float:
         """Standard deviation of the offset of the sensor's times, s."""
-        return max(self.sensor.offset, OFFSET)
+        return OFFSET if self.sensor.offset is None else self.sensor.offset
 
     @property
     def measured(self) -> int:

@@ -36,14 +36,15 @@ class ImpactSensor(Declared):
     false: float = part("fraction of impacts with a false detection before them", default=0.0)
     seed: int = part("seed of the noise", default=0)
     delay: float = scalar("s", "constant error of the impact time, unknown to the learner", default=0.0)
-    offset: float = scalar(
-        "s", "standard deviation, over units, of an error common to all dots of a unit", default=0.0
+    offset: float | None = part(
+        "standard deviation, s, over units of an error common to all dots of a unit; None where it is not "
+        "stated: none is simulated, and the learner expects 25 us",
+        default=None,
     )
 
     def __post_init__(self) -> None:
-        bounds = {"noise": math.inf, "offset": math.inf, "colour": 1.0, "missed": 1.0, "false": 1.0}
-        if self.force is not None:
-            bounds["force"] = math.inf
+        bounds = {"noise": math.inf, "colour": 1.0, "missed": 1.0, "false": 1.0}
+        bounds |= {name: math.inf for name in ("force", "offset") if getattr(self, name) is not None}
         for name, most in bounds.items():
             value = getattr(self, name)
             if not 0.0 <= value < most:
