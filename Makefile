@@ -11,7 +11,7 @@ TESTING := $(VENV)/test.stamp
 EVERYTHING := $(VENV)/dev.stamp
 # Each worker would compile every test file anew, and each program that a test starts every module.
 unexport PYTHONDONTWRITEBYTECODE
-CODE := conftest.py src tests studies $(wildcard benchmarks examples docs)
+CODE := conftest.py hatch_build.py src tests studies $(wildcard benchmarks examples docs)
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

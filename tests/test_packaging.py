@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 import printhammer as ph
+from printhammer.kernel.compile.modules import KINDS
+from printhammer.kernel.model.laws import LAW_FUNCTIONS
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
@@ -127,7 +129,9 @@ def test_the_wheel_holds_every_file_of_the_package_and_no_other(wheel: Path) -> 
         if path.is_file() and "__pycache__" not in path.parts
     }
     shipped = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    assert shipped == ours
+    modules = {name for name in shipped if name.startswith("printhammer/kernel/modules/")}
+    assert shipped - modules == ours
+    assert {Path(name).name.partition("_")[0] for name in modules} == {*KINDS, *LAW_FUNCTIONS}
     assert {"printhammer/py.typed", "printhammer/hammers/hendriks-1983.toml"} <= shipped
     assert any(re.fullmatch(r"printhammer/claims/.*\.toml", name) for name in shipped)
     assert any(re.fullmatch(r"printhammer/.*\.(html|jinja|j2)", name) for name in shipped)
@@ -144,6 +148,26 @@ def test_the_wheel_runs_elsewhere(elsewhere: Path, tmp_path: Path) -> None:
     assert "hendriks-1983" in output_of(
         elsewhere / "printhammer", "hammer", "show", "hendriks-1983", cwd=tmp_path
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hendriks-1983", "relay-5v"])
+def test_the_wheel_compiles_shipped_hammers_without_numba(elsewhere: Path, tmp_path: Path, name: str) -> None:
+    code = f"""
+import os, sys
+os.environ["NUMBA_CACHE_DIR"] = "empty"
+import printhammer as ph
+hammer = ph.load({name!r})
+width = hammer.waveform.width
+drives = [ph.PulseTrain(hammer.waveform, period=period * width, pulses=2) for period in (4.0, 5.0)]
+motion = ph.simulate(hammer, drives[0])
+_ = motion.dots, motion.energy, motion.x
+assert ph.Ensemble(hammer, drives, 9.0 * width).run(dots=True).ok.all()
+assert "numba" not in sys.modules
+"""
+    assert output_of(elsewhere / "python", "-c", code, cwd=tmp_path) == ""
+    kept = [path.suffix for path in (tmp_path / "empty").rglob("*") if path.is_file()]
+    assert set(kept) == {".code", ".json"}
 
 
 @pytest.mark.slow

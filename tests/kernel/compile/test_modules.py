@@ -106,19 +106,55 @@ print([name for name in sys.modules if name.partition(".")[0] == "numba"])
     assert done.strip() == "[]"
 
 
+VERBS = (
+    "run {hammer} --at 0us,1ms",
+    "map {hammer} --rates 5 --times 20 --pulses 2",
+    "strobe {hammer} --rate 900Hz --points 20 --no-verdict",
+    "lyapunov {hammer} --rate 900Hz --firings 20 --transient 10",
+    "print --hammer {hammer} --rate 900Hz --force I",
+    "hammer show {hammer}",
+)
+
+
+def test_no_verb_loads_numba_once_the_machine_code_is_on_disk(hammer: ph.Hammer, tmp_path: Path) -> None:
+    hammer.save(tmp_path / "hammer.toml")
+    verbs = [verb.format(hammer=tmp_path / "hammer.toml").split() for verb in VERBS]
+    code = f"""
+import sys
+from printhammer.cli.main import main
+loaded = {{}}
+for verb in {verbs!r}:
+    sys.argv = ["printhammer", *verb]
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code, verb
+    loaded[verb[0]] = "numba" in sys.modules
+print(loaded)
+"""
+    done = ""
+    for _ in range(2):
+        run = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert run.returncode == 0, run.stderr
+        done = run.stdout
+    assert done.splitlines()[-1] == str({verb[0]: False for verb in verbs})
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["bouncing-ball", "relay-5v", "dot-peen"])
+@pytest.mark.parametrize("name", ["hendriks-1983", "relay-5v", "tung-shaw-1988"])
 def test_what_is_linked_gives_the_bits_of_what_is_compiled_with_its_laws(name: str) -> None:
     from printhammer.kernel.compile import lower
     from printhammer.kernel.compile.compiling import compiled
 
     hammer = ph.load(name)
-    drive = ph.PulseTrain(hammer.waveform, rate=0.2 / hammer.waveform.duration, pulses=5)
+    drive = ph.PulseTrain(hammer.waveform, rate=0.2 / hammer.waveform.width, pulses=5)
     laws = laws_of(hammer, drive)
     bindings = bindings_of(laws)
     bound = {law: compile_law(function, compiled) for law, function in bindings.names.items()}
     signature = signature_of("run", {})
-    end = float(drive.times[-1]) + hammer.waveform.duration
+    end = float(drive.times[-1]) + hammer.waveform.width
     arguments = tuple(lower._types(each) for each in signature)
     run = execute_all(TEMPLATES, {**bound, **bindings.choices}, f"bound_{name}")["run"]
     library, symbol, _ = lower._lowered(run, arguments)

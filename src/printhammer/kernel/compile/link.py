@@ -95,7 +95,8 @@ def _values(template: Any, choices: Mapping[str, int]) -> str:
 def emit(module: Any) -> bytes:
     """Return machine code of a module for this processor."""
     machine = _machine()
-    module.data_layout = str(machine.target_data)
+    # That of the machine where it was lowered may be another.
+    module.triple, module.data_layout = machine.triple, str(machine.target_data)
     options = llvm.create_pipeline_tuning_options(speed_level=3)
     options.loop_vectorization, options.slp_vectorization = True, False
     builder = llvm.create_pass_builder(machine, options)

@@ -20,7 +20,7 @@ from printhammer.kernel.compile.cache import Code, File, say_once
 from printhammer.kernel.compile.signatures import RESULTS, signature_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from printhammer.kernel.compile.bindings import Bindings
 
@@ -117,6 +117,16 @@ def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
 
     sources = _digest_of(_SOURCES.get(entry, _PLAIN))
     return Module(entry, f"{entry} {sorted(variant.items())} {sources}", make)
+
+
+def every_template() -> Iterator[Module]:
+    """Yield the templates of all entry points in all variants."""
+    for entry in KINDS:
+        circuits = (False,) if entry == "lanes" else (False, True)
+        variants = [{} if entry == "lanes" else {"HAS_CIRCUIT": circuit} for circuit in circuits]
+        if entry == "flow":
+            variants = [{**variant, "FORCED": forced} for variant in variants for forced in (False, True)]
+        yield from (template_of(entry, variant) for variant in variants)
 
 
 def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:

@@ -1,0 +1,51 @@
+"""Build hook of the wheel: the modules of the kernel, lowered and compressed, see decision 0026."""
+
+from __future__ import annotations
+
+import atexit
+import lzma
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+_ABSENT = {"magnet": "", "spring": "", "pack": "", "backstop": "", "absent": "printhammer.parts.absent"}
+
+
+class LoweredModules(BuildHookInterface[Any]):
+    """Lower the templates of all entry points and the laws of all parts that ship, into the wheel alone."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Add the modules to the files of a wheel; an editable installation makes them when it wants them."""
+        if version == "editable":
+            return
+        sys.path.insert(0, str(Path(self.root, "src")))
+        from numba import TypingError
+
+        from printhammer.kernel.compile.bindings import bindings_of
+        from printhammer.kernel.compile.modules import every_template, laws_of
+        from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
+        from printhammer.parts import PARTS
+
+        modules = list(every_template())
+        for role in LAW_FUNCTIONS:
+            for name in (
+                "",
+                *sorted({part.__module__ for (known, _), part in PARTS.items() if known == role}),
+            ):
+                bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
+                modules += [laws_of(role, bindings, for_lanes) for for_lanes in (False, True)]
+        folder = tempfile.TemporaryDirectory()
+        atexit.register(folder.cleanup)
+        for module in modules:
+            path = Path(folder.name, module.shipped.name)
+            try:
+                content = module.bitcode()
+            except TypingError:
+                # A law of more constants than a lane has room for, which never runs in lanes.
+                continue
+            path.write_bytes(lzma.compress(content, preset=9))
+            place = module.shipped.relative_to(Path(self.root, "src"))
+            build_data["force_include"][str(path)] = place.as_posix()
