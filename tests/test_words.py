@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/printhammer"
 
 ROOMS = (
+    "chaos",
     "claims",
     "cli",
     "control/axes",

@@ -1,15 +1,15 @@
-"""Impact maps: Poincaré sections at the touches of the backstop or of the pack.
+"""Impact maps, Poincaré sections at the touches of backstop or pack, and statistics of impact trains.
 
-At a touch the displacement is that of the surface. What decides all that follows is the velocity and the time
-since the last firing; from touch to touch these two are an iterated map, as the strobe is from firing to
-firing, only that here the armature tells when to look.
+At a touch the displacement is that of the surface. The remaining state is the velocity and the time since the
+last firing; from touch to touch these two are an iterated map, like the strobe map from firing to firing,
+with the section defined by the armature itself.
 
-Statistics of an impact train: how regular the times are at which a surface is touched.
+*Statistics of an impact train.*
 
-What a platen hears, or a vibration sensor sees, is a train of impacts. The intervals between them, their
-coefficient of variation and their autocorrelation tell a regular train from an irregular one without any
-state; the Fano factor tells whether the irregularity adds up (D. R. Cox and P. A. W. Lewis, The Statistical
-Analysis of Series of Events, 1966, chapters 4 and 5).
+A vibration sensor records a train of impacts. The intervals between them, their coefficient of variation and
+their autocorrelation separate a regular train from an irregular one without knowledge of the state; the Fano
+factor shows whether the irregularity accumulates (D. R. Cox and P. A. W. Lewis, The Statistical Analysis of
+Series of Events, 1966, chapters 4 and 5).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
 
 TOUCHES: Final = 1000
-"""Number of touches unless told otherwise."""
+"""Default number of touches."""
 
 _FIRINGS_A_TOUCH: Final = 10
 
@@ -55,10 +55,10 @@ class Section(Result):
     surface: Surface = scalar("", '"pack" or "backstop"')
     first: int = scalar(
         "1",
-        "first of the firings between which touches were looked for",
+        "first of the firings between which touches were recorded",
         more="the very first one is number 1",
     )
-    last: int = scalar("1", "last of them")
+    last: int = scalar("1", "last of the firings between which touches were recorded")
     t: FloatArray = column("s", "time of touch", "touch")
     v: FloatArray = column("m/s", "velocity at touch", "touch")
     firing: IntArray = column(
@@ -79,7 +79,7 @@ class Section(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the touches are."""
+        """Title of the result, in one line."""
         return f"touches of the {self.surface} by {self.hammer.name}, fired every {self.period:.9g} s"
 
     @property
@@ -90,18 +90,18 @@ class Section(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the run went as asked."""
+        """Whether the run came to its end."""
         return self.status == "ok"
 
     @property
     def per_firing(self) -> float:
-        """Mean number of touches from firing to firing; NaN where there was but one firing."""
+        """Mean number of touches per firing; NaN for a single firing."""
         fired = self.last - self.first
         return int((self.firing < self.last).sum()) / fired if fired else float("nan")
 
     @property
     def remark(self) -> str:
-        """What there is to say of a section that has fewer touches than asked for; else empty."""
+        """Remark on a section with fewer touches than requested; else empty."""
         if len(self.t) == self.wanted:
             return ""
         why = "" if self.ok else f"; the run ended early: {self.status}"
@@ -123,27 +123,27 @@ def section(
     tolerance: float = TOLERANCE,
     **firing: Unpack[Firing],
 ) -> Section:
-    """Return the state of a hammer at each touch of its backstop, or of the pack.
+    """Compute the states of a hammer at the touches of its backstop or pack.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer; or the hammer with all that `firing` says of it. Its phase plays no part.
+        The hammer, or a regime, whose phase is ignored.
     surface : str, optional
         "backstop" or "pack".
     touches : int, optional
         Number of touches.
     transient : int, optional
-        Number of firings left out before the first touch.
+        Number of firings to discard before the first touch.
     firings : int, optional
-        Number of firings after which to give up looking; by default ten for each touch asked for.
+        Maximum number of firings; by default ten per requested touch.
     state, tolerance, **firing
         As for `printhammer.strobe`.
 
     Returns
     -------
     Section
-        With a status; a run that could not go on, or has too few touches, is no exception.
+        With a status; a run that ends early, or has too few touches, is not an exception.
     """
     counts = _counts(touches, transient, firings)
     check_tolerance(tolerance)
@@ -165,7 +165,7 @@ def sections(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> list[Section]:
-    """Return the sections of many trains from rest, computed on all cores; see `section`.
+    """Compute the sections of many trains from rest in parallel; see `section`.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def sections(
     Returns
     -------
     list of Section
-        One for each train.
+        One section per train.
     """
     counts = _counts(touches, transient, firings)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
@@ -188,7 +188,7 @@ def sections(
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
-    """Return the numbers of touches, of firings left out, and of firings after which to give up."""
+    """Return the numbers of touches and of discarded firings, and the maximum number of firings."""
     wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
@@ -219,7 +219,7 @@ def _section(train: Train, surface: Surface, counts: tuple[int, int, int], toler
     touches = touches_of(problem, surface, float(times[skipped]), float(times[-1]), wanted)
     t, v, t_out, v_out = touches.rows.T.copy()
     latest = np.searchsorted(times, t, side="right") - 1
-    # Touches are looked for up to the last one there is, or as far as the run got.
+    # Touches are recorded up to the last one, or to the end of the run.
     until = t[-1] if len(t) == wanted else touches.reached
     return Section(
         hammer=train.hammer,
@@ -241,18 +241,18 @@ def _section(train: Train, surface: Surface, counts: tuple[int, int, int], toler
 
 
 BINS: Final = 60
-"""Number of bins of the histogram unless told otherwise."""
+"""Default number of bins of the histogram."""
 
 LAGS: Final = 40
-"""Largest lag of the autocorrelation unless told otherwise; at most a quarter of the intervals."""
+"""Default largest lag of the autocorrelation; at most a quarter of the intervals."""
 
 _FEWEST: Final = 8
 _SAME: Final = 1e-9
-"""Part of an interval up to which differences count as none."""
+"""Relative difference below which two intervals are equal."""
 
 
 class ImpactTrain(Result):
-    """Intervals between impacts, and what they tell."""
+    """Intervals between impacts, and their statistics."""
 
     times: FloatArray = column("s", "time of the impact", "impact", name="t")
     intervals: FloatArray = part("times between successive impacts, s", more="one fewer", repr=False)
@@ -286,32 +286,32 @@ class ImpactTrain(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what this is."""
+        """Title of the result, in one line."""
         return "impact train"
 
     @property
     @derived("s", "time since the impact before", "impact")
     def interval(self) -> FloatArray:
-        """The intervals, NaN before the first."""
+        """Intervals since the impact before, s; NaN for the first impact."""
         return np.concatenate([[np.nan], self.intervals])
 
     @property
     def hammer(self) -> Hammer | None:
-        """The hammer, where it is known."""
+        """The hammer, if known."""
         return None if self.source is None else self.source.hammer
 
     @property
     def significant(self) -> float:
-        """What the autocorrelation of n independent intervals exceeds once in twenty lags, 1.96/sqrt(n)."""
+        """The 95 % bound of the autocorrelation of n independent intervals, 1.96/sqrt(n)."""
         return 1.96 / math.sqrt(len(self.intervals))
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the times come from."""
+        """Provenance of the times."""
         return provenance() if self.source is None else self.source.provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return which touches were looked for, for the attributes of the Dataset."""
+        """Return the surface of the touches, for the attributes of the Dataset."""
         return {name: getattr(self.source, name, None) for name in ("surface", "first", "last", "wanted")}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
@@ -337,33 +337,33 @@ def impact_train(
     lags: SupportsIndex = LAGS,
     **firing: Unpack[Firing],
 ) -> ImpactTrain:
-    """Return the statistics of the impacts of a section, or of a series of times.
+    """Compute statistics of the impacts of a section, or of a series of times.
 
     Parameters
     ----------
     touches : Section, Regime, Hammer or array
-        From `printhammer.section`; or a regime, or a hammer and how it is fired, of which that is taken; or
-        times of impacts, s, ascending. At least nine.
+        A section from `printhammer.section`; or a regime, or a hammer with the keywords `firing`, whose
+        section is computed; or at least nine times of impacts, s, ascending.
     window : float or str, optional
         Length of the windows for the Fano factor, s, or text with a unit; by default ten periods of the
-        drive, or ten mean intervals where there is none. In a window of one period every train that prints
-        once a period looks like a clock.
+        drive, or ten mean intervals without a drive. In a window of one period every train with one dot per
+        period appears perfectly regular.
     bins : int, optional
         Number of bins of the histogram, between the shortest and the longest interval.
     lags : int, optional
-        Largest lag of the autocorrelation; no more than a quarter of the intervals is taken.
+        Largest lag of the autocorrelation, clipped to a quarter of the intervals.
     **firing
         How a hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
     ImpactTrain
-        The statistics.
+        Intervals, histogram, autocorrelation and Fano factor.
 
     Raises
     ------
     InputError
-        There are too few times, they are not ascending or not finite; a window that is not positive.
+        There are too few times, they are not ascending or not finite, or the window is not positive.
     """
     if isinstance(touches, Regime | Hammer):
         touches = section(touches, **firing)
@@ -396,11 +396,10 @@ def impact_train(
 
 
 def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
-    """Return the autocorrelation of a series at the lags from 0 to `longest`.
+    """Compute the autocorrelation of a series at the lags from 0 to `longest`.
 
-    The sums of the products of deviations are divided by that at lag 0, as G. E. P. Box and G. M. Jenkins do
-    (Time Series Analysis, 1970, section 2.1.5). NaN where the numbers differ by no more than 1e-9 of the
-    largest.
+    The sums of the products of deviations are divided by the sum at lag 0 (G. E. P. Box and G. M. Jenkins,
+    Time Series Analysis, 1970, section 2.1.5). NaN if the numbers differ by no more than 1e-9 of the largest.
     """
     away = series - series.mean()
     whole = float((away**2).sum())
@@ -411,15 +410,15 @@ def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
 
 
 def _range(intervals: FloatArray) -> tuple[float, float]:
-    """Return the ends of the histogram: a thousandth of the mean apart at least."""
+    """Return the ends of the histogram, at least a thousandth of the mean apart."""
     low, high = float(intervals.min()), float(intervals.max())
     room = max(0.0, 0.5 * (1e-3 * float(intervals.mean()) - (high - low)))
     return low - room, high + room
 
 
 def _fano(times: FloatArray, length: float) -> tuple[int, float]:
-    """Return how many windows of a length, s, there are, and the Fano factor of the impacts in them."""
-    # Half an interval before the first impact, so that those of a clock do not fall on the edges.
+    """Count windows of a length, s, and compute the Fano factor of the impacts in them."""
+    # Windows start half an interval before the first impact, so that impacts of a clock avoid the edges.
     begin = times[0] - 0.5 * (times[-1] - times[0]) / (len(times) - 1)
     windows = int((times[-1] - begin) // length)
     if windows < 2:

@@ -19,7 +19,7 @@ from printhammer.errors import InputError
 
 
 class Units(StrEnum):
-    """Unit system of what is shown."""
+    """Unit system of displayed quantities."""
 
     SI = "si"
     INCH = "inch"

@@ -30,4 +30,4 @@ VERBS: Final[tuple[Verb, ...]] = (
 )
 
 GROUPS: Final = {"hammer": (hammer.GROUP, None), "fit": (fit.GROUP, fit.EXAMPLE)}
-"""What the verbs of two words have in common, by their first word: help, and an example."""
+"""Help and example of each group of two-word verbs, by their first word."""

@@ -1,12 +1,12 @@
-"""Rows of dots: the periodic orbit of a row, and its multiplier from dot to dot.
+"""Rows of dots: the periodic orbit of a row, and its Floquet multipliers from dot to dot.
 
 A drive that fires the same pulses for every dot of a row has a strobe map, from the state at one firing to
-that at the next. A row of equal dots is a fixed point of this map. The eigenvalues of the derivative there
-are its Floquet multipliers, by which a small error grows from dot to dot: beyond the unit circle a long row
-leaves the fixed point, however good its first dots are.
+the state at the next. A row of equal dots is a fixed point of this map. The eigenvalues of the derivative at
+the fixed point are its Floquet multipliers, the factors by which a small error grows from dot to dot: with a
+multiplier outside the unit circle a long row leaves the fixed point, however good its first dots are.
 
 Fixed points are found for many rows at once by Newton's method, with derivatives from central differences of
-neighbours that run side by side in one ensemble.
+neighbours that run in one ensemble.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from printhammer.run.start import initial_state
 from printhammer.support.arrays import BoolArray, FloatArray
 
 FIRING: Final = 12
-"""Index of the firing from which to the next one the map leads; the state in a row from rest is near it."""
+"""Default index of the firing at which the map starts; a row from rest is near the fixed point there."""
 
 MORE: Final = 4
-"""Number of dots from that firing on after which nothing that the map meets depends on where the row ends."""
+"""Number of dots after that firing, so that the end of the row does not affect the map."""
 
 DOTS: Final = FIRING + MORE
-"""Number of dots of a row that is long enough."""
+"""Number of dots of a sufficiently long row."""
 
 _SPACING: Final = 1e-5
-_CLOSED: Final = 1e-6  # Distance from state to image at which an orbit is closed, relative likewise
-_LONGEST_STEP: Final = 0.1  # Longest Newton step, relative likewise
+_CLOSED: Final = 1e-6  # Distance from state to image below which an orbit is closed, in scales of the state
+_LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state
 _ITERATIONS: Final = 12  # Iteration limit
 
 
@@ -53,23 +53,23 @@ def row_multipliers(
     Parameters
     ----------
     hammers, drives : sequences
-        A hammer and a drive for each row. A drive has four firings more than `firing` at least, from rest;
-        from the firing before `firing` on they are alike and as far apart from each other.
+        A hammer and a drive for each row. A drive starts from rest and has at least four firings more than
+        `firing`; from the firing before `firing` on, firings are identical and equally spaced.
     effort : Effort
         Tolerance and threads.
     closed : bool, optional
-        Whether to find the fixed point by Newton's method; otherwise the derivative is that at the state
+        Whether to find the fixed point by Newton's method; otherwise the derivative is evaluated at the state
         that the row from rest reaches, which is near the fixed point if the dots before are good.
     firing : int, optional
-        Index of the firing from which to the next one the map leads. Where the first dots are made right
-        their state is the fixed point, and an early firing is nearer to it than a later one.
+        Index of the firing at which the map starts. If the first dots are compensated, their state is the
+        fixed point, and an early firing is nearer to it than a late one.
 
     Returns
     -------
     array
-        The multiplier of largest absolute value: with its sign where it is real (negative: an error
-        alternates), else its absolute value. NaN where the row is no such orbit: a run that ends early,
-        Newton's method does not converge, or a pulse is fired while the armature leaves the pack.
+        The multiplier of largest absolute value: with its sign if it is real (negative: an error alternates),
+        else its absolute value. NaN if the row is no periodic orbit: a run ends early, Newton's method does
+        not converge, or a pulse is fired while the armature leaves the pack.
     """
     if not hammers:
         return np.zeros(0)
@@ -94,9 +94,9 @@ def row_multipliers(
 
 
 def leading(jacobians: FloatArray) -> FloatArray:
-    """Return the eigenvalues of largest absolute value, (rows,), of matrices (rows, 2, 2); NaN stays NaN.
+    """Compute the eigenvalues of largest absolute value, (rows,), of matrices (rows, 2, 2); NaN stays NaN.
 
-    A real one keeps its sign; of a pair of complex ones it is the absolute value.
+    A real eigenvalue keeps its sign; a complex pair is represented by its absolute value.
     """
     known = np.asarray(np.isfinite(jacobians).all(axis=(1, 2)))
     values = np.linalg.eigvals(np.where(known[:, None, None], jacobians, 0.0))
@@ -106,7 +106,7 @@ def leading(jacobians: FloatArray) -> FloatArray:
 
 
 class _Maps:
-    """The strobe maps of rows: states in units of the scales, shape (rows, 2), and their images."""
+    """Strobe maps of rows, in scaled states, shape (rows, 2)."""
 
     def __init__(
         self, hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort, firing: int
@@ -123,12 +123,12 @@ class _Maps:
         strobes = self._run(None, np.zeros(len(hammers)), self.times[:, :2], hammers, drives)
         states = np.stack([strobes.x, strobes.v], axis=2)
         states[_with_memory(strobes)] = np.nan
-        # Where an error alternates, it is least halfway between two states.
+        # If errors alternate in sign, the midpoint of two states is nearer to the fixed point.
         self.start = np.asarray(states.mean(axis=1) / self.scales)
         self.current = None if strobes.electric is None else strobes.electric[:, -1]
 
     def images(self, rows: Any, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the images (n, 2) of states of some rows, and the derivatives (n, 2, 2)."""
+        """Compute the images (n, 2) of states of rows, and the derivatives (n, 2, 2)."""
         steps = _SPACING * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         count, places = len(steps), np.repeat(rows, len(steps))
         states = ((z[:, np.newaxis] + steps) * self.scales[rows][:, np.newaxis]).reshape(-1, 2)
@@ -144,7 +144,7 @@ class _Maps:
             ends[_with_memory(strobes)[:, 0]] = np.nan
             images[able] = ends / self.scales[own]
             if strobes.electric is not None and self.current is not None:
-                # The current forgets its past sooner than the armature does: it follows from step to step.
+                # The current forgets its past faster than the armature: it is updated from step to step.
                 middle = np.flatnonzero(able)[::count] // count
                 self.current[rows[middle]] = strobes.electric[::count, 0]
         groups = np.asarray(images.reshape(-1, count, 2))
@@ -173,7 +173,7 @@ class _Maps:
 
 
 def _way(hammer: Hammer) -> float:
-    """Return the way from rest to the pack, m."""
+    """Return the distance from rest to the pack, m."""
     if hammer.front is None:
         raise InputError(
             f"{hammer.path}: the hammer has no pack", file=hammer.path, key="pack", expected="one"
@@ -191,5 +191,5 @@ def _possible(hammer: Hammer, state: FloatArray) -> bool:
 
 
 def _with_memory(strobes: Strobes) -> BoolArray:
-    """Return where the pack remembers what belongs to the state, so that the plane does not hold it."""
+    """Mask of the strobes inside the pack with a memory, whose state is not in the plane."""
     return np.array([[components(mode) > 2 for mode in row] for row in strobes.branch.tolist()])

@@ -3,12 +3,16 @@
 A table is a float64 array of shape (segments + 1, 6) with rows ``[start, kind, p0, p1, p2, p3]``. With tau
 the time since the firing and s = tau - start, a segment's value is
 
-====  ==================================  ================= kind  value                               used by
-====  ==================================  ================= 0     p0 + s (p1 + s (p2 + s p3))
-plateaus, ramps, sampled records 1     p0 + p1 exp(-p2 s)                  rise and decay of a coil current 2
-p0 + p1 sin(p2 s + p3)              half sine, sinusoidal force 4     p0, a voltage; thresholds p2, p3
-supply on, with a chopper 5     0; decays against p0                supply off 6     p0, at first
-reservoir ====  ==================================  =================
+====  ==================================  ================================
+kind  value                               used by
+====  ==================================  ================================
+0     p0 + s (p1 + s (p2 + s p3))         plateaus, ramps, sampled records
+1     p0 + p1 exp(-p2 s)                  rise and decay of a coil current
+2     p0 + p1 sin(p2 s + p3)              half sine, sinusoidal force
+4     p0, a voltage; thresholds p2, p3    supply on, with a chopper
+5     0; decays against p0                supply off
+6     p0, at first                        reservoir
+====  ==================================  ================================
 
 The first row starts at 0, starts ascend strictly, and the last row ``[end, 0, 0, 0, 0, 0]`` marks the end of
 the support (possibly infinite); the value is zero before 0 and from the end on. Values are right-continuous

@@ -97,21 +97,21 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             "motion.buzz",
             "Buzz printing",
             "A train of the same waveform, found by search, that prints while the armature stays clear of the"
-            " backstop; numbers are peak forces in units of that of a single pulse.",
+            " backstop; numbers are peak forces relative to a single pulse.",
         ),
         PaperFigure(
             8,
             "maps.surface",
             "Nine pulses: displacement against time and rate",
-            "Displacement under nine pulses at gradually rising rates, one curve for each, hiding those"
-            " behind it; blue inside the ribbon and paper pack.",
+            "Displacement under nine pulses at gradually rising rates, one curve for each rate; nearer curves"
+            " hide farther ones. Blue: inside the ribbon and paper pack.",
         ),
         PaperFigure(
             9,
             "maps.frequency_map",
             "Nine pulses: frequency-time map",
-            "The same in colours, at more rates. Thin lines are firings, orange lost dots; backstop, pack and"
-            " platen are marked on the scale.",
+            "Displacement under nine pulses in colours, at more rates. Thin lines are firings, orange lost"
+            " dots; backstop, pack and platen are marked on the scale.",
         ),
         PaperFigure(
             10,
@@ -124,7 +124,7 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             "poincare.poincare",
             "Poincaré plots",
             "Displacement and velocity at the first 200 firings of trains, a panel for each strobe time, with"
-            " the verdict on firings 1001 to 2000, and that of the paper where it is another. Vertical line:"
+            " the verdict on firings 1001 to 2000, and that of the paper if it differs. Vertical line:"
             " backstop; orange circles: the last points of a train with a period of up to 8 firings.",
         ),
     )

@@ -238,9 +238,7 @@ def _printed_title(page: Page) -> str:
 def _zoom_title(page: Page) -> str:
     line, first = page.worst_place(zoom_slots(page))
     last = min(first + zoom_slots(page), page.pattern.slots)
-    return (
-        f"The worst place: print line {line + 1}, slots {first + 1} to {last} (rings: where dots are wanted)"
-    )
+    return f"The worst place: print line {line + 1}, slots {first + 1} to {last} (rings: requested dots)"
 
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -338,7 +336,7 @@ def _sign(figure: Figure, page: Page) -> None:
 def summary(page: Page) -> str:
     """Return the quality of a page in one line."""
     lost, extra = int(page.lost.sum()), int(page.extra_contacts.sum())
-    said = [f"{page.line.size} dots wanted", f"{int(page.printed.sum())} printed", f"{lost} lost"]
+    said = [f"{page.line.size} dots requested", f"{int(page.printed.sum())} printed", f"{lost} lost"]
     if not page.run.all():
         said.append(f"{int((~page.run).sum())} not run")
     said.append(f"{int(page.good.sum())} within limits")

@@ -243,7 +243,7 @@ def plot_tolerance(batch: ToleranceYield, *, bars: int = 8) -> Figure:
     _correlations(right, batch, outcome, bars)
     heading(right, f"Rank correlation {title}")
     odd = int((batch.status != "ok").sum())
-    remark = f"{odd} of {len(batch.status)} draws make no hammer that prints." if odd else ""
+    remark = f"{odd} of {len(batch.status)} drawn hammers do not print." if odd else ""
     sign(figure, batch.hammer, remark)
     return figure
 
@@ -255,7 +255,7 @@ def _rates(ax: Axes, batch: ToleranceYield) -> None:
     ax.fill_between(batch.grid[:last], shares[:last], step="post", color=style.BLUE, alpha=0.15, lw=0.0)
     ax.set_ylim(0.0, 104.0)
     ax.set_xlabel("Slots per second  [Hz]")
-    ax.set_ylabel("Hammers that print well up to here  [%]")
+    ax.set_ylabel("Hammers within limits up to this rate  [%]")
     for share in (95.0, 50.0):
         ax.axhline(share, color=style.FAINT, lw=style.THIN, zorder=0)
     heading(ax, f"{len(batch.passed)} hammers")

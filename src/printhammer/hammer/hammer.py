@@ -282,8 +282,8 @@ class Hammer:
             values, which are set together.
         value : object, optional
             For a constant: text with its unit ("60 lbf"), a float in SI, or a `Constant`; for an option: its
-            value; for a part: a part, or a mapping of its keys with "law"; None takes away what is optional.
-            The standard errors of constants that are set go, unless "uncertainty" is set too.
+            value; for a part: a part, or a mapping of its keys with "law"; None removes an optional entry.
+            The standard errors of replaced constants are removed, unless "uncertainty" is set, too.
         status, source : str, optional
             Status and source of the constants that are set.
         """

@@ -1,13 +1,14 @@
 """Names of constants: one vocabulary for files, edits, sweeps, regimes, derivatives, tolerances and controls.
 
-===================== ====================================================================================
-name                  what it is =====================
-==================================================================================== ``mass``              a
-number of the hammer itself ``pack.stiffness``    a constant of a part, spelled as in a hammer file
-``waveform.width``    a constant of the pulse that is fired: the hammer's own, or that of the drive
-``period``, ``rate``  time between firings and firings per second, of a train or of a force
-``drive.amplitude``   of an endless force, as is ``drive.phase`` =====================
-====================================================================================
+=====================  ========================================================================
+name                   meaning
+=====================  ========================================================================
+``mass``               constant of the hammer itself
+``pack.stiffness``     constant of a part, spelled as in a hammer file
+``waveform.width``     constant of the fired pulse: the hammer's waveform, or that of the drive
+``period``, ``rate``   time between firings and firings per second, of a train or of a force
+``drive.amplitude``    constant of an endless force, as is ``drive.phase``
+=====================  ========================================================================
 
 The unit, meaning and bounds of a constant are declared once, with its part or waveform
 (`printhammer.support.constants.quantity`), and looked up here. `range_of` returns the range of a constant on

@@ -42,7 +42,7 @@ TIMES: Final = 512
 """Default number of times of a map; arbitrary."""
 
 TAIL: Final = 1e-3
-"""Least time after the last firing, s, shown at the lowest rate; arbitrary."""
+"""Smallest time after the last firing, s, shown at the lowest rate; arbitrary."""
 
 MOST_CELLS: Final = 200_000_000
 """Largest number of displacements in a map; arbitrary, to refuse typing errors."""
@@ -128,9 +128,9 @@ def frequency_map(
 
 
 def tail_of(hammer: Hammer, waveform: Waveform) -> float:
-    """Return how long a map goes on after the last firing at its lowest rate, s.
+    """Return the time after the last firing at the lowest rate that a map shows, s.
 
-    What the last firing of a slow device does is to be seen.
+    The time covers the response of a slow device to the last firing.
     """
     wait = wait_of(hammer, waveform)
     return wait if wait > CYCLE else TAIL

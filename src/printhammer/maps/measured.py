@@ -167,12 +167,12 @@ def load_measured_map(
         `displacement` lies over `rate` and one more dimension, and `time` over that one, or over both where
         every rate has times of its own.
     times : array, optional
-        Times from the first firing, s, ascending, to which the records are brought by straight lines between
-        samples. By default those of the samples if all rates have the same ones; otherwise even ones, as
-        close as the samples of the closest record.
+        Times from the first firing, s, ascending, at which the records are interpolated linearly. By default
+        those of the samples if all rates share them; otherwise evenly spaced times, with the smallest sample
+        spacing of any record.
     columns : str, optional
-        What the columns of a CSV file hold, such as "time=1, 500 Hz=2*50 um/V"; by default what a file
-        beside it says, and else its heading; see `printhammer.support.tables.columns`.
+        Declaration of the columns of a CSV file, such as "time=1, 500 Hz=2*50 um/V"; by default the
+        declaration in a file beside it, or else its heading; see `printhammer.support.tables.columns`.
 
     Returns
     -------

@@ -12,7 +12,7 @@
 | `status` | how the run ended, where there is one run |
 | `printhammer`, `numpy`, `numba`, `scipy` | versions on which the bits depend |
 
-What does not apply to a result is left out; the versions are always there.
+Keys that do not apply to a result are omitted; the versions are always present.
 """
 
 from __future__ import annotations

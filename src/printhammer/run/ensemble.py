@@ -350,7 +350,7 @@ class Ensemble:
         Returns
         -------
         EnsembleResult
-            With a status for each member; a run that could not go on is no exception.
+            With a status for each member; a run that ends early is not an exception.
         """
         if engine not in ENGINES:
             raise InputError.of("engine", engine, f"one of {', '.join(ENGINES)}")

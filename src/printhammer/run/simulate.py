@@ -73,12 +73,13 @@ def simulate(
     step_scale : float, optional
         Factor on all steps of the paper's schemes.
     ledger : bool, optional
-        Compute the energy ledger at once; otherwise when `Motion.energy` is first asked for.
+        Whether to compute the energy ledger at once; otherwise it is computed on first access of
+        `Motion.energy`.
 
     Returns
     -------
     Motion
-        With a status; a run that could not go on is no exception.
+        With a status; a run that ends early is not an exception.
     """
     if scheme not in SCHEMES:
         raise InputError.of("scheme", scheme, f"one of {', '.join(SCHEMES)}")

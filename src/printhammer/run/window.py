@@ -26,12 +26,12 @@ CYCLE: Final = 4e-3
 """Smallest default time from switch-off of the supply to the end of a run, s."""
 
 FLIGHTS: Final = 3.0
-"""Smallest length of a window, in flight times of the single pulse; a later dot of a train may fly longer."""
+"""Smallest length of a window, in flight times of the single pulse; a later dot may fly longer."""
 
 _SETTLED: Final = 0.05  # Distance from rest at the end of a window, as a fraction of the way to the pack
-_PATIENCE: Final = 16.0  # Flight times after which a device that does not settle is waited for no longer
-_LONGEST: Final = 64.0  # The same for a device that does not strike either, in times of its scales
-_LAST: Final = 1.0  # And in any case, s
+_PATIENCE: Final = 16.0  # Largest window of a device that does not settle, in flight times
+_LONGEST: Final = 64.0  # As `_PATIENCE`, for a device that makes no dot, in times of its scales
+_LAST: Final = 1.0  # Upper limit of a window, s
 TOLERANCE: Final = 5e-7  # The result depends on thresholds only
 MOST_STEPS: Final = 500_000
 _MOST_KEPT: Final = 512
@@ -46,39 +46,41 @@ _known: dict[tuple[str, str], Window] = {}
 class Window(NamedTuple):
     """Window of a device under a waveform, and the flight time of its single pulse."""
 
-    wait: float  # From the last firing to the end of a run, s
-    flight: float  # s, NaN without a dot
+    wait: float  # Time from the last firing to the end of a run, s
+    flight: float  # Flight time of the single pulse, s; NaN without a dot
 
 
 class Single(NamedTuple):
     """State of a single pulse at the end of a window: completed, flight time, distance from rest."""
 
     ok: bool
-    flight: float  # s, NaN without a dot
+    flight: float  # Flight time, s; NaN without a dot
     x: float
     v: float
 
 
 def least_wait(waveform: Waveform) -> float:
-    """Return the smallest time from the last firing to the end of a run, s, for any device.
+    """Compute the smallest time from the last firing to the end of a run, s, for any device.
 
-    Under a driver 4 ms after it is off, under a current or a force 4 ms after the firing, or its end.
+    With a driver the run ends 4 ms after switch-off, with a current or a force 4 ms after the firing, or
+    after its end.
     """
     lasts = waveform.support if math.isfinite(waveform.support) else 0.0
     return CYCLE + lasts if waveform.replaces else max(CYCLE, lasts)
 
 
 def wait_of(hammer: Hammer, waveform: Waveform | None = None) -> float:
-    """Return the time from the last firing to the end of a run, s; by default for the hammer's waveform."""
+    """Compute the time from the last firing to the end of a run, s, by default for the hammer's waveform."""
     pulse = hammer.waveform if waveform is None else waveform
     return CYCLE if pulse is None else _window_of(hammer, pulse).wait
 
 
 def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
-    """Return by which factor a device is slower than the paper's hammer: 1, 2, 5, 10, 20, ...
+    """Compute the factor by which a device is slower than the paper's hammer: 1, 2, 5, 10, 20, ...
 
-    The larger one of the flight time of a single pulse and half the width of the pulse, normalised by the
-    flight time of the paper's hammer, 0.28 ms, and rounded on a logarithmic scale; 1 for an endless drive.
+    The factor is the larger of the flight time of a single pulse and half the width of the pulse, divided by
+    the flight time of the paper's hammer, 0.28 ms, and rounded on a logarithmic scale; 1 for an endless
+    drive.
     """
     pulse = hammer.waveform if waveform is None else waveform
     if pulse is None or not math.isfinite(pulse.support):
@@ -93,12 +95,12 @@ def time_scale(hammer: Hammer, waveform: Waveform | None = None) -> float:
 
 
 def scaled_rate(hammer: Hammer, rate: float, waveform: Waveform | None = None) -> float:
-    """Return the rate, Hz, of a device that corresponds to a rate of the paper's hammer."""
+    """Scale a rate, Hz, of the paper's hammer to a device."""
     return rate / time_scale(hammer, waveform)
 
 
 def _window_of(hammer: Hammer, pulse: Waveform) -> Window:
-    """Return the window of a device, from the cache if its single pulse was run before."""
+    """Determine the window of a device, from the cache if its single pulse was run before."""
     if not has_window(hammer, pulse):
         return Window(least_wait(pulse), math.nan)
     drive = PulseTrain(pulse)

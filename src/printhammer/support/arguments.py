@@ -23,13 +23,13 @@ _KINDS: Final = {
     "Branch": "a branch of orbits",
     "Orbit": "an orbit",
 }
-"""Names of the classes that are checked, and the words for an object of each."""
+"""Descriptions of the checked classes for messages, by class name."""
 
 
 class _Argument(NamedTuple):
     name: str
     place: int
-    """Place among the positional arguments; the number of these for one that has to be named."""
+    """Position among the positional arguments; their number for a keyword-only parameter."""
 
     classes: frozenset[str]
     expected: str
@@ -38,14 +38,14 @@ class _Argument(NamedTuple):
 def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], None]:
     """Build the check of a function's arguments.
 
-    It looks at the parameters whose annotation is a union of classes in `_KINDS` and None. Objects are known
-    by the names of their classes, so that nothing has to be imported.
+    Parameters are checked whose annotation is a union of classes in `_KINDS` and None. Objects are compared
+    by the names of their classes, so that no class has to be imported.
 
     Returns
     -------
     Callable
-        Takes the positional arguments and the keywords of a call; InputError with the name and the value of
-        an argument that is not of its class.
+        Check of the positional arguments and the keywords of a call; raises InputError with name and value of
+        an argument of another class.
     """
     arguments = []
     for place, each in enumerate(inspect.signature(function).parameters.values()):

@@ -47,14 +47,14 @@ _FIRING: Final = Quantity("s", "t", "time of a firing", ge=0.0)
 class Axis(Declared, eq=False):
     """One axis of a sweep."""
 
-    key: str = part("as the spec gives it")
-    name: str = part("of its dimension or coordinate in the store")
+    key: str = part("key as written in the spec")
+    name: str = part("name of its dimension or coordinate in the store")
     target: Target = part(
         "whether it changes the hammer, the waveform of the drive, its timing, a firing time or the state"
     )
-    field: str = part("what it changes there: the key, the name of a number, or the number of a firing")
+    field: str = part("target of the change: the key, the name of a number, or the index of a firing")
     note: Quantity = part("unit, meaning and bounds")
-    values: FloatArray = part("in a grid its values; else the two ends of its range; SI")
+    values: FloatArray = part("values of a grid, or the two ends of a range; SI")
     geometric: bool = part("whether a range is divided geometrically", default=False)
 
     @property

@@ -57,15 +57,15 @@ class Base(Declared):
     hammer: Hammer = part("the hammer, before the axes change it")
     drive: Mapping[str, Any] = part("tables of the drive file; its waveform only where an axis changes it")
     waveform: Waveform | None = part(
-        "of the drive; None where that of the hammer is fired, or an axis changes it"
+        "waveform of the drive; None if the hammer's is fired, or an axis changes it"
     )
-    folder: Path = part("where what the drive names lies")
+    folder: Path = part("folder of the files that the drive refers to")
     state: tuple[float | None, float | None] = part(
         "displacement, m, and velocity, m/s, at the start; None for those at rest"
     )
     duration: float | None = scalar("s", "end of the runs")
     tolerance: float = part("error allowed in one step")
-    axes: tuple[Axis, ...] = part("what a row of values means")
+    axes: tuple[Axis, ...] = part("meaning of a row of axis values")
 
     @property
     def kind(self) -> str:

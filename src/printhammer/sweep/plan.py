@@ -58,7 +58,7 @@ class Blocks(Declared):
     """Division of a grid of members into blocks, each a whole chunk and contiguous in member order."""
 
     shape: tuple[int, ...] = part("members along each dimension; the last one runs fastest")
-    chunks: tuple[int, ...] = part("those of a block")
+    chunks: tuple[int, ...] = part("members of a block along each dimension")
 
     @classmethod
     def of(cls, shape: Sequence[int], most: int) -> Blocks:

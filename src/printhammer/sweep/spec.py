@@ -35,16 +35,16 @@ from printhammer.sweep.tables import read_quantity, read_tables
 class Spec(Declared):
     """Parsed specification of a sweep."""
 
-    where: str = part("what to name in a message, usually the file")
+    where: str = part("name for messages, usually the file")
     text: str = part("TOML")
-    title: str = part("one line that says what it is")
-    base: Base = part("what all members have in common")
-    axes: tuple[Axis, ...] = part("what varies")
+    title: str = part("one-line description")
+    base: Base = part("common settings of all members")
+    axes: tuple[Axis, ...] = part("axes that vary")
     design: str = part('either "grid" or "latin-hypercube"')
     members: int | None = part("number of members of a Latin hypercube; None in a grid")
-    seed: int | None = part("of a Latin hypercube")
+    seed: int | None = part("seed of a Latin hypercube")
     chunk: int | None = part("members of a block of work")
-    outputs: Outputs = part("what is kept")
+    outputs: Outputs = part("outputs stored for each member")
 
     @property
     def grid(self) -> bool:

@@ -112,12 +112,12 @@ def test_an_event_lies_on_a_curve_or_not() -> None:
         for b in (-0.37, 0.0, 0.123, 0.4):
             chart = _Chart(branch, NAMES[1], PLANE.bounds[1], STEPS)
             chart.value = b
-            assert chart.on(doubling, event(b))
-            assert not chart.on(doubling, event(b, kind="fold"))
+            assert chart.is_on(doubling, event(b))
+            assert not chart.is_on(doubling, event(b, kind="fold"))
             # Another orbit at the same constants is another bifurcation.
-            assert not chart.on(doubling, event(b, away=0.3 * PLANE.scales[0]))
+            assert not chart.is_on(doubling, event(b, away=0.3 * PLANE.scales[0]))
             chart.value = b + 0.2
-            assert not chart.on(doubling, event(b))
+            assert not chart.is_on(doubling, event(b))
 
 
 def test_two_events_on_one_curve_are_followed_once() -> None:
@@ -135,8 +135,8 @@ def test_two_events_on_one_curve_are_followed_once() -> None:
     with standing_in(CUBIC):
         followed = chart.curve(one)
         assert isinstance(followed, BifurcationCurve)
-        assert chart.on(followed, one)
-        assert chart.on(followed, two)
+        assert chart.is_on(followed, one)
+        assert chart.is_on(followed, two)
         refused = chart.curve(dataclasses.replace(one, kind=GRAZING))
     assert [point.kind for point in followed.points] == ["cusp"]
     # A start is followed as what it is.

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import printhammer as ph
 from printhammer.chaos import orbit
-from printhammer.chaos.orbits.settled import approaches, settled, shown
+from printhammer.chaos.orbits.settled import is_approaching, settled, shown
 from printhammer.run.regime import Regime
 
 
@@ -44,11 +44,11 @@ def test_drifting_states_show_no_period() -> None:
 def test_states_approach_an_orbit_in_its_order_only() -> None:
     home = cycle(5, 5)
     points = cycle(5, 203) + spiral(-0.99, 203)
-    assert approaches(points, home)
-    assert approaches(points[2:], home)
-    assert not approaches(points, home[::-1])
-    assert not approaches(points[::-1], home[::-1])
-    assert not approaches(points + 1e-3, home)
+    assert is_approaching(points, home)
+    assert is_approaching(points[2:], home)
+    assert not is_approaching(points, home[::-1])
+    assert not is_approaching(points[::-1], home[::-1])
+    assert not is_approaching(points + 1e-3, home)
 
 
 @pytest.mark.parametrize("period", [1, 2])

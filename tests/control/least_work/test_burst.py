@@ -123,8 +123,8 @@ def test_the_picture_shows_motion_current_power_and_ledger(burst: LeastWork) -> 
     widths = [bar.get_width() for bar in ledger.patches]
     assert widths[:3] == pytest.approx([1.0, burst.net_ratio, burst.positive_ratio])
     assert [text.get_text() for text in power.get_legend().get_texts()] == [
-        "the coil gives",
-        "the coil takes back",
+        "supplied by the coil",
+        "recovered by the coil",
     ]
     assert "-0.000" not in [text.get_text() for text in ledger.texts]
 

@@ -1,1 +1,1 @@
-"""Basins of attraction and their entropy, and how a second pulse quenches the first."""
+"""Basins of attraction and their entropy, and the quench map of two pulses."""

@@ -1,4 +1,4 @@
-"""Attractors, found and known again from the states of trains that lead to them."""
+"""Attractors: identified from the states of trains, and matched to the states of further trains."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from printhammer.chaos.bifurcation.columns import OK, Columns, cycles_of, run_columns
-from printhammer.chaos.orbits.settled import LIES_ON, approaches, noise_about, settled, shown
+from printhammer.chaos.orbits.settled import LIES_ON, is_approaching, noise_about, settled, shown
 from printhammer.chaos.strobe.train import exponents_onward
 from printhammer.chaos.strobe.verdict import is_positive
 from printhammer.results import Declared, part
@@ -21,41 +21,41 @@ MATCH: Final = 1e-2
 """Distance, in half-widths of the window, up to which periodic orbits count as the same attractor."""
 
 CLOUD: Final = 2000
-"""Points by which a strange attractor is known."""
+"""Number of points that represent a strange attractor."""
 
 SETTLING: Final = 1000
-"""Firings before these, so that they lie on it."""
+"""Number of firings discarded before these points, so that they lie on the attractor."""
 
 REACH: Final = 0.99
-"""Share of one half of these points that lies within reach of the other half: this defines the reach."""
+"""Quantile of the nearest distances between the two halves of these points that defines the reach."""
 
 INSIDE: Final = 0.95
-"""Share of the points of a train that must lie within reach for it to be on a strange attractor."""
+"""Smallest fraction of a train's points within reach, for the train to be on a strange attractor."""
 
 ATTEMPTS: Final = 12
-"""Trains without a period that are followed for long, at most, to find strange attractors."""
+"""Maximum number of aperiodic trains that are followed for long to find strange attractors."""
 
 POLISHED: Final = 12
-"""Trains of a piece that still move, at most, whose orbits are looked for by Newton's method."""
+"""Maximum number of unsettled trains per batch whose orbits are located by Newton's method."""
 
 
 class Attractor(Declared):
-    """What trains lead to."""
+    """A periodic orbit or a strange attractor."""
 
     name: str = part('"period-q" or "strange"')
-    period: int | None = part("number q; None for a strange one")
+    period: int | None = part("period q; None for a strange attractor")
     states: FloatArray = part(
         "displacements, m, and velocities, m/s, at successive firings: the orbit from its least displacement"
         " on, or points of a strange attractor, shape (q, 2) or (n, 2)"
     )
     exponent: float = part(
-        "largest exponent of the strobe map, per firing, of a strange one; else NaN", default=math.nan
+        "largest exponent of the strobe map per firing, of a strange attractor; else NaN", default=math.nan
     )
-    standard_error: float = part("of the exponent", default=math.nan)
+    standard_error: float = part("standard error of the exponent", default=math.nan)
 
 
 class Attractors:
-    """The attractors that were found so far, in the order in which they were.
+    """Attractors found so far, in order of discovery.
 
     Differences of displacement, velocity, memory and current are divided by the `scales`, shape (4,).
     """
@@ -69,14 +69,14 @@ class Attractors:
         self._noise: dict[int, float] = {}
 
     def at(self, tolerance: float) -> Attractors:
-        """Return the same attractors, for trains at another tolerance."""
+        """Return a copy for trains at another tolerance."""
         other = Attractors(self.regime, self.scales, tolerance)
         other.found, other._trees, other._noise = list(self.found), dict(self._trees), dict(self._noise)
         other._attempts = ATTEMPTS
         return other
 
     def judge(self, columns: Columns) -> IntArray:
-        """Return to which attractor trains have come: its place in `found`, -1 where that is not known."""
+        """Match trains to attractors: indices in `found`, -1 if unknown."""
         cycles, _ = self._cycles(columns)
         places = np.full(len(columns), -1, np.int64)
         for q in np.unique(cycles[cycles > 0]).tolist():
@@ -97,9 +97,9 @@ class Attractors:
         return np.stack([x, v], axis=-1) / self.scales[:2]
 
     def _settling(self, points: FloatArray, q: int) -> IntArray:
-        """Return the places of the orbits that states approach which still move, -1 where that is not known.
+        """Match unsettled trains to the orbits that they approach: indices in `found`, -1 if unknown.
 
-        They are of shape (n, points, 2) and repeat after q firings.
+        The states, of shape (n, points, 2), repeat after q firings.
         """
         places = np.full(len(points), -1, np.int64)
         left = list(range(len(points)))
@@ -108,7 +108,7 @@ class Attractors:
                 if attractor.period is not None and q % attractor.period == 0:
                     orbit = attractor.states / self.scales[:2]
                     noise = self._noise.get(place, LIES_ON)
-                    near = [row for row in left if approaches(points[row], orbit, MATCH, noise)]
+                    near = [row for row in left if is_approaching(points[row], orbit, MATCH, noise)]
                     places[near] = place
             left = [row for row in left if places[row] < 0]
             if not left:
@@ -122,7 +122,7 @@ class Attractors:
         return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:
-        """Return the places of orbits of one period, shape (n, q, 2); those that are new are added."""
+        """Match orbits of one period, shape (n, q, 2), adding new orbits; return indices in `found`."""
         q = orbits.shape[1]
         places = self._known(orbits)
         while (left := np.flatnonzero(places < 0)).size:
@@ -133,7 +133,7 @@ class Attractors:
         return places
 
     def _known(self, orbits: FloatArray) -> IntArray:
-        """Return the places of orbits of one period, shape (n, q, 2), -1 for those that are new."""
+        """Match periodic orbits of one period, shape (n, q, 2), to `found`: indices, -1 for new orbits."""
         places = np.full(len(orbits), -1, np.int64)
         for place, attractor in enumerate(self.found):
             if attractor.period == orbits.shape[1]:
@@ -142,7 +142,7 @@ class Attractors:
         return places
 
     def _strange(self, columns: Columns, rows: IntArray, places: IntArray) -> None:
-        """Find trains without a period on strange attractors; new ones are looked for where they begin."""
+        """Match aperiodic trains to strange attractors, and identify new attractors from unmatched trains."""
         points = self._scaled(columns.x, columns.v)
         left = rows
         for place in self._trees:
@@ -155,12 +155,12 @@ class Attractors:
             if followed is None:
                 continue
             places[row] = followed
-            # After a long transient to a periodic orbit the others must show for themselves.
+            # After a long transient to a periodic orbit the remaining trains are tested again.
             if followed in self._trees:
                 left = self._within(points, left, followed, places)
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
-        """Label the trains that lie on a strange attractor; return the others."""
+        """Label the trains that lie on a strange attractor; return the remaining trains."""
         if not rows.size:
             return rows
         tree, reach = self._trees[place]
@@ -170,7 +170,7 @@ class Attractors:
         return np.asarray(rows[share < INSIDE])
 
     def _follow(self, columns: Columns, row: int) -> int | None:
-        """Follow one train for long; return the place of the attractor, None where there is no saying."""
+        """Follow one train for long; return the index of its attractor, or None if it is undecided."""
         begin = columns.last[row : row + 1]
         if math.isnan(begin[0, 0]):
             return None
@@ -200,9 +200,9 @@ class Attractors:
 
 
 def _agree(orbits: FloatArray, known: FloatArray) -> BoolArray:
-    """Tell which of some orbits, shape (n, q, 2), are a known one, shape (q, 2), whatever their phase."""
+    """Mask of the orbits, shape (n, q, 2), equal to a known orbit, shape (q, 2), up to a cyclic shift."""
     count = len(known)
-    # The point nearest to the first one tells the shift.
+    # The point nearest to the first point gives the shift.
     shift = np.abs(known - orbits[:, :1]).max(axis=2).argmin(axis=1)
     turned = known[(shift[:, np.newaxis] + np.arange(count)) % count]
     return np.asarray(np.abs(turned - orbits).max(axis=(1, 2)) <= MATCH)

@@ -1,13 +1,13 @@
-"""Basins: which initial states lead to which attractor.
+"""Basins of attraction: the attractor that each initial state leads to, and the entropy of the boundaries.
 
-A grid of states at the moment of a firing, with the pulses before it under way, is fired at until it is known
-where each leads. The attractors are found from the cells themselves. A cell whose train repeats itself, by
-the rule of `printhammer.chaos.strobe.verdict`, leads to that periodic orbit. For one that does not, a train
-is followed for thousands of firings; where its exponent shows it to be strange, its points are an attractor
-to which those cells lead whose points lie among them. A cell of which neither is true after several rounds is
-undecided.
+Every state of a grid starts a train at the moment of a firing, with the earlier pulses under way. Trains are
+continued, round by round, until their attractors are known. The attractors are found from the cells
+themselves. A cell whose train is periodic, by the rule of `printhammer.chaos.strobe.verdict`, belongs to that
+periodic orbit. Of the aperiodic trains a few are followed for thousands of firings; if the exponent of such a
+train shows it to be strange, its points define a strange attractor, and cells whose points lie among them
+belong to it. Cells that fit neither case after the last round are undecided.
 
-Basin entropy: how uncertain it is to which attractor a state leads that is known up to a box.
+Basin entropy measures the uncertainty of the attractor if a state is known only up to a box.
 
 A. Daza, A. Wagemakers, B. Georgeot, D. Guéry-Odelin and M. A. F. Sanjuán, Basin entropy: a new tool to
 analyze uncertainty in dynamical systems, Scientific Reports 6 (2016) 31416.
@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from printhammer.chaos.basins.attractors import Attractor, Attractors
 from printhammer.chaos.bifurcation.columns import EFFORT, OK, run_columns, scales_of_columns
-from printhammer.chaos.strobe.map import possible
+from printhammer.chaos.strobe.map import is_possible
 from printhammer.chaos.strobe.verdict import LARGEST_PERIOD
 from printhammer.drive.input import read_count, read_number
 from printhammer.errors import InputError
@@ -47,15 +47,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 BOX: Final = 4
-"""Cells along the side of a box unless told otherwise."""
+"""Default number of cells along the side of a box."""
 
 
 class BasinEntropy(Declared):
-    """Basin entropy, natural logarithms."""
+    """Basin entropy, in natural logarithms."""
 
     box: int = part("cells along the side of a box")
     boxes: int = part("number N of whole boxes with at least one decided cell")
-    boundary_boxes: int = part("number Nb of those in which cells lead to more than one attractor")
+    boundary_boxes: int = part("number Nb of boxes whose cells lead to more than one attractor")
     entropy: float = part(
         "S / N, with S the sum over the boxes of -sum p ln p, p being the shares of the attractors in the"
         " decided cells of the box",
@@ -65,11 +65,11 @@ class BasinEntropy(Declared):
         "S / Nb; NaN where no box has more than one attractor",
         more="more than ln 2 shows that the boundary is fractal; less shows nothing",
     )
-    left_out: int = part("cells that are in no whole box, or not decided")
+    left_out: int = part("cells outside whole boxes, or undecided")
 
     @property
     def fractal(self) -> bool:
-        """Whether the boundary entropy exceeds ln 2, which a boundary that is no fractal cannot."""
+        """Whether the boundary entropy exceeds ln 2, which proves a fractal boundary."""
         return self.boundary_entropy > math.log(2.0)
 
 
@@ -79,15 +79,15 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
     Parameters
     ----------
     labels : int array, shape (n, m)
-        Number of the attractor to which each cell leads, from 1 on; 0 and less where it is not known, which
-        leaves the cell out.
+        Index of the attractor of each cell, from 1 on; cells of unknown attractor, 0 or negative, are left
+        out.
     box : int, optional
         Cells along the side of a box; cells beyond the last whole box are left out.
 
     Raises
     ------
     InputError
-        No plane of whole numbers, or a box that is not from 1 to the shorter side.
+        The labels are not a plane of whole numbers, or the box is not from 1 to the shorter side.
     """
     plane = np.asarray(labels)
     if plane.ndim != 2 or not plane.size or plane.dtype.kind not in "iu":
@@ -119,7 +119,7 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
 
 
 def uncertainty_exponent(labels: npt.ArrayLike) -> float:
-    """Return the exponent a of the share f of cells that have another label at a distance e, f ~ e^a.
+    """Estimate the uncertainty exponent a: the fraction of uncertain cells at distance e grows as e^a.
 
     The slope of log f against log e for distances of 1, 2, 4, ... cells along either side, up to an eighth of
     the plane; the dimension of the boundary is 2 - a, so that a is 1 for a smooth one and less for a fractal
@@ -128,7 +128,7 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
     """
     plane = np.asarray(labels)
     distances = [2**k for k in range(16) if 2**k <= min(plane.shape) // 8]
-    # As many pairs at every distance.
+    # Subsampling gives every distance the same number of pairs.
     up, across = (length - max(distances, default=0) for length in plane.shape)
     shares = []
     for apart in distances:
@@ -153,13 +153,13 @@ SAMPLE: Final = 256
 """Maximum number of cells integrated again at a tenth of the tolerance, up to an eighth of all; arbitrary."""
 
 FIRINGS: Final = 200
-"""Firings of a round unless told otherwise."""
+"""Default number of firings of a round."""
 
 ROUNDS: Final = 20
-"""Rounds that a cell gets, at most, unless told otherwise."""
+"""Default maximum number of rounds per cell."""
 
 CELLS: Final = 128
-"""Cells along each side unless told otherwise."""
+"""Default number of cells along each side."""
 
 MOST_CELLS: Final = 10_000_000
 """Number of cells above which a plane is refused, here and by `printhammer.quench_map`."""
@@ -179,11 +179,11 @@ Range = tuple[float | str, float | str, SupportsIndex]
 
 
 _ROWS: Final = 12
-"""Attractors that a summary lists."""
+"""Maximum number of attractors in a summary."""
 
 
 class Basins(Result, rows="v x"):
-    """Which initial states lead to which attractor."""
+    """Basins of attraction over a grid of initial states."""
 
     regime: Regime = part("hammer and periodic drive")
     x: FloatArray = coordinate("m", "displacement at the first firing", "x")
@@ -211,11 +211,11 @@ class Basins(Result, rows="v x"):
 
     @property
     def title(self) -> str:
-        """One line that says what the basins are."""
+        """Title of the result, in one line."""
         return f"basins of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def summary(self, box: int | None = None) -> Summary:
-        """Return the attractors with their shares, the cells that lead to none, and the basin entropy."""
+        """Summarise the attractors with their shares, the undecided cells, and the basin entropy."""
         rows: list[FactRow] = []
         for row, (attractor, share, error) in enumerate(zip(self.attractors, *self.shares, strict=True), 1):
             x, v = attractor.states[0].tolist()
@@ -253,7 +253,7 @@ class Basins(Result, rows="v x"):
 
     @property
     def rounding(self) -> str:
-        """Number of sampled labels that change at a tenth of the tolerance, as a sentence."""
+        """Sentence on the number of sampled labels that change at a tenth of the tolerance."""
         if not self.compared:
             return ""
         share = 100.0 * self.changed / self.compared
@@ -261,7 +261,7 @@ class Basins(Result, rows="v x"):
 
     @property
     def names(self) -> dict[int, str]:
-        """Names of the labels."""
+        """Names of the labels, by label."""
         kinds = {k: attractor.name for k, attractor in enumerate(self.attractors, 1)}
         return {NO_STATE: "no state", FAILED: "run ended early", UNDECIDED: "undecided", **kinds}
 
@@ -273,10 +273,10 @@ class Basins(Result, rows="v x"):
 
     @property
     def shares(self) -> tuple[FloatArray, FloatArray]:
-        """Share of each attractor in the cells that have a state, and its standard error, shape (A,).
+        """Fraction of the cells with a state that lead to each attractor, and its standard error, shape (A,).
 
-        The error is that of as many states drawn at random, sqrt(p (1 - p) / n). A regular grid knows the
-        share better than that where the boundary is smooth.
+        The error is that of as many states drawn at random, sqrt(p (1 - p) / n). Where the boundary is
+        smooth, a regular grid is more accurate.
         """
         count = int((self.labels != NO_STATE).sum())
         share = np.array([self.counts[k + 1] for k in range(len(self.attractors))], dtype=np.float64)
@@ -284,7 +284,7 @@ class Basins(Result, rows="v x"):
         return share, np.sqrt(share * (1.0 - share) / max(count, 1))
 
     def entropy(self, *, box: SupportsIndex = BOX) -> BasinEntropy:
-        """Return the basin entropy, of boxes of so many cells along a side."""
+        """Compute the basin entropy of boxes with `box` cells along a side."""
         return basin_entropy(self.labels, box=box)
 
     def notes(self) -> dict[str, Any]:
@@ -298,7 +298,7 @@ class Basins(Result, rows="v x"):
         }
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return cells over `v` and `x`, and what is known of each attractor over `attractor`."""
+        """Return cells over `v` and `x`, and the properties of the attractors over `attractor`."""
         own = super().entries()
         codes = ", ".join(f"{label} {name}" for label, name in self.names.items())
         own["label"] = replace(own["label"][0], attrs={"codes": codes}), self.labels
@@ -333,17 +333,17 @@ def basins(
     effort: Effort = EFFORT,
     **firing: Unpack[Fired],
 ) -> Basins:
-    """Find out which initial states lead to which attractor.
+    """Compute the basins of attraction: which initial states lead to which attractor.
 
     A state in the pack meets fresh paper at its own depth: on the loading branch where it goes in, on the
     unloading branch from there where it comes out. A state in the backstop begins with that indentation.
     Under a voltage all states begin without current, the supply's capacitor charged.
-    Where the law of the magnet does not hold, and behind a rigid backstop, there is no state.
+    Where the law of the magnet does not hold, or behind a rigid backstop, a cell has no state.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer; or the hammer with all that `firing` says of it. States are those at a firing, whatever
+        The hammer, or a regime; a hammer needs the keywords `firing`. States are those at a firing, whatever
         the phase.
     x, v : tuple, optional
         Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, the
@@ -356,7 +356,7 @@ def basins(
     Returns
     -------
     Basins
-        With a label for each cell; a run that could not go on is no exception.
+        With a label for each cell; a run that ends early is not an exception.
     """
     regime = Regime.of_firing(hammer, firing).at_firings
     count, most = read_count(firings, "firings"), read_count(rounds, "rounds")
@@ -402,12 +402,12 @@ def basins(
 def _decided(
     regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort, attractors: Attractors
 ) -> tuple[IntArray, IntArray, TextArray]:
-    """Return places of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings and statuses."""
+    """Return indices of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings and statuses of cells."""
     firings, most = counts
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
     status = np.full(len(cells), OK, "U16")
-    known_states = {x: possible(regime.hammer, x, 0.0) for x in np.unique(cells[:, 0]).tolist()}
+    known_states = {x: is_possible(regime.hammer, x, 0.0) for x in np.unique(cells[:, 0]).tolist()}
     absent = np.array([not known_states[x] for x in cells[:, 0].tolist()], np.bool_)
     places[absent], status[absent] = NO_STATE - 1, NO_STATE_STATUS
     states = cells.copy()
@@ -429,7 +429,7 @@ def _decided(
 
 
 def _sample(decided: IntArray, count: int) -> IntArray:
-    """Return rows of decided cells, spread evenly over the plane by multiples of the golden section."""
+    """Select rows of decided cells, spread evenly over the plane by multiples of the golden section."""
     size = min(SAMPLE, max(count // 8, 1), len(decided))
     shares = (np.arange(1, size + 1) * _GOLDEN) % 1.0
     return np.unique(decided[(shares * len(decided)).astype(np.int64)]) if size else decided[:0]
@@ -442,7 +442,7 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
 
 
 def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
-    """Read the least and the largest value of an axis and their number; InputError where it is none."""
+    """Parse the bounds of an axis and its number of values; InputError if they are invalid."""
     if not isinstance(entry, tuple | list) or len(entry) != 3:
         raise InputError.of(name, entry, "least and largest value and their number")
     low, high = (read_number(end, unit, name) for end in entry[:2])
@@ -453,6 +453,6 @@ def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
 
 
 def check_cells(across: int, up: int) -> None:
-    """Refuse a plane of more than `MOST_CELLS` cells."""
+    """Raise InputError for a plane of more than `MOST_CELLS` cells."""
     if across * up > MOST_CELLS:
         raise InputError(f"{across} x {up} cells", key="cells", expected=f"at most {MOST_CELLS}")

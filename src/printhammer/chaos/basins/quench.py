@@ -1,14 +1,13 @@
-"""The quench map: what a second pulse does, against its time and its width.
+"""Quench map: the effect of a second pulse as a function of its time and its width.
 
 Fig. 6 of F. Hendriks, *Bounce and Chaotic Motion in Impact Print Hammers* (1983), shows two cases: fired
-again after 660 µs the hammer is braked, and there is no second dot; after 700 µs it makes a complete
-excursion. Here this is a plane: the time between two firings against the width of the second pulse, that of
-the first one staying as it is. Where pulses overlap, their currents add.
+again after 660 µs, the hammer is braked and prints no second dot; after 700 µs it makes a complete excursion.
+The quench map extends the two cases to a plane: the time between two firings against the width of the second
+pulse, with an unchanged first pulse. Where pulses overlap, their currents add.
 
-A drive fires one waveform. For two different pulses without a kernel of their own, the waveform here holds
-both of them, so far apart that of its four firings only two do anything during the run: one whose first pulse
-comes at the beginning, one whose second pulse comes at the second firing, and two without a pulse by which
-the dots are told apart.
+A drive fires one waveform. To fire two different pulses without compiling another kernel, the waveform
+contains both, far apart. Of its four firings two contribute pulses to the run, the first pulse at the
+beginning and the second pulse at the second firing; the two others only serve to tell the dots apart.
 """
 
 from __future__ import annotations
@@ -45,19 +44,19 @@ from printhammer.run.window import time_scale
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
 TAIL: Final = 1e-3
-"""Time after the second firing, s, within which a second dot is waited for unless told otherwise."""
+"""Default time after the second firing within which a second dot counts, s."""
 
 _PIECE: Final = 8192
 _SPACING: Final = 5e-6
 _FINE: Final = 8
-"""Number of samples of a second run on either side of the highest one of the first, within its spacing."""
+"""Number of samples of the refined run on either side of the highest sample of the first run."""
 _PEAK_TOLERANCE: Final = 1e-8
-"""Largest tolerance of that second run: with that of a display, 5e-7, peaks err by 1e-4 of the way."""
+"""Largest tolerance of the refined run: with that of a display, 5e-7, peaks err by 1e-4 of the way."""
 _FIRST, _SECOND = 2, 3
 
 
 class QuenchMap(Result):
-    """What a second pulse does, against the time between the firings and its width."""
+    """Effect of a second pulse as a function of the time between firings and of its width."""
 
     hammer: Hammer = part("the hammer")
     waveform: Waveform = part("the first pulse; the second has another width")
@@ -91,11 +90,11 @@ class QuenchMap(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the map is."""
+        """Title of the result, in one line."""
         return f"quench map of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return how many second dots are lost, and how the others differ from the first."""
+        """Summarise how many second dots are lost, and how the remaining dots differ from the first."""
         struck, lost = self.struck, int(self.lost.sum())
         first = f"{quantity(self.single_force, 'N')}, flight time {quantity(self.single_flight_time, 's')}"
         rows: list[FactRow] = [
@@ -110,18 +109,18 @@ class QuenchMap(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the map comes from; the waveform is the first pulse, and currents add."""
+        """Provenance of the map; the waveform is the first pulse, and currents add."""
         return provenance(hammer=self.hammer, waveform=self.waveform, overlap="add", tolerance=self.tolerance)
 
     @property
     def lost(self) -> BoolArray:
-        """Where the second dot is lost; False where the run ended early."""
+        """Mask of the lost second dots; False where the run ended early."""
         return np.asarray(~self.struck & (self.status == "ok"))
 
     @property
     @derived("1", "second peak, 0 at the backstop and 1 at the pack", "gap width")
     def peak_share(self) -> FloatArray:
-        """Second peak in parts of the way to the pack: 0 at the backstop, 1 at the front of the pack."""
+        """Second peak as a fraction of the way from the backstop (0) to the front of the pack (1)."""
         front = self.hammer.front
         assert front is not None
         return (self.peak - self.hammer.origin) / (front - self.hammer.origin)
@@ -129,18 +128,18 @@ class QuenchMap(Result):
     @property
     @derived("1", "force of the second dot over that of the first alone", "gap width")
     def force_ratio(self) -> FloatArray:
-        """Force of the second dot over that of the first pulse alone."""
+        """Ratio of the force of the second dot to that of the first pulse alone."""
         return self.force / self.single_force
 
     @property
     @derived("s", "how much shorter the second dot flies", "gap width")
     def flight_gain(self) -> FloatArray:
-        """By how much the second dot flies shorter than that of the first pulse alone, s."""
+        """Flight time of the first pulse alone minus that of the second dot, s."""
         return self.single_flight_time - self.flight_time
 
 
 class TwoPulses(Waveform):
-    """A waveform of two pulses far apart, from which drives of two different pulses are made."""
+    """A waveform of two pulses far apart, which serves drives of two different pulses."""
 
     shape: ClassVar[str] = "two pulses"
     first: Waveform
@@ -149,7 +148,7 @@ class TwoPulses(Waveform):
     largest: float
 
     def segments(self) -> FloatArray:
-        """Return the segment table: nothing, the first pulse at `apart`, the second at twice that."""
+        """Return the segment table: no pulse, the first pulse at `apart`, the second at twice that time."""
         rows = [
             (number * self.apart + row[0], *row[1:])
             for number, pulse in enumerate((self.first, self.second), 1)
@@ -158,7 +157,7 @@ class TwoPulses(Waveform):
         return table(rows[:-1], rows[-1][0])
 
     def scaled(self, factor: float) -> Self:
-        """Return the same with every value multiplied by a factor."""
+        """Return a copy with every value scaled by `factor`."""
         scaled = {"first": self.first.scaled(factor), "second": self.second.scaled(factor)}
         return self.model_copy(update={**scaled, "largest": abs(factor) * self.largest})
 
@@ -169,7 +168,7 @@ class TwoPulses(Waveform):
 
 
 class TwoPulseDrive(Drive):
-    """A drive of two different pulses; its run begins at `begin`, with the firing of the first."""
+    """A drive of two different pulses; its run begins at `begin`, with the firing of the first pulse."""
 
     def __init__(self, waveform: TwoPulses, gap: float) -> None:
         super().__init__(waveform, self.firings(waveform.apart, gap))
@@ -177,7 +176,7 @@ class TwoPulseDrive(Drive):
 
     @staticmethod
     def firings(apart: float, gap: float) -> FloatArray:
-        """Return the firing times, s: two before the run, and the two from which dots are counted."""
+        """Compute the firing times, s: two before the run, and the two from which dots are counted."""
         return np.array([gap, apart, 2.0 * apart, 2.0 * apart + gap])
 
     @property
@@ -186,7 +185,7 @@ class TwoPulseDrive(Drive):
         return float(self._times[_FIRST])
 
     def with_firings(self, times: FloatArray) -> Self:
-        """Return the same drive with other firing times, made by `firings`."""
+        """Return a copy with other firing times, made by `firings`."""
         result = copy(self)
         result._times = times
         return result
@@ -203,29 +202,29 @@ def quench_map(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> QuenchMap:
-    """Fire twice from rest, and see what becomes of the second dot.
+    """Compute the quench map: fire twice from rest, and record the second dot.
 
     Parameters
     ----------
     hammer : Hammer
         A hammer with a pack.
     gaps : tuple, optional
-        Least and largest time between the two firings, s, or text with a unit, and number of times, the two
-        ends among them; by default 128 from 0.5 to 0.9 ms, multiplied by
-        `printhammer.run.window.time_scale` of the device.
+        Least and largest time between the two firings, s, or text with a unit, and the number of times, both
+        ends included; by default 128 from 0.5 to 0.9 ms, multiplied by `printhammer.run.window.time_scale` of
+        the device.
     widths : tuple, optional
-        Likewise for the width of the second pulse; by default 128 from half to one and a half times that of
+        As `gaps`, for the width of the second pulse; by default 128 from half to one and a half times that of
         the first.
     waveform : Waveform, optional
         The first pulse; by default the waveform of the hammer. It needs a width.
     tail : float or str, optional
-        Time after the second firing within which a dot counts as the second one, s, or text with a unit;
-        by default 1 ms, multiplied likewise.
+        Time after the second firing within which a dot counts as the second dot, s, or text with a unit; by
+        default 1 ms, scaled like `gaps`.
 
     Returns
     -------
     QuenchMap
-        With a status for each cell; a run that could not go on is no exception.
+        With a status for each cell; a run that ends early is not an exception.
     """
     pulse = waveform_of(hammer, waveform)
     width = getattr(pulse, "width", None)
@@ -276,10 +275,10 @@ def quench_map(
 
 
 def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) -> list[TwoPulseDrive]:
-    """Return drives that fire one pulse, and then one of some others, for runs of `last` seconds at most.
+    """Build drives that fire one pulse and then one of several others, for runs of at most `last` seconds.
 
     Runs begin at the time `begin` of a drive, with the rest state; times, s, count from there. The second
-    pulse comes half-way; other times are put in by `with_firings`.
+    pulse comes half-way; `with_firings` sets other times.
     """
     largest = max(first.peak, *(second.peak for second in seconds))
     # A power of two, so that sums of it with other times are rounded the same way everywhere.
@@ -296,11 +295,11 @@ def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) 
 def _piece(
     hammer: Hammer, drives: Sequence[TwoPulseDrive], gaps: FloatArray, tail: float, effort: Effort
 ) -> tuple[npt.NDArray[Any], ...]:
-    """Return second dot, status, peak, force and flight time of some gaps, each for all widths."""
+    """Return second dot, status, peak, force and flight time of several gaps, each for all widths."""
     begin, number = 0.0, 1
     every: list[Drive]
     if drives[0].pulses[0].replaces:
-        # Of a driver's pulses the latest alone acts: none may be under way unseen.
+        # Of a driver's pulses only the latest acts, so no earlier pulse may be under way.
         every = [PulseSequence(drive.pulses, [0.0, gap]) for gap in gaps.tolist() for drive in drives]
     else:
         begin, number = drives[0].begin, _SECOND
@@ -322,7 +321,7 @@ def _piece(
     turned, times = _highest(grid, x.astype(np.float64), after)
     lost = np.flatnonzero(result.ok & ~second & np.isfinite(turned))
     if lost.size:
-        # A run of a display is not good enough for a peak, nor a parabola where a pulse ends beside it.
+        # A run of a display is too coarse for a peak, and so is a parabola next to the end of a pulse.
         offsets = (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, 2 * _FINE + 1)
         moments = np.clip(times[lost, np.newaxis] + offsets, after[lost, np.newaxis], ends[lost, np.newaxis])
         strobes = [np.unique(row) for row in moments]
@@ -344,9 +343,9 @@ def _piece(
 
 
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest local maximum after some times and its time, shape (M,) each, from samples.
+    """Find the largest local maximum of sampled motions after given times, and its time, shape (M,) each.
 
-    The samples, shape (M, T), are evenly spaced, and NaN where there is none, as is a maximum.
+    The samples, shape (M, T), are evenly spaced; NaN where there is none, as is the maximum.
     """
     before, here, following = x[:, :-2], x[:, 1:-1], x[:, 2:]
     bend = before - 2.0 * here + following
@@ -362,9 +361,9 @@ def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatA
 
 
 def _top(t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the largest displacement at which the velocity falls through 0 between samples, shape (M,).
+    """Find the largest displacement at which the velocity falls through 0 between samples, shape (M,).
 
-    NaN where it does so nowhere. The velocity is linear between samples, shape (M, T).
+    NaN without such a crossing. The velocity is interpolated linearly between samples, shape (M, T).
     """
     falls = (v[:, :-1] > 0.0) & (v[:, 1:] <= 0.0)
     drop = np.where(falls, v[:, :-1] - v[:, 1:], 1.0)

@@ -12,8 +12,8 @@ from printhammer.chaos.orbits.orbit import SADDLE
 from printhammer.chaos.orbits.search import orbits
 from printhammer.support.threads import Progress
 
-_CROSSINGS: Final = 6  # Length of a manifold over the longer side of the plane
-_PIECES: Final = 200  # Points of a manifold over that side
+_CROSSINGS: Final = 6  # Length of a manifold, in units of the longer side of the plane
+_PIECES: Final = 200  # Number of points of a manifold per longer side of the plane
 
 
 def saddle_manifolds(
@@ -28,14 +28,14 @@ def saddle_manifolds(
     longest : int
         Largest orbit period, firings.
     progress : callable, optional
-        Called with the number of saddles done and of all.
+        Called with the number of saddles done and the total.
 
     Returns
     -------
     list of Manifolds
-        One for each saddle that lies in the plane of the states at a firing.
+        One entry for each saddle that lies in the plane of the states at a firing.
     int
-        Number of saddles that are in the pack at the firing, and not in that plane.
+        Number of saddles left out because the armature is in the pack at the firing.
     """
     spans = np.array([np.ptp(planes.x), np.ptp(planes.v)]) / planes.regime.window.half_widths
     side = float(spans.max())

@@ -1,8 +1,8 @@
 """Bifurcation diagrams by brute force: the states at the firings, against a parameter.
 
-For each value of a parameter a train is fired, the first firings are left out, and the states at the others
-are the column of the diagram above that value: one point for a train that repeats itself at every firing, two
-where it does at every second one, and many for a strange one.
+For each value of a parameter a train is fired, a transient is discarded, and the states at the following
+firings are the column of the diagram at that value: one point for a train of period 1, two for a train of
+period 2, many for a strange train.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _JUDGED: Final = 200
 """Number of firings after the default transient."""
 
 REFINE: Final = 2
-"""Times that the steps between neighbours that differ are halved, unless told otherwise."""
+"""Default number of times that steps between differing neighbours are halved."""
 
 MOST_STATES: Final = 100_000_000
 """Number of states above which a diagram is refused."""
@@ -42,12 +42,12 @@ DIRECTIONS: Final = get_args(Direction)
 
 
 class InterruptedDiagram(KeyboardInterrupt):
-    """A diagram was interrupted.
+    """Raised when a diagram is interrupted.
 
     Attributes
     ----------
     diagram : Bifurcation
-        What is done; the status of the others is "not run".
+        The finished columns; the status of the others is "not run".
     """
 
     def __init__(self, diagram: Bifurcation) -> None:
@@ -74,46 +74,47 @@ def bifurcation(
 ) -> Bifurcation:
     """Compute a bifurcation diagram of a hammer under a periodic drive.
 
-    At a tolerance for pictures, trains that settle slowly pass for undecided.
+    At a tolerance for pictures, trains that settle slowly appear as undecided.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer; or the hammer with all that `firing` says of it.
+        The hammer, or a regime; a hammer needs the keywords `firing`.
     periods, rates : array, optional
         Times between firings, s, or firings per second, Hz, ascending.
     parameter, values : str and array, optional
-        Instead: the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
+        Alternatively the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
         values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
     firings, transient : int, optional
         Number of firings at each value, and of those to discard at the beginning: by default all but 200, at
         least a third. With few firings, trains that settle slowly are undecided.
     direction : str, optional
-        "from rest": every train begins at rest, with nothing fired before. "up", "down": it begins where the
-        train at the value before, or after, ended, with the pulses before under way; the first begins at
-        rest. "both": up and down. See `printhammer.chaos.bifurcation.builder`.
+        "from rest": every train begins at rest, with no firing before. "up", "down": a train begins where the
+        train at the value before, or after, ended, with the earlier pulses under way; the first train begins
+        at rest. "both": up and down. See `printhammer.chaos.bifurcation.builder`.
     state : tuple of float, optional
-        Displacement, m, and velocity, m/s, that takes the place of rest, with the pulses before under way.
+        Displacement, m, and velocity, m/s, that replace the rest state, with the earlier pulses under way.
     refine : int, optional
-        How often the step between neighbours whose periods differ, or whose orbits lie apart, is halved.
+        Number of times to halve the step between neighbours whose periods differ, or whose orbits lie apart.
     exponents : bool, optional
-        Compute the exponents of trains without a period, which tell strange ones from undecided ones; takes
-        many times as long.
+        Whether to compute the exponents of aperiodic trains, which separate strange from undecided trains;
+        takes many times as long.
     **firing
-        How the hammer is fired, as for `printhammer.Regime.of`; period or rate only with another parameter.
+        How the hammer is fired, as for `printhammer.Regime.of`; period or rate only if another parameter
+        varies.
 
     Returns
     -------
     Bifurcation
-        With a status for each train; a run that could not go on is no exception.
+        With a status for each train; a run that ends early is not an exception.
 
     Raises
     ------
     InputError
-        An argument is not what is described above; a value that the parameter cannot have; a hammer without
-        a rest state where no state is given.
+        An argument is not as described above, the parameter cannot have a value, or the hammer has no rest
+        state and no state is given.
     InterruptedDiagram
-        A KeyboardInterrupt, with what was done.
+        At a KeyboardInterrupt, with the finished columns.
     """
     name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
     count = read_count(firings, "firings")
@@ -149,7 +150,7 @@ def bifurcation(
 
 
 def _result(builder: DiagramBuilder) -> Bifurcation:
-    """Return the diagram as far as it is."""
+    """Build the diagram from the trains run so far."""
     order = np.argsort(builder.values, kind="stable")
     rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
     table = builder.table
@@ -180,7 +181,7 @@ def _parameter(
     choice: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
     firing: Firing,
 ) -> tuple[str, FloatArray, Regime]:
-    """Return the name of the parameter, its values, and the regime in which it is changed."""
+    """Parse the choice of parameter: its name, its values, and the regime in which it is changed."""
     periods, rates, parameter, values = choice
     if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
         raise InputError("periods, rates and parameter: expected one of them", key="parameter")

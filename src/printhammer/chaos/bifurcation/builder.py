@@ -1,16 +1,16 @@
-"""A bifurcation diagram under way: the trains at the given values, refinement between them, exponents.
+"""Construction of a bifurcation diagram: trains at given values, refinement between them, exponents.
 
-Carrying the state from one value of a parameter to the next, on all cores.
+Carrying of the state from one value of a parameter to the next, in parallel.
 
-Strictly, each train begins where the one before it ended, so that they cannot be run side by side. Here the
-values are cut into strands of `STRAND` successive values. Every strand is begun from rest, and within it the
-state is carried; all strands run side by side. Then the joints are closed: the first train of a strand is run
-again from the state at which the strand before it ended. Where it comes to the same attractor, the rest of
-the strand stands as it is; where it does not, it replaces what was there, and the state is carried on from
-it, until the same attractor is met or the strand ends, in which case the next joint is closed anew.
+Strictly, each train begins where the train before it ended, which is a serial computation. Here the values
+are cut into strands of `STRAND` successive values. The first train of a strand begins at rest, the state is
+carried within the strand, and all strands run in parallel. Then the joints are closed: the first train of a
+strand is run again from the state at which the strand before it ended. If it reaches the same attractor, the
+rest of the strand is kept; if not, it replaces the former result, and the state is carried on from it until
+the same attractor is reached or the strand ends, in which case the next joint is closed anew.
 
-So every train lies on the attractor to which a strict carrying leads, up to what an attractor is known by
-(`same_attractor`). The strands depend on the values alone, and so does the result: not on threads or chunks.
+So every train lies on the attractor to which a strictly serial computation leads, up to the resolution of
+`is_same_attractor`. The strands, and hence the result, depend on the values alone, not on threads or chunks.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from printhammer.chaos.bifurcation.columns import (
     state_or_rest,
 )
 from printhammer.chaos.strobe.resting import exact_cycle, rests_of
-from printhammer.chaos.strobe.train import FINER, LONG_CYCLE, exponents_onward, forgets
+from printhammer.chaos.strobe.train import FINER, LONG_CYCLE, exponents_onward, is_memoryless
 from printhammer.run.effort import Effort
 from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
@@ -46,38 +46,38 @@ if TYPE_CHECKING:
     from printhammer.chaos.strobe.train import State
 
 STRAND: Final = 16
-"""Values in a strand."""
+"""Number of values in a strand."""
 
 SAME: Final = 1e-3
 """Distance, in half-widths of the window, up to which periodic orbits count as the same."""
 
 _SHIFTED: Final = 0.5
-"""Difference of the means of two clouds, in their standard deviations, up to which they count as the same."""
+"""Largest difference of the means of two clouds, in standard deviations, within which they are the same."""
 
 
 @dataclass
 class Strand:
-    """Successive trains, the state being carried from each to the next."""
+    """Successive trains between which the state is carried."""
 
     rows: list[int]
-    """Their rows in the table of all trains, in the order in which the state is carried."""
+    """Rows in the table of all trains, in the order in which the state is carried."""
     before: int
-    """Number of the strand that ends where this one begins; -1 for the first one."""
+    """Index of the strand that ends where this strand begins; -1 for the first strand."""
 
 
 @dataclass
 class Trains:
-    """All trains of a diagram: what is run, and what is found."""
+    """All trains of a diagram: what to run, and the results."""
 
     regimes: list[Regime]
-    """One for each train."""
+    """Regimes, one per train."""
     columns: Columns
-    """Their states."""
+    """States of the trains."""
     cycles: Any
-    """Their periods, 0 for none."""
+    """Periods of the trains, 0 for none."""
     distances: Any
     scales: FloatArray
-    """By which differences of displacement, velocity, memory and current are divided. Shape (M, 4)."""
+    """Scales of displacement, velocity, memory and current for differences, shape (M, 4)."""
     carried: int = field(default=0)
     """Number of trains that were run again to close the joints."""
 
@@ -95,10 +95,10 @@ def carry(
     run: Callable[[list[int], FloatArray], None],
     trial: Callable[[list[int], FloatArray], tuple[Columns, Any, Any]],
 ) -> None:
-    """Run the trains of strands of one or several directions, and close their joints.
+    """Run the trains of the strands of one or several directions, and close their joints.
 
-    `start` is the state with which a strand begins; `run` runs rows of the table from states and keeps the
-    results there, `trial` returns them: columns, periods, distances.
+    `start` is the state with which a strand begins; `run` runs rows of the table from states and stores the
+    results in it, `trial` returns the results instead: columns, periods, distances.
     """
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
@@ -109,7 +109,7 @@ def carry(
         run([rows[k] for rows in long], np.array(begun))
     open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before >= 0}
     while open_:
-        # Every open joint is taken one train further, all of them side by side.
+        # Every open joint is advanced by one train, all joints in parallel.
         order = sorted(open_)
         rows = [strands[number].rows[place] for number, place in order]
         ended = [
@@ -124,7 +124,7 @@ def carry(
         table.carried += len(rows)
         open_ = set()
         for i, ((number, place), row) in enumerate(zip(order, rows, strict=True)):
-            if same_attractor(table, row, columns, i, int(cycles[i])):
+            if is_same_attractor(table, row, columns, i, int(cycles[i])):
                 continue
             put(table.columns, [row], Columns(*(values[[i]] for values in vars(columns).values())))
             table.cycles[row], table.distances[row] = cycles[i], distances[i]
@@ -134,12 +134,12 @@ def carry(
                 open_ |= {(n, 0) for n, other in enumerate(strands) if other.before == number}
 
 
-def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
-    """Tell whether a train that was run again came to the attractor on which it was before.
+def is_same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
+    """Whether a train that was run again reached the same attractor as before.
 
-    Periodic trains did if their orbits agree within `SAME`. Of trains without a period it is asked that the
-    means of their points differ by less than half of their standard deviations; trains whose run ended early
-    must have ended the same way.
+    Periodic trains did if their orbits agree within `SAME`, aperiodic trains if the means of their points
+    differ by less than half of their standard deviations, and trains whose run ended early if they ended the
+    same way.
     """
     was = table.columns
     if columns.status[place] != OK or was.status[row] != OK:
@@ -157,12 +157,12 @@ def same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle:
 
 
 JUMP: Final = 0.2
-"""Distance of neighbouring orbits of the same period, in half-widths of the window, that is refined."""
+"""Distance of neighbouring orbits of one period, in half-widths of the window, that triggers refinement."""
 
 
 @dataclass
 class DiagramBuilder:
-    """A diagram under way. Trains are numbered as they come, those of all directions at a value in a row."""
+    """A diagram under construction; trains are numbered in order of creation, by value and direction."""
 
     regime: Regime
     name: str
@@ -180,7 +180,7 @@ class DiagramBuilder:
         self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
-        """Make room for trains at new values; return the places of the values."""
+        """Add trains at new values; return the indices of the values."""
         first = len(self.values)
         regimes = [self.regime.with_(self.name, value) for value in values.tolist()]
         every = [regime for regime in regimes for _way in self.ways]
@@ -206,7 +206,7 @@ class DiagramBuilder:
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:
-        """Run the trains at the values that were given."""
+        """Run the trains at the given values."""
         places = self.add(grid, 0)
         if self.ways == ("from rest",):
             self.run(places, np.array([state_or_rest(self.table.regimes[row], self.begin) for row in places]))
@@ -220,7 +220,7 @@ class DiagramBuilder:
     def refine(self, level: int) -> None:
         """Run trains between neighbours that differ; the state comes from the neighbour before."""
         order = np.argsort(self.values, kind="stable").tolist()
-        pairs = [pair for pair in itertools.pairwise(order) if self.differ(*pair)]
+        pairs = [pair for pair in itertools.pairwise(order) if self.is_different(*pair)]
         middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]
         new = [
             (pair, middle)
@@ -240,8 +240,8 @@ class DiagramBuilder:
                 states.append(state_or_rest(self.table.regimes[row], begin))
         self.run(rows, np.array(states))
 
-    def differ(self, place: int, neighbour: int) -> bool:
-        """Tell whether the trains at two values differ: in period, or by a jump of the orbit."""
+    def is_different(self, place: int, neighbour: int) -> bool:
+        """Whether the trains at two values differ, in period or by a jump of the orbit."""
         table = self.table
         for way in range(len(self.ways)):
             a, b = self.rows([place, neighbour], way)
@@ -267,8 +267,8 @@ class DiagramBuilder:
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
         scales = self.table.scales[list(rows)]
         cycles, distances = cycles_of(columns, fronts, scales)
-        # A motion that comes to rest on its backstop repeats itself where time is kept within the period.
-        able = np.array([forgets(regime) for regime in regimes])
+        # A motion that rests on its backstop is periodic to the last bit if time is kept within the period.
+        able = np.array([is_memoryless(regime) for regime in regimes])
         open_rows = np.flatnonzero(able & (cycles == 0) & (columns.status == OK))
         if open_rows.size:
             own = [regimes[row] for row in open_rows]
@@ -278,19 +278,19 @@ class DiagramBuilder:
         return columns, cycles, distances
 
     def run(self, rows: Sequence[int], states: FloatArray) -> None:
-        """Run trains from states and keep what is found."""
+        """Run trains from states and store the results."""
         columns, cycles, distances = self.trial(rows, states)
         put(self.table.columns, rows, columns)
         self.table.cycles[list(rows)] = cycles
         self.table.distances[list(rows)] = distances
         for row in np.flatnonzero(cycles == 0).tolist():
-            if self.rests(columns, row, self.table.regimes[rows[row]]):
+            if self.is_resting(columns, row, self.table.regimes[rows[row]]):
                 self.exponents[rows[row]], self.errors[rows[row]] = -math.inf, math.inf
         self.done += len(rows)
 
-    def rests(self, columns: Columns, row: int, regime: Regime) -> bool:
+    def is_resting(self, columns: Columns, row: int, regime: Regime) -> bool:
         """Whether a train without a period up to 64 comes to rest on its backstop in a longer cycle."""
-        if not forgets(regime) or columns.status[row] != OK or regime.phase:
+        if not is_memoryless(regime) or columns.status[row] != OK or regime.phase:
             return False
         points = np.column_stack([columns.x[row], columns.v[row]])
         count = exact_cycle(points)
@@ -300,16 +300,16 @@ class DiagramBuilder:
         """Mark the trains whose period differs at finer tolerances.
 
         A ball that comes to rest forgets its past, but between two rests a small error may grow to the size
-        of the motion; the length of its cycle is then that of the rounding.
+        of the motion; rounding then decides the length of its cycle.
         """
         table = self.table
         long = table.cycles >= LONG_CYCLE
-        rows = [int(row) for row in np.flatnonzero(long) if forgets(table.regimes[row])]
+        rows = [int(row) for row in np.flatnonzero(long) if is_memoryless(table.regimes[row])]
         if not rows:
             return
         regimes = [table.regimes[row] for row in rows]
         fronts, scales = np.full(len(rows), math.inf), table.scales[rows]
-        # From rest to rest once, and then twice round.
+        # From rest to rest, then once more for a second cycle.
         transient = int(table.cycles[rows].max())
         for share in FINER:
             finer = self.effort.at(share * self.effort.tolerance)
@@ -318,16 +318,16 @@ class DiagramBuilder:
             self.sensitive[rows] |= cycles != table.cycles[rows]
 
     def tell(self, done: int) -> None:
-        """Tell how many trains are done; those that are run again to close joints do not count."""
+        """Report the number of finished trains; trains run again to close joints do not count."""
         self.effort.report(min(done, self.known), self.known)
 
     def measure(self) -> None:
-        """Compute the exponents of the trains without a period, over as many firings as there are points."""
+        """Compute the exponents of the aperiodic trains, over as many firings as there are points."""
         columns, table = self.table.columns, self.table
         begun = {}
         for row, regime in enumerate(table.regimes):
             x, v, branch, _memory, *electric = columns.last[row].tolist()
-            # A start inside the pack would need its memory; such a train stays undecided.
+            # A start inside the pack would need the memory of the pack; such a train stays undecided.
             if branch >= 0.0 or math.isnan(x):
                 continue
             if columns.status[row] == OK and not table.cycles[row] and math.isnan(self.exponents[row]):

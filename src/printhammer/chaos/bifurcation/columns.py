@@ -23,7 +23,7 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray, TextArray
 
 TOLERANCE: Final = 1e-9
-"""Tolerance of diagrams and basins unless told otherwise: noise far below what a period is judged by.
+"""Default tolerance of diagrams and basins; its noise is far below the agreement that defines a period.
 
 With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble` weakly stable orbits never settle to within 1e-6 of the
 window.
@@ -36,7 +36,7 @@ NOT_RUN: Final = "not run"
 _STATUS: Final = "U16"
 
 MOST_STATES: Final = 1 << 19
-"""States that are integrated in one piece; with it memory is bounded."""
+"""Number of states that are integrated in one batch, which bounds the memory."""
 
 
 class Columns(Declared):
@@ -68,7 +68,7 @@ class Columns(Declared):
         return len(self.x)
 
     def handed(self, row: int) -> State:
-        """Return the state with which the next train can go on."""
+        """Return the state with which the next train continues."""
         return tuple(self.last[row].tolist())
 
 
@@ -95,12 +95,12 @@ def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> No
 def run_columns(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Fire many trains and keep their states at the last `firings` - `transient` firings.
+    """Fire many trains and store their states at the last `firings` - `transient` firings.
 
-    States, shape (M, 7), are displacement, velocity, branch of the pack (negative: as follows from the
-    state), memory, and under a voltage the electric part of the state (`printhammer.run.start.Beyond`) at the
-    first firing, with the pulses before it under way; a row of NaN is a train from rest with nothing fired
-    before (`FROM_REST`).
+    States, shape (M, 7), are displacement, velocity, branch of the pack (negative: derived from the state),
+    memory, and under a voltage the electric part of the state (`printhammer.run.start.Beyond`) at the first
+    firing, with the earlier pulses under way; a row of NaN is a train from rest with no firing before
+    (`FROM_REST`).
     """
     points = firings - transient
     columns = blank_columns(len(regimes), points)
@@ -122,9 +122,9 @@ def run_columns(
 def _run(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Run trains that begin alike: all from rest, all inside the pack, or all elsewhere."""
+    """Run trains of one kind of start: all from rest, all inside the pack, or all elsewhere."""
     rest = bool(np.isnan(states[0, 0]))
-    # Cells of a basin share one regime, columns of a diagram have one each.
+    # The cells of a basin share one regime; each column of a diagram has its own.
     known = {id(regime): regime for regime in regimes}
     made = {key: _train(regime, firings, rest) for key, regime in known.items()}
     trains = [made[id(regime)] for regime in regimes]
@@ -138,7 +138,7 @@ def _run(
     ensemble = Ensemble(
         [regime.hammer for regime in regimes],
         [drive for drive, _times in trains],
-        # One more period, so that no state depends on where the run ends.
+        # One period is added, so that no state depends on the end of the run.
         [float(times[-1]) + regime.period for regime, (_drive, times) in zip(regimes, trains, strict=True)],
         states=None if rest else states[:, places],
         starts=[float(times[0]) for _drive, times in trains],
@@ -173,7 +173,7 @@ def _run(
 def run_in_stretches(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Do as `run_columns` for trains that `forgets` allows, a period at a time.
+    """Compute the same as `run_columns`, one period at a time, for trains that `is_memoryless` allows.
 
     Slower, but exact over long times, see `printhammer.chaos.strobe.train.STRETCH`.
     """
@@ -216,7 +216,7 @@ def run_in_stretches(
 
 
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
-    """Return a drive, and the times of its firings from the first to the one after all that are asked for."""
+    """Build a drive, and the times of its firings from the first to the one after the last requested."""
     if rest and regime.drive is None:
         drive = regime.pulses(firings + 2)
         return drive, drive.times[: firings + 1]
@@ -225,7 +225,7 @@ def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]
 
 
 def state_or_rest(regime: Regime, state: State) -> State:
-    """Return a state that was handed on, or `FROM_REST` where this hammer cannot begin with it."""
+    """Return a state that was carried over, or `FROM_REST` if this hammer cannot begin with it."""
     if math.isnan(state[0]):
         return FROM_REST
     try:
@@ -238,9 +238,9 @@ def state_or_rest(regime: Regime, state: State) -> State:
 
 
 def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
-    """Return by what differences of displacement, velocity, memory and current are divided, shape (M, 4).
+    """Compute the scales of displacement, velocity, memory and current of each train, shape (M, 4).
 
-    The half-widths of the window of each train, see `printhammer.run.regime`, and a typical current.
+    They are the half-widths of the window of each train, see `printhammer.run.regime`, and a typical current.
     """
     known: dict[tuple[int, float], tuple[float, ...]] = {}
     rows = []
@@ -256,11 +256,11 @@ def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
 
 
 def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the periods of trains, in firings, by the rule of `printhammer.chaos.strobe.verdict`.
+    """Compute the periods of trains, in firings, by the rule of `printhammer.chaos.strobe.verdict`.
 
-    A period is the smallest q, at most 64 and half of the points, whose states q firings apart agree, 0 where
-    there is none. The second array is how far these are from each other at most, in half-widths of the
-    window, NaN where there is no q. Fronts of the packs, m, are infinite where there is none; the scales are
+    A period is the smallest q, at most 64 and half of the points, whose states q firings apart agree, 0 if
+    there is no such q. The second array is the largest distance of these states, in half-widths of the
+    window, NaN without q. `fronts` are the positions of the packs, m, infinite without a pack; the scales are
     those of `scales_of_columns`.
     """
     branch = pack_branches(columns.x, columns.branch, fronts[:, np.newaxis])
@@ -269,7 +269,7 @@ def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple
     distances = np.full(len(states), np.nan)
     left = np.flatnonzero(np.isfinite(states).all(axis=(1, 2)))
     for q in range(1, min(LARGEST_PERIOD, states.shape[1] // 2) + 1):
-        # States that all agree agree at the end too, which is soon seen.
+        # If all states agree, the last ones do, which is quickly tested.
         near = left[(np.abs(states[left, -1] - states[left, -1 - q]) <= AGREEMENT).all(axis=1)]
         if not near.size:
             continue
@@ -289,7 +289,7 @@ def confirm(
     scales: FloatArray,
     effort: Effort,
 ) -> None:
-    """Put right the periods from `cycles_of`, and the distances, where the states alone do not show them.
+    """Correct the periods from `cycles_of`, and the distances, where the states alone are ambiguous.
 
     See `printhammer.chaos.orbits.settled`; a period that is not confirmed becomes 0.
     """
@@ -311,10 +311,10 @@ def confirm(
 
 
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:
-    """Return how far two periodic orbits of the same period lie apart, whatever their phase.
+    """Compute the distance of two periodic orbits of the same period, minimised over the phase.
 
-    Of their states, shape (q, 2), in units of the scales, the largest difference of a component, for that
-    shift of firings with which it is least.
+    The distance is the largest difference of a component of the states, shape (q, 2), in units of the scales,
+    for the cyclic shift that makes it least.
     """
     count = len(one)
     shifted = other[(np.arange(count) + np.arange(count)[:, np.newaxis]) % count]

@@ -1,6 +1,6 @@
-"""Bifurcation: a diagram as it is kept, its windows, and the routes to its strange trains.
+"""Bifurcation diagram as a result: its windows, and the routes to its strange trains.
 
-Windows of a bifurcation diagram, and whether a series of period doublings leads to the strange ones.
+Windows of a bifurcation diagram, and whether a series of period doublings precedes the strange trains.
 
 A window is an interval of the parameter in which all trains that were run have the same verdict. A value
 stands for the interval half-way to its neighbours, so that widths of windows add up to the whole range.
@@ -40,11 +40,11 @@ SERIES: Final = (2, 4, 8)
 """Periods that, one after the other, count as a series of doublings."""
 
 MOST_UNDECIDED: Final = 32
-"""Trains without a period that are not strange, on a route, after which it is not followed further."""
+"""Maximum number of aperiodic trains that are not strange on a route, after which the search stops."""
 
 
 class Window(Declared):
-    """Neighbouring values of the parameter with the same verdict; values and width in SI."""
+    """Window: neighbouring values of the parameter with the same verdict; values and width in SI."""
 
     verdict: str = part('"period-q", "strange", "superstable" or "undecided"')
     period: int = part("number q; 0 where there is none")
@@ -55,7 +55,7 @@ class Window(Declared):
 
 
 class Route(Declared):
-    """What one meets on the way to the first strange train."""
+    """The windows on the way to the first strange train."""
 
     way: Literal["rising", "falling"] = part("sense of the values of the parameter")
     before: tuple[Window, ...] = part(
@@ -63,7 +63,7 @@ class Route(Declared):
     )
     first: float | None = part(
         "value of the first strange train, SI",
-        more="None if there is none, or the way was not followed so far",
+        more="None without a strange train, or if the search stopped before it",
     )
     complete: bool = part(
         "False where `MOST_UNDECIDED` trains without a period came first that are not strange, and the way"
@@ -72,21 +72,21 @@ class Route(Declared):
 
     @property
     def periods(self) -> list[int]:
-        """Periods of the windows before, those without one left out."""
+        """Periods of the windows of the route, without undecided windows."""
         return [window.period for window in self.before if window.period]
 
     @property
     def cascade(self) -> bool:
-        """Whether windows of the periods 2, 4 and 8 follow each other there."""
+        """Whether windows of the periods 2, 4 and 8 follow each other on the route."""
         return bool(doublings(self.before))
 
     @property
     def sentence(self) -> str:
-        """The finding in a sentence, with the value in SI."""
+        """The finding as a sentence, with the value in SI."""
         return self.worded("{:.9g}".format)
 
     def worded(self, shown: Callable[[float], str]) -> str:
-        """Return the finding in a sentence, with the value as `shown` writes it."""
+        """Write the finding as a sentence, with the value formatted by `shown`."""
         values = f"With {self.way} values"
         way = ", ".join(window.verdict for window in self.before)
         if not self.complete:
@@ -103,7 +103,7 @@ class Route(Declared):
 
 
 def cells(values: FloatArray) -> FloatArray:
-    """Return for how wide an interval each of some ascending values stands."""
+    """Compute the width of the interval that each of several ascending values represents."""
     if len(values) < 2:
         return np.zeros(len(values))
     edges = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])
@@ -111,7 +111,7 @@ def cells(values: FloatArray) -> FloatArray:
 
 
 def doublings(windows: Sequence[Window]) -> list[Window]:
-    """Return the first of each three windows in a row whose periods are 2, 4 and 8.
+    """Find the first of each three successive windows whose periods are 2, 4 and 8.
 
     Windows that are undecided do not count: where the period doubles, trains take long to settle.
     """
@@ -121,7 +121,7 @@ def doublings(windows: Sequence[Window]) -> list[Window]:
 
 
 class Bifurcation(Result, rows="direction column"):
-    """States at the firings against a parameter, under one or two directions."""
+    """States at the firings against a parameter, in one or several directions."""
 
     regime: Regime = part("hammer, periodic drive and phase; the parameter has other values in each column")
     parameter: str = scalar("", "what is changed, see `printhammer.run.regime.Regime.with_`")
@@ -196,11 +196,11 @@ class Bifurcation(Result, rows="direction column"):
 
     @property
     def title(self) -> str:
-        """One line that says what the diagram is."""
+        """Title of the result, in one line."""
         return f"bifurcation diagram of {self.regime.hammer.name} in {self.parameter}"
 
     def summary(self) -> Summary:
-        """Return the windows of each direction, routes to strange trains, hysteresis, undecided trains."""
+        """Summarise the windows of each direction, routes to strange trains, hysteresis, undecided trains."""
         several = len(self.directions) > 1
         value, unit = self._value_text()
         lines = [""]
@@ -218,7 +218,7 @@ class Bifurcation(Result, rows="direction column"):
         )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
-        """Return the formatter of parameter values, with digits that tell neighbours apart, and the unit."""
+        """Return the formatter of parameter values, precise enough to separate neighbours, and the unit."""
         si = self.regime.quantity(self.parameter).si
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)
@@ -227,7 +227,7 @@ class Bifurcation(Result, rows="direction column"):
         return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
 
     def _windows_grid(self, direction: str) -> Grid:
-        """Return the verdicts of one direction: how many windows, how wide together, the widest one."""
+        """Tabulate the verdicts of one direction: number of windows, total width, widest window."""
         windows = sorted(self.windows(direction), key=lambda window: (window.period or 1000, window.verdict))
         total = sum(window.width for window in windows) or 1.0
         groups = [
@@ -246,7 +246,7 @@ class Bifurcation(Result, rows="direction column"):
         return Grid(columns, direction, most=12)
 
     def _undecided(self) -> list[str]:
-        """Return why trains that came to their end are undecided, a sentence for each reason."""
+        """List the reasons why trains that ran to the end are undecided, a sentence each."""
         undecided = (self.verdicts == "undecided") & (self.status == "ok")
         known = undecided & ~np.isnan(self.exponents)
         settling = known & (self.exponents < -SIGNIFICANT * self.standard_errors)
@@ -267,7 +267,7 @@ class Bifurcation(Result, rows="direction column"):
         ]
 
     def _sensitive(self) -> list[str]:
-        """Return how many periods hang on rounding, if any do."""
+        """Report how many periods depend on rounding; an empty list if none does."""
         count = int(self.sensitive.sum())
         whose = "1 period changes" if count == 1 else f"{count} periods change"
         return [f"{whose} at a finer tolerance: long cycles hang on the last bits."] if count else []
@@ -275,7 +275,7 @@ class Bifurcation(Result, rows="direction column"):
     @property
     @derived("1", "part of the period between a firing and its point")
     def phase(self) -> float:
-        """Part of the period between a firing and its point."""
+        """Fraction of the period between a firing and its point."""
         return self.regime.phase
 
     @property
@@ -298,12 +298,12 @@ class Bifurcation(Result, rows="direction column"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the diagram comes from; without a period where that is what is changed."""
+        """Provenance of the diagram; without a period if the period is the parameter."""
         known = super().provenance
         return {key: known[key] for key in known if key != "period" or self.parameter not in (PERIOD, RATE)}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return states over `direction`, `column` and `firing`, and of each train what it settles to."""
+        """Return states over `direction`, `column` and `firing`, verdicts over `direction` and `column`."""
         own = super().entries()
         of = self.regime.quantity(self.parameter)
         note = replace(own["value"][0], unit=of.si, meaning=of.meaning, head=self.parameter)
@@ -311,23 +311,23 @@ class Bifurcation(Result, rows="direction column"):
         return {"verdict": own.pop("verdict"), **own}
 
     def windows(self, direction: str | None = None) -> list[Window]:
-        """Return the intervals of the parameter with one verdict, from the least value to the largest.
+        """Compute the windows of one direction, from the least value of the parameter to the largest.
 
-        Of one direction, by default the first; InputError where the diagram has no such direction.
+        The direction is by default the first; InputError if the diagram has no such direction.
         """
         return self._grouped(self._row(direction), range(len(self.values)))
 
     def routes(self, direction: str | None = None) -> tuple[Route, Route]:
-        """Return what comes before the first strange train, with the parameter rising and falling.
+        """Compute the routes to the first strange train, with the parameter rising and falling.
 
-        Of one direction, as for `windows`. Of trains without a period whose exponent is not known it is
-        computed here, from one end of the range on up to the first strange one.
+        The direction is as for `windows`. Exponents of aperiodic trains that are not known yet are computed
+        here, from one end of the range up to the first strange train.
         """
         row = self._row(direction)
         names = self.verdicts[row].tolist()
         known: dict[int, bool] = {}
 
-        def strange(k: int) -> bool:
+        def is_strange(k: int) -> bool:
             if names[k] == "undecided" and k not in known:
                 known[k] = self._is_strange(row, k)
             return names[k] == "strange" or known.get(k, False)
@@ -336,7 +336,7 @@ class Bifurcation(Result, rows="direction column"):
             undecided = 0
             for place, k in enumerate(order):
                 before = order[:place]
-                if strange(k):
+                if is_strange(k):
                     return Route(way, tuple(self._grouped(row, before)), float(self.values[k]), True)
                 undecided += names[k] == "undecided"
                 if undecided > MOST_UNDECIDED:
@@ -355,7 +355,7 @@ class Bifurcation(Result, rows="direction column"):
         return self.directions.index(direction)
 
     def _grouped(self, row: int, order: Sequence[int]) -> list[Window]:
-        """Return the windows of neighbouring columns, which may ascend or descend."""
+        """Group neighbouring columns, in ascending or descending order, into windows."""
         names, cycles = self.verdicts[row].tolist(), self.cycles[row].tolist()
         widths = cells(self.values)
         windows = []
@@ -368,11 +368,11 @@ class Bifurcation(Result, rows="direction column"):
         return windows
 
     def _is_strange(self, row: int, k: int) -> bool:
-        """Tell whether a train without a period is strange, by its exponent from its last point on."""
+        """Whether an aperiodic train is strange, by its exponent from its last point on."""
         x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
         regime = self.regime.with_(self.parameter, float(self.values[k]))
         front = regime.hammer.front
-        # Inside the pack, and between firings, the state that is kept is not all that a train goes on from.
+        # Inside the pack, and between firings, the stored state is incomplete.
         if self.status[row, k] != "ok" or self.phase or (front is not None and x > front):
             return False
         points = self.x.shape[2]
@@ -381,11 +381,10 @@ class Bifurcation(Result, rows="direction column"):
 
 
 def hysteresis(diagram: Bifurcation) -> BoolArray:
-    """Return at which values the directions of a diagram lead to different attractors, shape (C,).
+    """Mask of the values at which the directions of a diagram lead to different attractors, shape (C,).
 
-    Periodic ones are different if their periods are, or if their orbits lie further apart than
-    `SAME` of the builder; trains without a period are only told from periodic ones. All
-    false where there is but one direction.
+    Periodic trains differ if their periods do, or if their orbits lie further apart than `SAME` of the
+    builder; an aperiodic train differs from periodic ones only. All False for a single direction.
     """
     different = np.zeros(len(diagram.values), np.bool_)
     if len(diagram.directions) < 2:

@@ -11,7 +11,7 @@ Theory*, Academic Press 1977, 359; E. L. Allgower and K. Georg, *Introduction to
 Methods*, SIAM 2003). The system is regular at folds, where the parameter turns back. Lengths are measured in
 scaled variables, u and p each divided by a scale of its own.
 
-What happens on the way, folds, period doublings and the like, is the business of
+Bifurcations on the way, such as folds and period doublings, are located by
 `printhammer.chaos.continuation.branch_points`.
 """
 
@@ -32,26 +32,26 @@ from printhammer.support.arrays import FloatArray
 
 _GROWTH: Final = 1.5
 _LEAST_COSINE: Final = 0.97
-"""Of the angle between successive tangents, below which a step is taken again with half its length."""
+"""Cosine of the angle between successive tangents below which a step is repeated with half its length."""
 _FARTHEST: Final = 0.4
-"""Distance of a corrected point from its prediction, in steps, beyond which it may lie on another curve."""
+"""Largest distance of a corrected point from its prediction, in steps; beyond it the step is rejected."""
 _LEAP: Final = 1.0
-"""Change of a multiplier in one step, in units of one more than its size, beyond which the step is halved."""
+"""Change of a multiplier in one step, relative to 1 + |multiplier|, beyond which the step is halved."""
 _SAME: Final = 1e-6
-"""Scaled distance below which two points are one."""
+"""Scaled distance below which two points are identical."""
 
 
 class Stop(Declared):
-    """Where a curve ends, and why."""
+    """End of a curve, and the reason for stopping."""
 
     reason: str = part(
         '"bound"; "closed"; "no value": the map has none beyond; "lost": Newton\'s method does not converge'
         ' beyond; "jump": what it converges to there is no continuation; "length": the number of steps is'
         ' used up; "not asked"; or what the caller\'s watch says'
     )
-    parameter: float = part("the parameter there")
-    state: FloatArray = part("the state there")
-    sentence: str = part("the same in words")
+    parameter: float = part("parameter at the end")
+    state: FloatArray = part("state at the end")
+    sentence: str = part("the reason as a sentence")
     node: Node | None = part(
         "where the caller's watch stops between two nodes: the last node of the curve",
         default=None,
@@ -62,8 +62,8 @@ class Stop(Declared):
 class Curve(Declared):
     """A curve of fixed points."""
 
-    nodes: list[Node] = part("in order along the curve; `arc` increases")
-    stops: tuple[Stop, Stop] = part("what ended it before the first and after the last")
+    nodes: list[Node] = part("fixed points in order along the curve; `arc` increases")
+    stops: tuple[Stop, Stop] = part("reasons for stopping before the first and after the last point")
 
     @property
     def closed(self) -> bool:
@@ -72,12 +72,12 @@ class Curve(Declared):
 
 
 class Steps(Declared):
-    """How a curve is followed; lengths in scaled variables."""
+    """Step sizes and iteration limit of a curve, in scaled variables."""
 
     first: float = part("length of the first step", default=0.02)
-    smallest: float = part("least length", default=1e-7)
+    smallest: float = part("smallest length", default=1e-7)
     largest: float = part("largest length", default=0.1)
-    most: int = part("number of steps in either direction", default=1000)
+    most: int = part("maximum number of steps in each direction", default=1000)
     precision: float = part(
         "scaled correction of Newton's method below which a point is on the curve", default=1e-11
     )
@@ -94,7 +94,7 @@ class Steps(Declared):
 
 
 Watch = Callable[[Node, Node], Stop | None]
-"""Called with each node and the next; a `Stop` ends the curve there."""
+"""Callback for each pair of successive nodes; a returned `Stop` ends the curve between them."""
 
 
 def follow(
@@ -109,34 +109,35 @@ def follow(
     row: npt.ArrayLike | None = None,
     watch: Watch | None = None,
 ) -> Curve:
-    """Follow the curve of fixed points through a point.
+    """Follow the curve of fixed points through a point by pseudo-arclength continuation.
 
     Parameters
     ----------
     family : callable
         The map.
     state : array, shape (n,)
-        Near a fixed point.
+        State near a fixed point.
     parameter : float
-        Its parameter, which is kept for the first point.
+        Parameter of the first point, kept fixed in its correction.
     scales : array, shape (n + 1,)
-        By which the components of the state, and last the parameter, are divided.
+        Scales that divide the components of the state and, last, the parameter.
     bounds : tuple of float
         Least and largest parameter; the curve ends there.
     steps : Steps, optional
-        Lengths and number of steps.
+        Step sizes and maximum number of steps.
     directions : str, optional
-        From the first point, "up", toward larger parameters at first, "down", or "both".
+        Direction from the first point: "up", initially toward larger parameters, "down", or "both".
     row : array, shape (n + 1,), optional
-        Scaled direction in which the curve leaves the first point upward, where that is known: that of a
-        branch that begins there. The component of the first point along it is kept instead of the parameter.
+        Scaled direction in which the curve leaves the first point upward, if known, as for a branch born at a
+        bifurcation. The correction of the first point then fixes the component along it instead of the
+        parameter.
     watch : callable, optional
         Called with each node and the next, in the direction of travel; may end the curve.
 
     Returns
     -------
     Curve
-        From its lower to its upper end; both ends have a reason and a place.
+        From its lower to its upper end, with reason and place of both stops.
 
     Raises
     ------
@@ -198,7 +199,7 @@ def _half(
         z = follower.point(here)
         ahead = follower.correct(z + length * here.tangent, here.tangent, arc=here.arc + length)
         trouble, reached = follower.trouble, None
-        jumped = ahead is not None and not _joined(follower, here, ahead, length)
+        jumped = ahead is not None and not _is_joined(follower, here, ahead, length)
         if jumped:
             ahead = None
         if ahead is not None:
@@ -211,7 +212,7 @@ def _half(
             if length < steps.smallest:
                 return nodes, _lost(here, trouble, jumped=jumped)
             continue
-        if reached is None and len(nodes) > 2 and _passes(follower, here, ahead, home, start):
+        if reached is None and len(nodes) > 2 and _is_passed(follower, here, ahead, home, start):
             nodes.append(replace(start, arc=here.arc + float(np.linalg.norm(home - z))))
             sentence = f"the curve closes upon itself at the parameter {start.parameter:.9g}"
             return nodes, Stop("closed", start.parameter, start.state, sentence)
@@ -234,14 +235,14 @@ def _half(
     return nodes, Stop("length", here.parameter, here.state, sentence)
 
 
-def _joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
+def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
     """Return whether a corrected point lies on the same curve, as far as its distance and tangent tell."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
-    return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _leaps(here, ahead)
+    return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)
 
 
-def _leaps(here: Node, ahead: Node) -> bool:
+def _has_leap(here: Node, ahead: Node) -> bool:
     """Return whether the multipliers change by much between two points of the same kind of motion."""
     if here.value.label != ahead.value.label:
         return False
@@ -295,7 +296,7 @@ def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float
     return replace(node, parameter=parameter, tangent=tangent, arc=arc)
 
 
-def _passes(follower: Corrector, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
+def _is_passed(follower: Corrector, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
     """Return whether the curve goes through its start between two nodes."""
     begin = follower.point(here)
     along = follower.point(ahead) - begin

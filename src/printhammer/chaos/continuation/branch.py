@@ -1,6 +1,6 @@
-"""Branch: a curve of periodic orbits along one constant, with what each does and what happens on the way.
+"""Branch: a curve of periodic orbits along one constant, with its bifurcations and grazings.
 
-What happens along a branch of periodic orbits, in the words of a hammer.
+Events along a branch are described in the terms of a hammer.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Change = Literal["", "appears", "vanishes", "splits", "merges", "several"]
 
 
 class BranchEvent(Declared, eq=False):
-    """A point of a branch at which something happens."""
+    """A bifurcation, grazing or change of section on a branch."""
 
     kind: EventKind = part(
         '"fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are'
@@ -53,23 +53,23 @@ class BranchEvent(Declared, eq=False):
         ' "branching": two branches cross; "grazing": a contact appears or vanishes; "section": nothing'
         " to the orbit, but a contact comes near the section, which moves to another phase"
     )
-    value: float = part("of the constant, SI")
+    value: float = part("value of the constant, SI")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
-    phase: float = part("part of the period from a firing to the section")
-    multipliers: npt.NDArray[np.complex128] = part("the multipliers there, shape (2,)")
-    surface: str = part('of a grazing: "pack", "backstop" or, where several contacts change at once, ""')
+    phase: float = part("phase of the section, as a fraction of the period")
+    multipliers: npt.NDArray[np.complex128] = part("multipliers at the point, shape (2,)")
+    surface: str = part('surface of a grazing: "pack", "backstop" or, if several contacts change, ""')
     change: Change = part(
         'of a grazing, as the constant grows: a contact "appears", "vanishes", "splits" in two or two "merge"'
         ' ("merges"); "several" where more than one changes at once. Else empty'
     )
-    contacts: tuple[str, str] = part("sequence of contacts before and after it along the branch")
-    after: int = part("number of the orbit of the branch that it follows")
-    sharp: bool = part("whether it was located; otherwise it is known between two orbits only")
+    contacts: tuple[str, str] = part("sequence of contacts before and after the point along the branch")
+    after: int = part("index of the orbit of the branch before the point")
+    sharp: bool = part("whether the point was located; otherwise it is only bracketed by two orbits")
     point: BranchPoint = part("the point of the curve", repr=False)
 
     @property
     def message(self) -> str:
-        """What happens, in a few words."""
+        """The event in a few words."""
         if self.kind == "section":
             return f"a contact nears the section, which moves to the phase {self.phase:.4g}"
         if self.kind != "grazing":
@@ -81,7 +81,7 @@ class BranchEvent(Declared, eq=False):
 
 
 def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
-    """Return a point of a curve, looked at at a phase, in the words of a hammer."""
+    """Describe a point of a curve at a section of a phase as an event of a hammer."""
     surface, change = ("", "") if point.sides is None else _grazing(point)
     return BranchEvent(
         kind="grazing" if point.kind == "change" else point.kind,
@@ -99,7 +99,7 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
 
 
 def _grazing(point: BranchPoint) -> tuple[str, str]:
-    """Return on which surface a contact changes, and how as the constant grows."""
+    """Determine on which surface a contact changes, and how it changes as the constant grows."""
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)
     before, after = (node.value.extra for node in ordered)
@@ -113,14 +113,14 @@ def _grazing(point: BranchPoint) -> tuple[str, str]:
     more = len(after.of(surface)) - len(before.of(surface))
     if abs(more) != 1:
         return surface, "several"
-    parts = _parted((after if more > 0 else before).of(surface), before.period * before.firings)
+    parts = _is_parted((after if more > 0 else before).of(surface), before.period * before.firings)
     if parts:
         return surface, "splits" if more > 0 else "merges"
     return surface, "appears" if more > 0 else "vanishes"
 
 
-def _parted(touches: list[Touch], length: float) -> bool:
-    """Return whether the shortest gap between contacts is shorter than the shortest contact."""
+def _is_parted(touches: list[Touch], length: float) -> bool:
+    """Whether the shortest gap between contacts is shorter than the shortest contact."""
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False
@@ -136,7 +136,7 @@ def _parted(touches: list[Touch], length: float) -> bool:
 def stable_ranges(
     along: FloatArray, stable: BoolArray, events: Sequence[BranchEvent], ends: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Return the ranges of the constant over which the orbits of a branch are stable, ascending.
+    """Compute the ranges of the constant over which the orbits of a branch are stable, ascending.
 
     `ends` are the values at which the branch ends, which may lie beyond its first and last orbit.
     """
@@ -161,7 +161,7 @@ def stable_ranges(
 
 
 MOST: Final = 1000
-"""Number of steps in either direction unless told otherwise."""
+"""Default maximum number of steps in each direction."""
 
 _DIGITS: Final = ".9g"
 
@@ -169,10 +169,11 @@ _DIGITS: Final = ".9g"
 class Branch(Result):
     """A curve of periodic orbits along one constant.
 
-    Every array has one row for each orbit, in order along the curve; their values need not ascend. Reasons
-    to stop are "bound"; "closed"; "period doubling": the orbit is born there; "grazing" of a rigid backstop;
-    "merged" with an orbit of fewer firings; "no value": a run does not come through; "lost": Newton's method
-    does not converge; "jump": what it converges to is no continuation; "length": the steps are used up.
+    Every array has one row for each orbit, in order along the curve; the values of the constant need not
+    ascend. Reasons for stopping are "bound"; "closed"; "period doubling": the orbit is born there; "grazing"
+    of a rigid backstop; "merged" with an orbit of fewer firings; "no value": a run ends early; "lost":
+    Newton's method does not converge; "jump": it converges to another curve; "length": the maximum number of
+    steps is reached.
     """
 
     regime: Regime = part("hammer and periodic drive at the start, and phase of the section")
@@ -237,11 +238,11 @@ class Branch(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the branch is."""
+        """Title of the result, in one line."""
         return f"period-{self.firings} orbits of {self.regime.hammer.name} along {self.parameter}"
 
     def summary(self) -> Summary:
-        """Return where the orbit is stable, and the events of the branch."""
+        """Summarise where the orbit is stable, and the events of the branch."""
         stable = [
             f"   {styled('good', 'stable')} from {low:.9g} to {high:.9g} {self.unit}"
             for low, high in self.stable_ranges
@@ -265,15 +266,16 @@ class Branch(Result):
     @property
     @derived("1", "part of the period between a firing and the section")
     def phase(self) -> float:
-        """Part of the period between a firing and the section at the start; see `phases`."""
+        """Phase of the section at the start, as a fraction of the period; see `phases`."""
         return self.regime.phase
 
     @property
     @derived("1", "whether all small changes of the state die out", "orbit", dtype=np.int32)
     def stable(self) -> BoolArray:
-        """Whether all small changes of the state die out, shape (N,).
+        """Mask of the stable orbits, shape (N,): all small perturbations decay.
 
-        Where the branch is born in a period doubling, as of the orbit beside it: a multiplier is 1 there.
+        At the birth of a branch in a period doubling, where a multiplier is 1, the stability is that of the
+        neighbouring orbit.
         """
         stable = np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
         for end, beside, stop in ((0, 1, self.stops[0]), (-1, -2, self.stops[1])):
@@ -284,7 +286,7 @@ class Branch(Result):
     @property
     @derived("1", "whether the branch is a closed loop", kind="column", dtype=np.int32)
     def closed(self) -> bool:
-        """Whether the branch is an island: a closed loop, joined to nothing; its ends are one orbit."""
+        """Whether the branch is an island: a closed loop, joined to no other branch; its ends coincide."""
         return self.curve.closed
 
     @property
@@ -296,7 +298,7 @@ class Branch(Result):
 
     @property
     def message(self) -> str:
-        """What the branch is, and why it ends at either end, in one line."""
+        """Description of the branch and the reasons for stopping at its ends, in one line."""
         reached = [*self.values.tolist(), *(event.value for event in self.events if event.kind == "fold")]
         low, high = min(reached), max(reached)
         span = f"{self.parameter} from {low:{_DIGITS}} to {high:{_DIGITS}} {self.unit}"
@@ -307,13 +309,13 @@ class Branch(Result):
         return f"{what}; at its first orbit {first}; at its last orbit {last}"
 
     def notes(self) -> dict[str, Any]:
-        """Return how the branch ends, for the attributes of the Dataset."""
+        """Return the reasons for stopping, for the attributes of the Dataset."""
         first, last = (stop.sentence for stop in self.stops)
         stable = [list(pair) for pair in self.stable_ranges]
         return {"first_end": first, "last_end": last, "stable_ranges": stable}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return orbits over `orbit`, `firing` and `multiplier`, and over `event` what happens on the way."""
+        """Return orbits over `orbit`, `firing` and `multiplier`, and events over `event`."""
         own = super().entries()
         own["value"] = replace(own["value"][0], unit=self.unit, meaning=self.parameter), self.values
         for name in ("real", "imag"):
@@ -349,12 +351,12 @@ class Branch(Result):
         return branches_table([self], self.attributes).drop(columns="branch")
 
     def orbit(self, number: int) -> Orbit:
-        """Return all about one of the orbits, closed anew at its value of the constant.
+        """Recompute one of the orbits, converged anew at its value of the constant.
 
         Parameters
         ----------
         number : int
-            Its place along the branch.
+            Index of the orbit along the branch.
         """
         regime = replace(self.regime, phase=float(self.phases[number]))
         regime = regime.with_(self.parameter, float(self.values[number]))
@@ -364,21 +366,21 @@ class Branch(Result):
     def doubled(
         self, event: BranchEvent, *, most: SupportsIndex = MOST, threads: int | None = None
     ) -> Branch:
-        """Return the branch of twice the period that is born at one of the period doublings.
+        """Follow the branch of twice the period that is born at one of the period doublings.
 
         Parameters
         ----------
         event : BranchEvent
             A period doubling of this branch.
         most : int, optional
-            Number of steps.
+            Maximum number of steps in each direction.
         threads : int, optional
-            By default as many as there are cores.
+            Number of threads; by default the number of cores.
 
         Raises
         ------
         InputError
-            The event is none of this branch's period doublings, or no orbit of twice the period is near.
+            The event is not a period doubling of this branch, or no orbit of twice the period is near.
         """
         if event.kind != "period doubling" or event not in self.events:
             raise InputError.of("event", event.kind, "a period doubling of this branch")
@@ -386,7 +388,7 @@ class Branch(Result):
 
 
 def branches_table(branches: Sequence[Branch], attributes: Mapping[str, Any]) -> pd.DataFrame:
-    """Return branches as a table, a row for each orbit and firing."""
+    """Convert branches to a table with a row for each orbit and firing."""
     import pandas as pd
 
     tables = []

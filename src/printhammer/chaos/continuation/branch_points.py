@@ -1,9 +1,9 @@
-"""What happens along a curve of fixed points: folds, period doublings, tori, branchings, changes of motion.
+"""Special points of a curve of fixed points: folds, period doublings, tori, branchings, changes of motion.
 
-Each kind has a test function that changes sign there (W. J. F. Govaerts, *Numerical Methods for Bifurcations
-of Dynamical Equilibria*, SIAM 2000; Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer
-2004, section 10.2). With J = dG/du, its eigenvalues mu_i, the Floquet multipliers, and the tangent t of the
-curve:
+Each kind has a test function that changes sign at the point (W. J. F. Govaerts, *Numerical Methods for
+Bifurcations of Dynamical Equilibria*, SIAM 2000; Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*,
+Springer 2004, section 10.2). With J = dG/du, its eigenvalues mu_i, the Floquet multipliers, and the tangent t
+of the curve:
 
 | kind | test function |
 |---|---|
@@ -37,71 +37,71 @@ from printhammer.support.arrays import FloatArray
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change", "section"]
 
 BIRTH: Final = "period doubling"
-"""Reason of the stop of an orbit of even period where it comes from a doubling."""
+"""Reason for stopping of an orbit of even period at the period doubling that it is born from."""
 
 _ROUNDS: Final = 60
 _SHARE: Final = 1e-13
-"""Share of a step to which a point is located."""
+"""Fraction of a step to which a point is located."""
 _REAL: Final = 1e-9
 _ROUNDING: Final = 1e-8
-"""Imaginary part of a real multiplier, and test function of nothing, but for rounding."""
+"""Rounding level of the imaginary part of a real multiplier and of a test function."""
 _SHARE_OF_CHANGE: Final = 1e-10
 _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
-"""Share of a step to which a change is bisected; margins from which and to which it is met by them."""
+"""Fraction of a step to which a change is bisected, and range of margins for its interpolation."""
 _NEAR: Final = 1e-4
-"""Shares of a step within which a fold and a branching are one point."""
+"""Fraction of a step within which a fold and a branching are the same point."""
 _BRACKET: Final = 1e-5
-"""Share of a step within which a branching is not bracketed any closer."""
+"""Fraction of a step to which a branching is bracketed."""
 _AMPLITUDE: Final = 1e-2
 _LEAST_AMPLITUDE: Final = 1e-6
 _CLOSER: Final = 4.0
-"""Least scaled distance from a doubling at which an orbit born there is sought; factor between two tries."""
+"""Smallest scaled distance from a doubling at which its orbit is sought; factor between attempts."""
 _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
-"""Share of that distance by which it may lie aside, and distance of a multiplier of it from 1."""
+"""Tolerances for a new orbit: sideways distance as a fraction of that distance, multiplier minus 1."""
 _HALF_NEAR: Final = 0.05
-"""Scaled distance within which an orbit is close to one of half its period."""
+"""Scaled distance within which an orbit is close to an orbit of half its period."""
 _HALF_DOUBLES: Final = 0.5
-"""Distance of a multiplier of that one from -1 within which it may be about to double."""
+"""Distance of a multiplier of the latter orbit from -1 within which it may be about to double."""
 
 
 class BranchPoint(Declared):
-    """A point at which something happens to a curve of fixed points."""
+    """A bifurcation or a change of motion on a curve of fixed points."""
 
     kind: Kind = part('"fold", "period doubling", "Neimark-Sacker", "branching", "change" or "section"')
-    node: Node = part("the fixed point there")
-    after: int = part("number of the node of the curve that it follows")
+    node: Node = part("fixed point there")
+    after: int = part("index of the node of the curve before the point")
     labels: tuple[Hashable, Hashable] = part("labels of the motion before and after it")
     sharp: bool = part(
         "False where it could not be located to the precision of the curve",
-        more="it is then between two nodes",
+        more="only bracketed by two nodes",
         default=True,
     )
     sides: tuple[Node, Node] | None = part(
-        "of a change: fixed points close before and behind it", default=None
+        "for a change: fixed points close before and behind it", default=None
     )
 
     @property
     def parameter(self) -> float:
-        """The parameter there."""
+        """Parameter at the point."""
         return self.node.parameter
 
 
 def doubling_test(jacobian: FloatArray) -> float:
-    """Return det(J + I), zero where a multiplier is -1."""
+    """Compute det(J + I), zero where a multiplier is -1."""
     return float(np.linalg.det(jacobian + np.eye(len(jacobian))))
 
 
 def torus_test(jacobian: FloatArray) -> float:
-    """Return the product over pairs of multipliers of mu_i mu_j - 1; 1 for a single one."""
+    """Compute the product over pairs of multipliers of mu_i mu_j - 1; 1 for a single multiplier."""
     multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
     i, j = np.triu_indices(len(multipliers), 1)
     return float(np.prod(multipliers[i] * multipliers[j] - 1.0).real)
 
 
 def fold_test(jacobian: FloatArray) -> float:
-    """Return det(J - I), zero where a multiplier is 1."""
+    """Compute det(J - I), zero where a multiplier is 1."""
     return float(np.linalg.det(jacobian - np.eye(len(jacobian))))
 
 
@@ -112,24 +112,24 @@ def points_of(
     precision: float,
     margin: Callable[[Node], float] | None = None,
 ) -> list[BranchPoint]:
-    """Return what happens along a curve, in order.
+    """Locate the special points along a curve, in order.
 
     Parameters
     ----------
     family : callable
         The map.
     curve : Curve
-        Its fixed points, from `printhammer.chaos.continuation.arclength.follow`.
+        Curve of fixed points, from `printhammer.chaos.continuation.arclength.follow`.
     scales, precision
-        Those with which the curve was followed.
+        Scales and precision with which the curve was followed.
     margin : callable, optional
-        Near a change of the label, passes through 0 where it changes. Changes are then met by interpolation,
-        and the map is not evaluated too close to them.
+        Function that passes through 0 where the label changes. Changes are then located by interpolation, and
+        the map is not evaluated too close to them.
 
     Returns
     -------
     list of BranchPoint
-        Ordered along the curve.
+        Special points, ordered along the curve.
     """
     follower = Corrector(family, scales, precision)
 
@@ -143,11 +143,11 @@ def points_of(
         "branching": branching_test,
     }
     every: list[BranchPoint] = []
-    # At the period doubling from which an orbit comes its curve turns back; that is no fold.
+    # At the period doubling that an orbit is born from its curve turns back, which is not a fold.
     places = (0, len(curve.nodes) - 2)
     births = [place for place, stop in zip(places, curve.stops, strict=True) if stop.reason == BIRTH]
     for after, (here, ahead) in enumerate(itertools.pairwise(curve.nodes)):
-        kinds = [kind for kind, test in tests.items() if _changes_sign(test(here), test(ahead))]
+        kinds = [kind for kind, test in tests.items() if _has_sign_change(test(here), test(ahead))]
         if after in births:
             kinds = [kind for kind in kinds if kind not in ("fold", "branching")]
         points = []
@@ -168,13 +168,13 @@ def points_of(
     return every
 
 
-def _changes_sign(before: float, after: float) -> bool:
-    """Return whether a test function changes sign by more than rounding, as where areas are preserved."""
+def _has_sign_change(before: float, after: float) -> bool:
+    """Whether a test function changes sign by more than rounding, as matters for area-preserving maps."""
     return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
 
 
 def _on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
-    """Return the place at a share of the straight way between two nodes."""
+    """Return the point at a fraction of the straight line between two nodes."""
     state = begin.state + share * (end.state - begin.state)
     return replace(
         begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc
@@ -182,7 +182,7 @@ def _on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
 
 
 def _has_pair(node: Node) -> bool:
-    """Return whether a pair of complex multipliers lies close to the unit circle."""
+    """Whether a pair of complex multipliers lies close to the unit circle."""
     pair = np.abs(node.multipliers.imag) > _REAL
     return bool((pair & (np.abs(np.abs(node.multipliers) - 1.0) < 1e-3)).any())
 
@@ -190,9 +190,10 @@ def _has_pair(node: Node) -> bool:
 def zero_between(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Return where between two nodes a test function is zero, as a share of the way, and the node there.
+    """Locate the zero of a test function between two nodes: fraction of the way, and the node there.
 
-    Bisection and secant (the Illinois rule) by turns; None where no fixed point was found on the way.
+    Alternates bisection and the Illinois variant of regula falsi; None if a fixed point on the way is not
+    found.
     """
     low, high = 0.0, 1.0
     at_low, at_high = test(here), test(ahead)
@@ -226,9 +227,9 @@ def zero_between(
 def _branching(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Return where two curves cross, as `zero_between`.
+    """Locate the crossing of two curves; the result is as for `zero_between`.
 
-    Newton's method fails at the crossing itself: it is bracketed ever closer and met by interpolation.
+    Newton's method fails at the crossing itself, which is therefore bracketed and interpolated.
     """
     low, high, one, other = 0.0, 1.0, here, ahead
     for _ in range(_ROUNDS):
@@ -249,7 +250,7 @@ def _branching(
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Return the places between two nodes at which the label changes."""
+    """Locate the places between two nodes at which the label changes."""
     changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
     while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
@@ -275,7 +276,7 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Return the share of the way at which the label first changes, nodes on both sides, and sharpness."""
+    """Locate the first change of the label: fraction of the way, nodes on both sides, sharpness."""
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan
@@ -320,11 +321,11 @@ def follow_doubled(
 ) -> Curve:
     """Follow the orbits of twice the period that are born at a period doubling.
 
-    The first one is sought at a scaled distance `amplitude` from the doubling `point`, in the direction of
-    the eigenvector whose multiplier is -1; its parameter is found with it, on whichever side it lies. It has
-    to lie as an orbit born there does: to first order in that direction, its parameter and its multipliers
-    as they are at the doubling. Where it does not, or there is none, it is sought closer by. `doubled` is the
-    map applied twice; the other arguments are those of `follow`. InputError where there is no such orbit.
+    The first orbit is sought at a scaled distance `amplitude` from the doubling `point`, in the direction of
+    the eigenvector whose multiplier is -1; its parameter is solved for as well, on whichever side it lies. It
+    is accepted if, to first order, it lies in that direction, with the parameter and the multipliers of the
+    doubling. Otherwise the search is repeated closer to the doubling. `doubled` is the map applied twice; the
+    other arguments are those of `follow`. InputError if there is no such orbit.
     """
     widths = np.asarray(scales, dtype=np.float64)
     jacobian = point.node.value.jacobian
@@ -359,17 +360,18 @@ def follow_doubled(
 
 
 def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> bool:
-    """Tell whether an orbit lies as one born at a doubling does, the way from there being known."""
+    """Whether an orbit lies where an orbit born at the doubling does, to first order."""
     aside = float(np.linalg.norm(way - amplitude * row))
     return aside <= _ASIDE * amplitude and float(np.abs(node.multipliers - 1.0).min()) <= _NEW_MULTIPLIER
 
 
 def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
-    """Return the period doubling at which an orbit of even period ends, where its curve passes one.
+    """Locate the period doubling at which a branch of even period ends, if its curve passes one.
 
-    There the states half a period apart become one, and the curve goes on as its own mirror image, the same
-    orbits half a period later. `half` corrects onto the curve over half the period, `here` and `ahead` are
-    successive nodes of that over the whole. The stop has the doubling on the former as its node.
+    At the doubling the states half a period apart coincide, and the curve continues as its own mirror image,
+    with the same orbits half a period later. `half` corrects onto the curve over half the period, `here` and
+    `ahead` are successive nodes of the curve over the whole period. The stop has the doubling on the former
+    curve as its node.
     """
     if here.tangent[-1] * ahead.tangent[-1] >= 0.0:
         return None
@@ -394,7 +396,7 @@ def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
 
 
 def doubling_near(follower: Corrector, node: Node) -> Node | None:
-    """Return the period doubling near a fixed point on its curve, by the secant method; None if not found."""
+    """Locate the period doubling near a fixed point on its curve by the secant method; None if not found."""
     step = 1e-3
     z = follower.point(node)
     before, value = node, doubling_test(node.value.jacobian)

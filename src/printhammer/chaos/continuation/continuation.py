@@ -1,10 +1,10 @@
-"""Continuation: a periodic orbit followed through the values of a constant, stable or not, to where it ends.
+"""Continuation of a periodic orbit, stable or not, along a constant of the hammer to the ends of its branch.
 
-A branch is a curve of periodic orbits. Along it the Floquet multipliers tell where the orbit loses its
-stability and how; the sequence of contacts tells where one appears or vanishes, a grazing. The contact forces
-of the paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe
-map has a derivative at a grazing and the branch goes on. On a rigid backstop it has none: there a branch ends
-at its first grazing, and the stop says so.
+A branch is a curve of periodic orbits. Its Floquet multipliers show where and how the orbit loses stability;
+its sequence of contacts shows where a contact appears or vanishes, a grazing. The contact forces of the
+paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe map is
+differentiable at a grazing and the branch continues. On a rigid backstop it is not: there a branch ends at
+its first grazing, which the stop reports.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from printhammer.chaos.continuation.branch import MOST, Branch
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.orbit import Orbit
 from printhammer.chaos.orbits.search import orbits
-from printhammer.chaos.strobe.map import MAP_EFFORT, is_on_impact, quiet_section, state_later, usable
+from printhammer.chaos.strobe.map import MAP_EFFORT, is_on_impact, is_usable, quiet_section, state_later
 from printhammer.chaos.strobe.points import strobes
 from printhammer.drive.input import read_count
 from printhammer.errors import InputError
@@ -28,7 +28,7 @@ from printhammer.run.regime import Fired, Regime
 from printhammer.support.arrays import FloatArray
 
 _SETTLE: Final = 500
-"""Firings after which a train from rest is taken to have settled."""
+"""Number of firings after which a train from rest is assumed to have settled."""
 
 
 @computation
@@ -44,38 +44,38 @@ def continuation(
     effort: Effort = MAP_EFFORT,
     **firing: Unpack[Fired],
 ) -> Branch:
-    """Follow a periodic orbit of a hammer through the values of one constant.
+    """Follow a periodic orbit of a hammer along one constant.
 
     Parameters
     ----------
     start : Hammer, Regime or Orbit
-        A periodic orbit from `printhammer.orbits`; or a regime, or a hammer with all that `firing` says of
-        it, whose orbit is that near `state`, or else that to which a train from rest settles, or else the
-        first that a search finds. Where an impact lies on the section, the branch is followed at another
-        phase; no result depends on the phase.
+        A periodic orbit from `printhammer.orbits`; or a regime, or a hammer with the keywords `firing`. Its
+        orbit is the orbit near `state` if that is given, else the orbit that a train from rest settles to,
+        else the first orbit of a search. Where an impact lies on the section, the branch is followed at
+        another phase; no result depends on the phase.
     parameter : str
         "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
         waveform or of an endless force, such as "waveform.amplitude" or "drive.amplitude".
     bounds : tuple
         Least and largest value, SI or text with a unit.
     firings : int, optional
-        Of a hammer or regime: number of firings after which the orbit repeats; by default that to which the
-        train settles, and 1 where it does not or a state is given.
+        For a hammer or regime: number of firings after which the orbit repeats; by default the period that
+        the train settles to, and 1 if it does not settle or a state is given.
     state : tuple of float, optional
-        Of a hammer or regime: displacement, m, and velocity, m/s, at a section, near the orbit.
+        For a hammer or regime: displacement, m, and velocity, m/s, at a section, near the orbit.
     most : int, optional
-        Number of steps in either direction.
+        Maximum number of steps in each direction.
     steps : Steps, optional
-        Instead: how the curve is followed, in units of half-widths of the strobe window and of a fifth of the
-        range of the constant.
+        Step sizes instead of `most`, in half-widths of the strobe window and fifths of the range of the
+        constant.
     **firing
-        How the hammer is fired, as for `printhammer.Regime.of`; beside an orbit at most its own phase.
+        How the hammer is fired, as for `printhammer.Regime.of`; for an orbit only its phase may be given.
 
     Returns
     -------
     Branch
-        In both directions from the start to the bounds or to another stop, which is named. Folds are located
-        to about 1e-10 of the range or better, grazings to about 1e-8.
+        Branch in both directions from the start, to the bounds or to another stop, with its reason. Folds are
+        located to about 1e-10 of the range or better, grazings to about 1e-8.
     """
     if isinstance(start, Orbit):
         fired = [value for name, value in firing.items() if name not in ("phase", "overlap")]
@@ -117,19 +117,19 @@ def continuation(
 def _orbit_to_start_from(
     regime: Regime, firings: int | None, effort: Effort
 ) -> tuple[Regime, FloatArray, int]:
-    """Return a regime at the phase of a section, the state of an orbit there and its number of firings."""
+    """Find the orbit to start from: regime at the phase of a section, state, and number of firings."""
     judged = (_SETTLE // 2, _SETTLE)
     (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=effort.threads)
     period = None if settled.verdict is None or not settled.ok else settled.verdict.period
     state = np.array([settled.x[0], settled.v[0]])
-    if period is not None and firings in (None, period) and usable(regime.hammer, *state.tolist()):
+    if period is not None and firings in (None, period) and is_usable(regime.hammer, *state.tolist()):
         return regime, state, period
     many = firings or 1
     for orbit in orbits(regime, longest=many, threads=effort.threads):
         if orbit.firings == many:
             state = state_later(orbit.regime, orbit.section, regime.phase, effort.tolerance)
             # On its way out of the pack the armature has a memory.
-            if np.isfinite(state).all() and usable(regime.hammer, *state.tolist()):
+            if np.isfinite(state).all() and is_usable(regime.hammer, *state.tolist()):
                 return regime, state, many
             return orbit.regime, np.array(orbit.section), many
     raise InputError(

@@ -1,6 +1,7 @@
-"""The stroboscopic map of a regime as a map with a parameter, to be followed by `arclength`.
+"""Stroboscopic map of a regime as a map with a parameter, for pseudo-arclength continuation.
 
-Beside its value and derivatives it tells of the contacts on the way; their sequence is the label of motion.
+Beside its value and derivatives the map returns the contacts on the way; their sequence is the label of
+motion.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Final, Literal
 import numpy as np
 
 from printhammer.chaos.continuation.fixed_points import MapValue
-from printhammer.chaos.strobe.map import IN_PACK, image_of, margin_of, usable
+from printhammer.chaos.strobe.map import IN_PACK, image_of, is_usable, margin_of
 from printhammer.errors import InputError
 from printhammer.hammer.hammer import Hammer
 from printhammer.results import Declared, column, part, scalar
@@ -24,12 +25,12 @@ from printhammer.run.start import initial_state
 from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 1e-6
-"""Relative change of the parameter by which the slope is taken; it only steers, and need not be exact."""
+"""Relative parameter step of the slope's finite difference; the slope only steers the corrector."""
 _MUCH: Final = 1e3
-"""Multiplier from which on that change is made smaller."""
+"""Multiplier above which that step is reduced."""
 _BESIDE: Final = 1e-7
 _GENTLE: Final = 3e-4
-"""Change of a state, and speed of a pack touch, in units of the scales of the run."""
+"""Finite-difference step of a state, and speed of a gentle pack touch, in scales of the run."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
 _MOST_TOUCHES: Final = 100
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
@@ -38,7 +39,7 @@ Surface = Literal["pack", "backstop"]
 
 
 def cyclic(surfaces: Iterable[str]) -> str:
-    """Return a sequence of surfaces touched, P or B each, from where it is first in the alphabet."""
+    """Rotate a sequence of touched surfaces, P or B each, to its alphabetically first form."""
     word = "".join("P" if surface == "pack" else "B" for surface in surfaces)
     if len(word) > _MOST_TOUCHES:
         return _MANY
@@ -46,7 +47,7 @@ def cyclic(surfaces: Iterable[str]) -> str:
 
 
 class Touch(Declared):
-    """One contact of an orbit that begins within its period; times since the firing before the section."""
+    """A contact of an orbit that begins within its period; times since the firing before the section."""
 
     surface: Surface = part('"pack" or "backstop"')
     t_in: float = scalar("s", "time of touch")
@@ -57,7 +58,7 @@ class Touch(Declared):
 
 
 class Passage(Declared):
-    """What happens on the way from a section to the last."""
+    """The contacts of a motion between two sections."""
 
     touches: tuple[Touch, ...] = part("in order")
     period: float = scalar("s", "time between firings")
@@ -69,15 +70,15 @@ class Passage(Declared):
 
     @property
     def sequence(self) -> str:
-        """The surfaces touched, P or B each, from where the sequence is first in the alphabet.
+        """Sequence of touched surfaces, P or B each, rotated to its alphabetically first form.
 
-        A touch that moves through the section changes nothing: of an orbit, the beginning is arbitrary.
+        A touch that moves through the section changes nothing, since the beginning of an orbit is arbitrary.
         """
         return cyclic(touch.surface for touch in self.touches)
 
     @property
     def dots(self) -> list[tuple[float, float] | None]:
-        """Flight time, s, and impact speed, m/s, of the dot of each firing; None for a lost one."""
+        """Flight time, s, and impact speed, m/s, of the dot of each firing; None for a lost dot."""
         dots: list[tuple[float, float] | None] = [None] * self.firings
         for touch in self.of("pack"):
             fired = math.floor(touch.t_in / self.period)
@@ -89,34 +90,34 @@ class Passage(Declared):
 
 
 class Course(Declared):
-    """What a periodic orbit does in one period of it; energies in J."""
+    """Course of a periodic orbit over one period; energies in J."""
 
     states: FloatArray = part("displacement, m, and velocity, m/s, at the sections, shape (firings, 2)")
     peak_forces: FloatArray = column(
         "N", "largest pack force of the contacts of each firing", "firing", more="NaN without one"
     )
-    coil_work: float = part("of the coil")
-    drive_work: float = part("of a drive that is a force")
-    pack_loss: float = part("in the pack")
-    backstop_loss: float = part("in the backstop")
-    damping_loss: float = part("in the damping of the armature")
+    coil_work: float = part("work of the coil")
+    drive_work: float = part("work of a drive that is a force")
+    pack_loss: float = part("loss in the pack")
+    backstop_loss: float = part("loss in the backstop")
+    damping_loss: float = part("loss in the damping of the armature")
 
 
 class RegimeFamily:
-    """The strobe map of a regime, iterated `firings` times, with the constant `name` as parameter."""
+    """Strobe map of a regime, iterated `firings` times, with the constant `name` as parameter."""
 
     def __init__(self, regime: Regime, name: str, firings: int, tolerance: float) -> None:
         self.regime, self.name, self.firings, self.tolerance = regime, name, firings, tolerance
 
     def __call__(self, state: FloatArray, parameter: float) -> MapValue:
-        """Return the map at one state, m and m/s, and one value of the constant, SI."""
+        """Evaluate the map at a state, m and m/s, and a value of the constant, SI."""
         try:
             regime = self.regime.with_(self.name, parameter)
             problem, end = self._problem(regime, state)
         except InputError as error:
             return MapValue.none(2, str(error))
         hammer = regime.hammer
-        if not usable(hammer, float(state[0]), float(state[1])):
+        if not is_usable(hammer, float(state[0]), float(state[1])):
             return MapValue.none(2, _IN_PACK)
         record = problem.run(end)
         if record.status_name != "ok":
@@ -127,7 +128,7 @@ class RegimeFamily:
         if any(touch.v_in < _GENTLE * problem.scales[1] for touch in passage.of("pack")):
             image = np.array(record.nodes[-1, 1:3])
             jacobian = self._differences(problem, end, state)
-            if not usable(hammer, *image.tolist()):
+            if not is_usable(hammer, *image.tolist()):
                 return MapValue.none(2, _IN_PACK)
         else:
             reached = image_of(regime, state, self.firings, self.tolerance, contacts=False)
@@ -144,14 +145,15 @@ class RegimeFamily:
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
     def margin(self, state: FloatArray, parameter: float) -> float:
-        """Return the signed nearness of a grazing, see `printhammer.chaos.strobe.map.Image`."""
+        """Compute the signed nearness of a grazing, see `printhammer.chaos.strobe.map.Image`."""
         problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         return margin_of(problem, problem.run(end))
 
     def _differences(self, problem: Problem, end: float, state: FloatArray) -> FloatArray | None:
-        """Return the derivative of the map from runs beside.
+        """Compute the derivative of the map by finite differences of runs.
 
-        Where a touch is gentle the contact is too shallow for the differences of its law in the tangent flow.
+        In a gentle touch the contact is too shallow for the finite differences of its law in the tangent
+        flow.
         """
         columns = []
         for move in np.diag(_BESIDE * np.array(problem.scales)):
@@ -169,7 +171,7 @@ class RegimeFamily:
     def _slope(
         self, state: FloatArray, parameter: float, image: FloatArray, growth: float
     ) -> FloatArray | None:
-        # What grows much bends much as well.
+        # A large multiplier comes with a large curvature.
         step = _SPACING * min(1.0, _MUCH / max(growth, 1.0)) * (abs(parameter) or 1.0)
         beside = [self.end_of(state, parameter + sign * step) for sign in (-1.0, 1.0)]
         if beside[0] is not None and beside[1] is not None:
@@ -179,7 +181,7 @@ class RegimeFamily:
         return None if beside[0] is None else np.asarray((image - beside[0]) / step)
 
     def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
-        """Return the state at the end alone; None where the run does not come through."""
+        """Compute the final state alone; None if the run ends early."""
         try:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:
@@ -199,14 +201,14 @@ class RegimeFamily:
         return problem, float(moments[-1])
 
     def course(self, state: FloatArray, parameter: float) -> Course:
-        """Return what an orbit does, given its state at the section."""
+        """Compute the course of an orbit from its state at the section."""
         regime = self.regime.with_(self.name, parameter)
         problem, end = self._problem(regime, state)
         record = problem.run(end)
         increments = increments_of(problem, record)
         forces = np.full(self.firings, np.nan)
         zero = problem.start - regime.phase * regime.period
-        for contact in contacts_of(problem, record, increments, rigid_backstop(regime)):
+        for contact in contacts_of(problem, record, increments, has_rigid_backstop(regime)):
             if contact.surface == "pack" and not contact.initial and contact.peak_force is not None:
                 fired = math.floor((contact.t_in - zero) / regime.period) % self.firings
                 forces[fired] = np.fmax(forces[fired], contact.peak_force)
@@ -215,13 +217,13 @@ class RegimeFamily:
         return Course(states, forces, *(float(total) for total in increments.sum(axis=0)[:5]))
 
 
-def rigid_backstop(regime: Regime) -> bool:
-    """Return whether the velocity jumps at the backstop, so that the strobe map has a kink at a grazing."""
+def has_rigid_backstop(regime: Regime) -> bool:
+    """Whether the velocity jumps at the backstop, so that the strobe map has a kink at a grazing."""
     return regime.hammer.backstop is not None and regime.hammer.backstop.law == "rigid"
 
 
 def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tuple[Touch, ...]:
-    """Return the contacts of an orbit that begin in a record; one open at its end ends in the next period."""
+    """Collect the contacts of an orbit that begin in a record; an open contact ends in the next period."""
     position, front = hammer.position, hammer.front
     touches = []
     open_at_start = {int(row[0]): float(row[3]) for row in record.contacts if row[6]}

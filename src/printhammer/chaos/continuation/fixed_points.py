@@ -1,7 +1,7 @@
-"""Fixed points of a map with a parameter, one at a time, by Newton's method.
+"""Fixed points of a map with a parameter, converged one at a time by Newton's method.
 
 State u and parameter p together are a point z = (u, p). A point is corrected onto the curve of fixed points
-G(u, p) = u in the plane z . row = constant, in scaled variables: u and p each divided by a scale of its own.
+G(u, p) = u in the plane z . row = constant, in scaled variables: u and p each divided by a scale.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from printhammer.support.arrays import FloatArray
 
 _MOST_CORRECTIONS: Final = 12
 _STAGNANT: Final = 1e3
-"""Corrections that no longer shrink are noise of the map if they are below this many precisions."""
+"""Corrections that no longer shrink are noise of the map if they are below this multiple of the precision."""
 
 
 class MapValue(Declared):
@@ -29,12 +29,12 @@ class MapValue(Declared):
     jacobian: FloatArray = part("derivative dG/du, shape (n, n)")
     slope: FloatArray = part("derivative dG/dp, shape (n,)")
     label: Hashable = part(
-        "the kind of motion between the two states, such as its sequence of contacts",
-        more="where it changes along a curve, that is an event",
+        "kind of motion between the two states, such as its sequence of contacts",
+        more="a change along a curve is an event",
         default=(),
     )
-    trouble: str = part("why the map has no value there; empty where it has one", default="")
-    extra: Any = part("whatever else the map wants to keep of this evaluation", default=None, repr=False)
+    trouble: str = part("why the map has no value at this point; empty if it has one", default="")
+    extra: Any = part("further data that the map attaches to this evaluation", default=None, repr=False)
     monodromy: FloatArray | None = part(
         "derivative whose eigenvalues are the multipliers, where the map is larger than that of the orbit",
         default=None,
@@ -43,7 +43,7 @@ class MapValue(Declared):
 
     @classmethod
     def none(cls, count: int, trouble: str) -> MapValue:
-        """Return what stands for a value that does not exist."""
+        """Return the placeholder for a value that does not exist, with the reason."""
         nan = math.nan
         return cls(np.full(count, nan), np.full((count, count), nan), np.full(count, nan), (), trouble)
 
@@ -59,7 +59,7 @@ class Node(Declared):
     parameter: float = part("parameter p")
     tangent: FloatArray = part("direction of the curve in scaled variables, of length 1, shape (n + 1,)")
     arc: float = part("length of the curve from its start in scaled variables, negative before it")
-    value: MapValue = part("the map there")
+    value: MapValue = part("map at the point")
     residual: float = part("largest scaled component of G(u, p) - u")
 
     @property
@@ -77,7 +77,7 @@ class Node(Declared):
 
 
 class Corrector:
-    """Corrects points onto the curves of one map family.
+    """Corrects points onto the curves of one map family by Newton's method.
 
     The components of the state, and last the parameter, are divided by the scales, shape (n + 1,); a point is
     on a curve where its scaled correction is below the precision.
@@ -95,20 +95,20 @@ class Corrector:
             )
 
     def scaled(self, state: npt.ArrayLike, parameter: float) -> FloatArray:
-        """Return a point in scaled variables."""
+        """Scale a point."""
         return np.append(np.asarray(state, dtype=np.float64), parameter) / self.scales
 
     def point(self, node: Node) -> FloatArray:
-        """Return a node in scaled variables."""
+        """Scale the point of a node."""
         return self.scaled(node.state, node.parameter)
 
     def derivative(self, value: MapValue) -> FloatArray:
-        """Return the scaled derivative of G(u, p) - u, shape (n, n + 1)."""
+        """Compute the scaled derivative of G(u, p) - u, shape (n, n + 1)."""
         rows = np.column_stack([value.jacobian - np.eye(self.count), value.slope])
         return np.asarray(rows * self.scales / self.scales[: self.count, np.newaxis])
 
     def correct(self, z: FloatArray, row: FloatArray, *, arc: float = 0.0) -> Node | None:
-        """Return the fixed point near z whose scaled product with `row` is that of z; None if not found.
+        """Find the fixed point near z in the plane through z normal to `row`; None if not found.
 
         The tangent of the node points along `row`.
         """
@@ -140,15 +140,15 @@ class Corrector:
         return None
 
     def at_parameter(self, z: FloatArray) -> Node | None:
-        """Return the fixed point near z at its parameter; None if not found."""
+        """Find the fixed point near z at the parameter of z; None if not found."""
         return self.correct(z, np.eye(self.count + 1)[-1])
 
     def onto(self, z: FloatArray) -> Node | None:
-        """Return the fixed point near z that Newton's method with least corrections finds; None if none."""
+        """Find the fixed point near z by Newton's method with least corrections; None if not found."""
         node = self.at_parameter(z)
         if node is not None:
             return node
-        # At a fold the parameter cannot be held; the smallest correction can be taken instead.
+        # At a fold the parameter cannot be fixed; the smallest correction is well defined.
         for _ in range(_MOST_CORRECTIONS):
             value = self.family(z[:-1] * self.scales[:-1], float(z[-1] * self.scales[-1]))
             if value.trouble:
@@ -174,9 +174,10 @@ class Corrector:
 
 
 def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node | None:
-    """Return the point of a curve at a share, 0 to 1, of the way between two nodes; None if not found.
+    """Find the point of a curve at a fraction of the way between two nodes; None if not found.
 
-    The way is measured along the tangent of the first; the guess is the cubic through both.
+    The way is measured along the tangent of the first node; the initial guess is the cubic through both
+    nodes.
     """
     begin, end = follower.point(here), follower.point(ahead)
     chord = float(np.linalg.norm(end - begin))

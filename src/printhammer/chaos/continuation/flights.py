@@ -1,7 +1,7 @@
-"""Flights from one touch of a surface to the next, and the touches of an orbit that are nearest to a grazing.
+"""Flights from one touch of a surface to the next, and the touches of an orbit nearest to a grazing.
 
-At a touch the displacement is that of the surface; what is left of the state is the velocity, 0 at a grazing.
-A rigid backstop bends the strobe map by a square root there; without the surface close to the touch the
+At a touch the displacement is that of the surface; the remaining state variable is the velocity, 0 at a
+grazing. A rigid backstop gives the strobe map a square root there; without the surface close to the touch the
 motion is smooth on both sides of it.
 """
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from printhammer.chaos.continuation.family import rigid_backstop
+from printhammer.chaos.continuation.family import has_rigid_backstop
 from printhammer.chaos.strobe.map import turns
 from printhammer.derivatives.states import follow
 from printhammer.errors import InputError
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _CURRENT: Final = "under a voltage the current at a touch belongs to the state"
 _CLOSE: Final = 0.01
-"""Part of the period before and after a touch over which the surface is left out."""
+"""Time before and after a touch during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9
 _SPACING: Final = 1e-6
 _ROUNDS: Final = 20
@@ -39,21 +39,21 @@ _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
 
 
 class Flight(Declared):
-    """A motion from a touch to the next, some firings later; the surface is left out close to both."""
+    """A motion from a touch to the next, some firings later, with the surface removed close to both."""
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
-    accelerations: tuple[float, float] = part("at its start and at its end, m/s^2")
+    accelerations: tuple[float, float] = part("acceleration at its start and at its end, m/s^2")
     contacts: tuple[str, ...] = part("surfaces touched on the way")
     surface: float = part("displacement of the surface, m")
     rebound: float = part("coefficient of restitution; NaN without a rigid backstop")
-    trouble: str = part("why there is none; empty where there is")
+    trouble: str = part("why there is no flight; empty if there is one")
 
 
 def fly(
     regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
 ) -> Flight:
-    """Return the flight that leaves a surface at a phase of the drive with a speed, m/s."""
+    """Compute the flight that leaves a surface at a phase of the drive with a speed, m/s."""
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None
@@ -65,7 +65,7 @@ def fly(
     close = _CLOSE * regime.period
     state, jacobian, trouble = np.array([place, speed]), np.eye(2), ""
     contacts: list[str] = []
-    rigid = surface == "backstop" and rigid_backstop(regime)
+    rigid = surface == "backstop" and has_rigid_backstop(regime)
 
     def problem(start: float, *, alone: bool) -> Problem:
         made = Problem(hammer, train, (float(state[0]), float(state[1])), start, tolerance)
@@ -74,7 +74,7 @@ def fly(
         return made
 
     leaving = _acceleration(problem(begin, alone=True), close)
-    # Inside a contact, with a surface that gives way, there is nothing to leave out.
+    # In a contact with a compliant surface the surface is not removed.
     outside = rigid or (leaving < 0.0) == (surface == "pack")
     cuts = [begin, begin + close, end - close, end] if outside else [begin, end]
     for number, (start, stop) in enumerate(itertools.pairwise(cuts)):
@@ -100,7 +100,7 @@ def fly(
 
 
 def _acceleration(problem: Problem, time: float) -> float:
-    """Return the acceleration at the start of a run, m/s^2."""
+    """Compute the acceleration at the start of a run, m/s^2."""
     record = problem.run(problem.start + time)
     (row,) = problem.resample(record, np.array([problem.start]))
     push = row[2] if problem.drive.quantity == "force" else 0.0
@@ -108,16 +108,16 @@ def _acceleration(problem: Problem, time: float) -> float:
 
 
 class NearTouch(Declared):
-    """Where an orbit touches a surface, or turns near it."""
+    """A touch of a surface by an orbit, or a turning point near a surface."""
 
     surface: Surface = part('"pack" or "backstop"')
-    phase: float = part("part of the period from a firing to it")
-    gap: float = part("how far it is from a grazing, in half-widths of the window")
-    speed: float = part("with which it leaves a rigid backstop, m/s; 0 of a turn")
+    phase: float = part("phase of the touch, as a fraction of the period")
+    gap: float = part("distance from a grazing, in half-widths of the window")
+    speed: float = part("speed after the impact on a rigid backstop, m/s; 0 for a turning point")
 
 
 def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> list[NearTouch]:
-    """Return the turns of an orbit, and its impacts on a rigid backstop, those nearest to a grazing first."""
+    """List the turning points and rigid-backstop impacts of an orbit, nearest to a grazing first."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     hammer = regime.hammer
@@ -135,7 +135,7 @@ def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: flo
     for time, x in [*zip(*turns(problem, record)[:2], strict=True), *_still(state, begin, fast)]:
         name, gap = min(((name, abs(x - place) / way) for name, place in known), key=lambda pair: pair[1])
         touches.append(NearTouch(name, phase(float(time)), float(gap), 0.0))
-    if rigid_backstop(regime):
+    if has_rigid_backstop(regime):
         rows = [(float(row[1]), float(row[4])) for row in record.contacts if not row[6]]
         if state[0] == hammer.position and state[1] > 0.0:
             rows = [row for row in rows if row[0] < end - _CLOSE * regime.period]
@@ -158,20 +158,20 @@ def touch_at(
     tolerance: float,
     width: float,
 ) -> tuple[float, float] | None:
-    """Return phase of the touch and value of a constant of the orbit that leaves a surface with a speed.
+    """Find phase of the touch and value of a constant for the orbit that leaves a surface with a speed.
 
     Parameters
     ----------
     regime : Regime
-        With a value of the constant near the solution.
+        Regime with a value of the constant near the solution.
     name : str
-        Of the constant.
+        Name of the constant.
     surface : str
         "pack" or "backstop".
     guess : tuple of float
         Phase of the touch, as a fraction of the period, and value of the constant, SI.
     speed : float
-        Speed with which the orbit leaves a rigid backstop, m/s; 0 of a grazing.
+        Speed with which the orbit leaves a rigid backstop, m/s; 0 for a grazing.
     firings, tolerance
         Firings after which the orbit repeats; error allowed in one step.
     width : float
@@ -180,7 +180,7 @@ def touch_at(
     Returns
     -------
     tuple of float or None
-        None where Newton's method does not converge.
+        None if Newton's method does not converge.
     """
     phase, own = guess
     scales = regime.window.half_widths
@@ -216,11 +216,11 @@ def touch_at(
 def fading(
     regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
 ) -> list[tuple[float, float, float]] | None:
-    """Return phase, speed and value of the constant of an ever slower impact.
+    """Continue an impact to its grazing: phase, speed and value of the constant for falling speeds.
 
-    A branch of orbits is smooth in these variables up to the grazing, which is the last entry; in the state
-    at a section it bends ever more, since the derivative of the strobe map grows as the inverse of the speed.
-    None where the impact does not fade to a grazing nearby. The arguments are those of `touch_at`.
+    A branch of orbits is smooth in these variables up to the grazing, which is the last entry. In the state
+    at a section its curvature diverges, since the derivative of the strobe map grows as the inverse of the
+    speed. None if the impact does not fade to a grazing nearby. The arguments are those of `touch_at`.
     """
     way = [(touch.phase, touch.speed, float(regime.value(name)))]
     speeds = [touch.speed * share for share in _SLOWER] if touch.speed else []

@@ -1,4 +1,4 @@
-"""Ends of branches at a grazing of a rigid backstop.
+"""Continuation of branches to a grazing of a rigid backstop.
 
 Where the impact of an orbit fades, a multiplier grows as the inverse of its speed, and steps along the branch
 shrink with the square of that speed: in the state at a section the grazing is never reached. With phase and
@@ -26,20 +26,20 @@ _GENTLE: Final = 1e-2
 _NEAR: Final = 1e-2
 """Largest distance, in scales of the constant, from an orbit to the grazing in which it ends."""
 _STEEP: Final = 10.0
-"""Least multiplier of an orbit whose impact fades: between it and the grazing none passes the unit circle."""
+"""Smallest multiplier of an orbit whose impact fades: no multiplier crosses the unit circle beyond it."""
 _CLOSER: Final = 0.7
 """Speed, as a fraction of that at the last attempt, at which a grazing is sought again."""
 _ON_CURVE: Final = 1e-5
-"""Largest scaled distance of one of the last orbits from itself after its period."""
+"""Largest scaled closing error of one of the last orbits."""
 
 
 def grazing_end(
     family: RegimeFamily, scales: FloatArray, node: Node, *, impacts: bool = False
 ) -> tuple[list[Node], float] | None:
-    """Return the last orbits of a branch before the grazing in which it ends, and the constant there.
+    """Compute the last orbits of a branch before the grazing in which it ends, and the constant there.
 
-    `node` is the last orbit known; with `impacts` only its impacts count, not its turns. None where there is
-    no grazing close to it.
+    `node` is the last known orbit; with `impacts` its turning points are ignored. None if no grazing is
+    close.
     """
     regime, width = family.regime.with_(family.name, node.parameter), float(scales[-1])
     every = near_touches(regime, node.state, family.firings, family.tolerance)
@@ -64,7 +64,7 @@ def _orbits(
     node: Node,
     way: list[tuple[float, float, float]],
 ) -> list[Node] | None:
-    """Return orbits, each by phase and speed of one impact and the constant, as nodes behind another one."""
+    """Convert orbits, as phase and speed of an impact and constant, to nodes behind another node."""
     nodes = [node]
     place = family.regime.hammer.position
     for phase, speed, value in way:
@@ -81,7 +81,7 @@ def _orbits(
         if residual > _ON_CURVE or not length > 0.0 or chord[-1] == 0.0:
             return None
         tangent = chord / length
-        # Differences of the constant reach over the grazing; along the curve G(u, p) - u = 0 goes on.
+        # Finite differences in the constant cross the grazing; differences along the curve do not.
         along = tangent * scales
         slope = -(image.jacobian - np.eye(2)) @ along[:-1] / along[-1]
         nodes.append(Node(state, value, tangent, last.arc + length, replace(image, slope=slope), residual))
@@ -110,6 +110,6 @@ def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bo
 
 
 def _slowest(node: Node) -> float:
-    """Return the speed of the slowest impact on the backstop, m/s; infinite without one."""
+    """Return the speed of the slowest impact on the backstop, m/s; infinite without impacts."""
     passage: Passage = node.value.extra
     return min((abs(touch.v_in) for touch in passage.of("backstop")), default=math.inf)

@@ -1,8 +1,9 @@
-"""The map of printing regimes: all periodic orbits of a hammer, followed in the rate.
+"""Map of printing regimes: all periodic orbits of a hammer, followed along the rate.
 
-At several rates orbits are searched for, stable and unstable; each that does not lie on a known branch is
+At several rates stable and unstable orbits are searched for; each orbit that lies on no known branch is
 followed in both directions. Period doublings lead to further branches. An island, an orbit that exists only
-between two folds and is joined to nothing, is a closed loop.
+between two folds and is joined to no other branch, is a closed loop. Islands that contain none of the rates
+are missed.
 """
 
 from __future__ import annotations
@@ -42,10 +43,10 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.orbit import Orbit
 
 SEEDS: Final = 6
-"""Number of rates at which orbits are searched for unless told otherwise."""
+"""Default number of rates at which orbits are searched for."""
 
 _TOGETHER: Final = 4
-"""Branches that are followed side by side; a fixed number, so that the result does not depend on threads."""
+"""Number of branches followed in parallel; fixed, so that the result does not depend on threads."""
 _SAME: Final = 1e-4
 """Distance, in half-widths of the window, within which an orbit lies on a branch."""
 
@@ -53,23 +54,21 @@ _SAME: Final = 1e-4
 class Branches(Result):
     """Branches of periodic orbits along the same constant.
 
-    That an orbit lies on none of them does not prove that there is none.
+    The list may be incomplete: further orbits may exist.
     """
 
-    found: tuple[Branch, ...] = part(
-        "the branches, by number of firings, then in the order in which they were found"
-    )
+    found: tuple[Branch, ...] = part("branches, sorted by number of firings, then by order of discovery")
     refused: tuple[str, ...] = part(
-        "why an orbit could not be followed, or a search found nothing, a sentence each", default=()
+        "why an orbit could not be followed, or a search found no orbit, a sentence each", default=()
     )
 
     @property
     def title(self) -> str:
-        """One line that says what the branches are."""
+        """Title of the result, in one line."""
         return f"branches of periodic orbits along {self.found[0].parameter if self.found else ''}"
 
     def summary(self) -> Summary:
-        """Return what branches were found, what happens on them, and why they end."""
+        """Summarise the branches, their events, and the reasons for stopping."""
         parts: list[str | Grid] = []
         for number, branch in enumerate(self, 1):
             parts.append(f"{styled('strong', number)}  {branch.message}")
@@ -88,7 +87,7 @@ class Branches(Result):
 
     @property
     def message(self) -> str:
-        """What was found, in one line."""
+        """Summary of the branches in one line."""
         if not self.found:
             return "; ".join(("no branch was found", *self.refused))
         counts = Counter(branch.firings for branch in self.found)
@@ -101,11 +100,11 @@ class Branches(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the first branch comes from."""
+        """Provenance of the first branch."""
         return self.found[0].provenance if self.found else super().provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return what the branches are, and why they end, for the attributes of the Dataset."""
+        """Return descriptions and reasons for stopping of the branches, for the attributes of the Dataset."""
         first = self.found[0] if self.found else None
         names = ("parameter", "bounds", "phase")
         ends = {f"branch_{i}": branch.message for i, branch in enumerate(self.found)}
@@ -113,21 +112,21 @@ class Branches(Result):
         return {**{name: getattr(first, name, None) for name in names}, **ends, "stable_ranges": stable}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the branches over `branch`, filled up with NaN or -1."""
+        """Return the branches over `branch`, padded with NaN or -1."""
         return stacked(self.found, "branch", Branch)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row for each branch, orbit and firing."""
+        """Convert the branches to a table with a row for each branch, orbit and firing."""
         return branches_table(self.found, self.attributes)
 
 
 class InterruptedBranches(KeyboardInterrupt):
-    """The search for branches was interrupted.
+    """Raised when the search for branches is interrupted.
 
     Attributes
     ----------
     branches : Branches
-        Those that were followed to their ends by then.
+        The branches followed to their ends before the interrupt.
     """
 
     def __init__(self, branches: Branches) -> None:
@@ -149,36 +148,36 @@ def regimes(
     effort: Effort = MAP_EFFORT,
     **_keywords: Unpack[Keywords],
 ) -> Branches:
-    """Return which printing regimes of a hammer exist at which rate, stable or not.
+    """Find the printing regimes of a hammer, stable or not, over a range of rates.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer; or a regime of it, whose own rate plays no part.
+        The hammer, or a regime of it, whose rate is ignored.
     rates : tuple
         Least and largest rate, Hz or text with a unit.
     longest : int, optional
-        Largest number of firings of the orbits that are searched for.
+        Largest orbit period to search for, in firings.
     seeds : int, optional
         Number of rates, evenly spaced inside the range, at which orbits are searched for.
     doublings : int, optional
-        How often the orbits born at period doublings are followed as well.
+        Number of successive period doublings whose new orbits are followed.
     waveform, overlap
-        Of a hammer: as for `printhammer.Regime.of`.
+        For a hammer: as for `printhammer.Regime.of`.
     most
         As for `printhammer.continuation`, for every branch.
 
     Returns
     -------
     Branches
-        With a sentence for each rate at which nothing was found and each orbit that could not be followed.
+        With a sentence for each rate without orbits and each orbit that could not be followed.
 
     Raises
     ------
     InputError
-        An argument is not what is described above.
+        An argument is not as described above.
     InterruptedBranches
-        At an interrupt (Ctrl-C), with the branches that were followed by then.
+        At an interrupt (Ctrl-C), with the branches finished by then.
     """
     try:
         low, high = (read_positive(rate, "Hz", "rates") for rate in rates)
@@ -209,12 +208,12 @@ def regimes(
 def follow_doublings(
     branch: Branch, levels: int, *, most: int = MOST, threads: int | None = None
 ) -> Branches:
-    """Return a branch with those born at its period doublings, theirs, and so on, to so many levels.
+    """Follow the branches born at the period doublings of a branch, recursively to `levels` levels.
 
     Raises
     ------
     InterruptedBranches
-        At an interrupt (Ctrl-C), with the branches that were followed by then.
+        At an interrupt (Ctrl-C), with the branches finished by then.
     """
     steps = Steps(most=most, precision=PRECISION)
     collected = _Collected(branch.bounds, steps, Effort(branch.tolerance, threads))
@@ -235,12 +234,12 @@ class _Collected:
         self.done: set[tuple[int, int]] = set()
 
     def result(self) -> Branches:
-        """Return all, shorter periods first."""
+        """Return all branches, shorter periods first."""
         return Branches(tuple(sorted(self.found, key=lambda branch: branch.firings)), tuple(self.refused))
 
     @contextmanager
     def kept_at_interrupt(self) -> Iterator[None]:
-        """Hand over what was found at an interrupt."""
+        """Raise `InterruptedBranches` with the branches found so far if the block is interrupted."""
         try:
             yield
         except KeyboardInterrupt:
@@ -250,16 +249,16 @@ class _Collected:
         """Follow the orbits that lie on no branch yet."""
         left = list(orbits)
         while left:
-            left = [orbit for orbit in left if not self.known(orbit)]
+            left = [orbit for orbit in left if not self.is_known(orbit)]
             now, left = left[:_TOGETHER], left[_TOGETHER:]
             for orbit, branch in zip(now, self.effort.mapped(self.followed, now, length=1), strict=True):
                 if isinstance(branch, str):
                     self.refused.append(branch)
-                elif not self.known(orbit):
+                elif not self.is_known(orbit):
                     self.found.append(branch)
 
     def followed(self, orbit: Orbit) -> Branch | str:
-        """Return the branch through an orbit, or why there is none."""
+        """Follow the branch through an orbit; return the branch, or the reason for a failure."""
         bounds = read_bounds(orbit.regime, RATE, self.bounds)
         tracer = Tracer(orbit.regime, RATE, bounds, self.effort.alone)
         try:
@@ -267,19 +266,19 @@ class _Collected:
         except InputError as error:
             return f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
 
-    def known(self, orbit: Orbit) -> bool:
-        """Return whether an orbit lies on a branch that was found."""
+    def is_known(self, orbit: Orbit) -> bool:
+        """Whether an orbit lies on a known branch."""
         alike = [branch for branch in self.found if branch.firings == orbit.firings]
-        return any(_on(branch, orbit) for branch in alike)
+        return any(_is_on(branch, orbit) for branch in alike)
 
     def double(self, level: int) -> None:
-        """Follow what is born at the period doublings of all branches found so far."""
+        """Follow the orbits born at the period doublings of all branches found so far."""
         for number, branch in enumerate(list(self.found)):
             for place, event in enumerate(branch.events):
                 if event.kind != "period doubling" or (number, place) in self.done:
                     continue
                 self.done.add((number, place))
-                if any(_ends_at(other, event.value, event.state) for other in self.found):
+                if any(_has_end_at(other, event.value, event.state) for other in self.found):
                     continue
                 try:
                     born = branch.doubled(event, most=self.steps.most, threads=self.effort.threads)
@@ -288,12 +287,12 @@ class _Collected:
                     continue
                 middle = born.orbit(len(born) // 2)
                 alike = [other for other in self.found if other.firings == born.firings]
-                if not middle.ok or not any(_on(other, middle) for other in alike):
+                if not middle.ok or not any(_is_on(other, middle) for other in alike):
                     self.found.append(born)
 
 
 def _state_at(orbit: Orbit, phase: float) -> FloatArray:
-    """Return a state of an orbit at another phase of the period."""
+    """Return the state of an orbit at another phase of the period."""
     if phase == orbit.phase:
         return orbit.section
     motion = orbit.motion()
@@ -301,8 +300,8 @@ def _state_at(orbit: Orbit, phase: float) -> FloatArray:
     return np.array([x[0], v[0]])
 
 
-def _ends_at(branch: Branch, value: float, state: FloatArray) -> bool:
-    """Return whether a branch ends in a period doubling there."""
+def _has_end_at(branch: Branch, value: float, state: FloatArray) -> bool:
+    """Whether a branch ends in a period doubling there."""
     scales = np.append(branch.regime.window.half_widths, (branch.bounds[1] - branch.bounds[0]))
     place = np.append(state, value)
     return any(
@@ -312,13 +311,13 @@ def _ends_at(branch: Branch, value: float, state: FloatArray) -> bool:
     )
 
 
-def _on(branch: Branch, orbit: Orbit) -> bool:
-    """Return whether an orbit lies on a branch."""
-    return any(_at_section(branch, orbit, float(phase)) for phase in np.unique(branch.phases))
+def _is_on(branch: Branch, orbit: Orbit) -> bool:
+    """Whether an orbit lies on a branch."""
+    return any(_is_at_section(branch, orbit, float(phase)) for phase in np.unique(branch.phases))
 
 
-def _at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
-    """Return whether an orbit lies on what a branch has at a section of this phase."""
+def _is_at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
+    """Whether an orbit lies on the pieces of a branch at a section of this phase."""
     value, state = orbit.regime.value(branch.parameter), _state_at(orbit, phase)
     half_widths = branch.regime.window.half_widths
     values = branch.values
@@ -329,7 +328,7 @@ def _at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
     ).at_phase(phase)
     for i in between:
         for k in range(branch.firings):
-            # A rough look at the chord first, then the orbit itself.
+            # The distance from the chord is a quick test; then the orbit itself is compared.
             ends = np.array([[branch.x[j, k], branch.v[j, k]] for j in (i, i + 1)]) / half_widths
             reach = float(np.abs(ends[1] - ends[0]).max()) + 0.05
             if np.abs(ends - state / half_widths).max(axis=1).min() > reach:

@@ -1,4 +1,4 @@
-"""How a branch of periodic orbits is followed and described."""
+"""Branch tracing: continuation of periodic orbits across changes of section; properties of the orbits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from printhammer.chaos.continuation.branch_points import (
     follow_doubled,
     points_of,
 )
-from printhammer.chaos.continuation.family import Passage, RegimeFamily, rigid_backstop
+from printhammer.chaos.continuation.family import Passage, RegimeFamily, has_rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.chaos.continuation.grazing_ends import fades, grazing_end
 from printhammer.chaos.strobe.map import quiet_section, state_later
@@ -31,30 +31,30 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.threads import Progress, mapped
 
 PRECISION: Final = 1e-10
-"""Scaled correction of Newton's method below which an orbit is found; see `arclength`."""
+"""Scaled correction of Newton's method below which an orbit has converged; see `arclength`."""
 
 _PARTS: Final = 5.0
-"""Parts of the range of the constant that count as much as half a width of the strobe window."""
+"""The range of the constant divided by this is its scale, as half-widths are those of the state."""
 _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
 _SHORTER: Final = 1e-6
-"""Scaled distance of an orbit from itself after a part of its firings, up to which it repeats then."""
+"""Scaled closing error after a fraction of the firings, below which an orbit has that shorter period."""
 _DIGITS: Final = ".9g"
 _MOST_SECTIONS: Final = 8
 _SAME_PHASE: Final = 1e-3
-"""Sections that a branch is followed at beyond an end; parts of the period within which they are the same."""
+"""Phases of sections, as fractions of the period, within this distance are the same."""
 _CLEAR: Final = 1e-3
-"""Scaled distance from a lost end from which on an impact at the section disturbs no derivative."""
+"""Scaled distance from a lost end beyond which an impact at the section does not disturb derivatives."""
 _LEAST_CHORD: Final = 1e-5
-"""Least scaled distance of two orbits whose chord is the direction of a branch."""
+"""Smallest scaled distance of two orbits whose chord defines the direction of a branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 
 
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
-    """Return the ends of a range of a constant, SI; InputError where they are not two ascending numbers."""
+    """Parse the ends of a range of a constant, SI; InputError unless they are two ascending numbers."""
     unit = regime.quantity(parameter).si
     try:
         low, high = bounds
@@ -68,7 +68,7 @@ def read_bounds(
 
 @dataclass
 class Tracer:
-    """What all branches along one constant of one regime have in common."""
+    """Tracer of all branches along one constant of one regime."""
 
     regime: Regime
     parameter: str
@@ -80,13 +80,13 @@ class Tracer:
         self.scales = np.append(self.regime.window.half_widths, part)
 
     def family(self, firings: int) -> RegimeFamily:
-        """Return the strobe map over so many firings."""
+        """Return the strobe map over a number of firings."""
         return RegimeFamily(self.regime, self.parameter, firings, self.effort.tolerance)
 
     def branch(
         self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None = None
     ) -> Branch:
-        """Return the branch through an orbit."""
+        """Trace the branch through an orbit."""
         family = self.family(firings)
         curve = follow(
             family,
@@ -106,11 +106,11 @@ class Tracer:
     def resumed(
         self, family: RegimeFamily, nodes: list[Node], stop: Stop, steps: Steps, *, backward: bool
     ) -> tuple[list[tuple[RegimeFamily, list[Node]]], Stop]:
-        """Return how a branch goes on from an end at other sections, piece by piece, and its new stop.
+        """Continue a branch past a section change; return the new pieces and the reason for stopping.
 
         A branch is lost where an impact meets its section. Each piece begins or ends with the last orbit of
-        that before it, looked at where it is farthest from its contacts. Orbits too close to the end are
-        removed from `nodes`.
+        the piece before it, at the phase where that is farthest from its contacts. Orbits too close to the
+        end are removed from `nodes`.
         """
         pieces: list[tuple[RegimeFamily, list[Node]]] = []
         while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
@@ -151,7 +151,7 @@ class Tracer:
         return pieces, stop
 
     def before_end(self, nodes: list[Node]) -> list[Node]:
-        """Return the orbits of a piece from its end on without those so close to it that it disturbs them."""
+        """Remove the orbits of a piece that lie so close to its end that the impact disturbs them."""
         places = np.array([np.append(node.state, node.parameter) for node in nodes]) / self.scales
         away = np.linalg.norm(places - places[0], axis=1) > _CLEAR
         return nodes[min(int(np.argmax(away)) if away.any() else 0, len(nodes) - 2) :]
@@ -159,11 +159,11 @@ class Tracer:
     def way_at(
         self, family: RegimeFamily, nodes: list[Node], quiet: tuple[Regime, FloatArray]
     ) -> FloatArray | None:
-        """Return the direction, in scaled variables, in which a branch goes on at another section.
+        """Compute the direction, in scaled variables, in which a branch continues at another section.
 
-        `nodes` begin with the last orbit, which is at the state `quiet` there. It is that of the chord from
-        an orbit before it: a contact on the section leaves no derivative there, and at a fold the constant
-        alone is no direction. None where no orbit is far enough away, or one does not come through.
+        `nodes` begin with the last orbit, which is at the state `quiet` there. The direction is that of the
+        chord from an earlier orbit: a contact on the section leaves no derivative there, and at a fold the
+        sign of the constant is ambiguous. None if no orbit is far enough away, or if a run ends early.
         """
         last = nodes[0]
         end = np.append(quiet[1], last.parameter) / self.scales
@@ -179,13 +179,13 @@ class Tracer:
         return None
 
     def at_phase(self, phase: float) -> Tracer:
-        """Return the same at another section."""
+        """Return a copy at another section."""
         same = phase == self.regime.phase
         return self if same else replace(self, regime=replace(self.regime, phase=phase))
 
     def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
-        """Return a curve that ends near a grazing of a rigid backstop continued up to it."""
-        if not rigid_backstop(self.regime):
+        """Continue a curve that ends near a grazing of a rigid backstop up to the grazing."""
+        if not has_rigid_backstop(self.regime):
             return curve
         nodes, stops = curve.nodes, list(curve.stops)
         for end, sign in ((0, -1.0), (-1, 1.0)):
@@ -203,7 +203,7 @@ class Tracer:
         return Curve(nodes, (stops[0], stops[1]))
 
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Return the branch born at a period doubling of an orbit of so many firings."""
+        """Follow the branch born at a period doubling of an orbit of `firings` firings."""
         if event.phase != self.regime.phase:
             return self.at_phase(event.phase).doubled(firings, event, most, threads)
         family = self.family(2 * firings)
@@ -229,21 +229,21 @@ class Tracer:
         return self.described([(family, nodes)], (born, curve.stops[1]), steps, threads)
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
-        """Return the orbit near a state at one value of the constant; None if there is none."""
+        """Find the orbit near a state at one value of the constant; None if not found."""
         follower = Corrector(self.family(firings), self.scales, PRECISION)
         node = follower.at_parameter(follower.scaled(state, value))
         return None if node is None else np.asarray(node.state)
 
     def at_value(self, value: float) -> str:
-        """Return a value of the constant with name and unit."""
+        """Format a value of the constant with name and unit."""
         return f"{self.parameter} = {value:{_DIGITS}} {self.regime.quantity(self.parameter).si}"
 
     def watch(self, firings: int, steps: Steps, effort: Effort) -> Any:
-        """Return what is asked between any two nodes: whether the branch ends there."""
+        """Build the callback that decides between two nodes whether the branch ends there."""
         half, whole = None, self.family(firings)
         if firings % 2 == 0:
             half = Corrector(self.family(firings // 2), self.scales, steps.precision)
-        rigid = rigid_backstop(self.regime)
+        rigid = has_rigid_backstop(self.regime)
         parts = [self.family(firings // k) for k in range(2, firings + 1) if firings % k == 0]
         taken, fading = 0, fades(whole, self.scales)
 
@@ -258,19 +258,19 @@ class Tracer:
                 return Stop(GRAZING, ahead.parameter, ahead.state, _AT_GRAZING)
             born = None if half is None else birth_of(half, here, ahead)
             if born is None:
-                shorter = [part for part in parts if self.repeats(part, ahead)]
+                shorter = [part for part in parts if self.is_repeat(part, ahead)]
                 return self.merged(shorter, here, ahead) if shorter else None
             if born.node is None:
                 return born
-            # What the orbit does there is that of its whole period.
+            # A stop over half the period is that of the orbit's whole period.
             value = whole(born.node.state, born.node.parameter)
             last = replace(born.node, value=value) if not value.trouble else here
             return replace(born, node=last)
 
         return watched
 
-    def repeats(self, part: RegimeFamily, node: Node) -> bool:
-        """Return whether an orbit repeats after the firings of a part of it already."""
+    def is_repeat(self, part: RegimeFamily, node: Node) -> bool:
+        """Whether an orbit already repeats after a fraction of its firings."""
         end = part.end_of(node.state, node.parameter)
         return end is not None and bool(np.abs((end - node.state) / self.scales[:2]).max() < _SHORTER)
 
@@ -299,9 +299,9 @@ class Tracer:
         steps: Steps,
         threads: int | None,
     ) -> Branch:
-        """Return a branch with all about its orbits, of pieces at sections of their own."""
+        """Build the branch, with the properties of all orbits, from pieces at their own sections."""
         family = pieces[0][0]
-        # A piece begins with the orbit with which the one before it ends.
+        # A piece begins with the last orbit of the piece before it.
         owned = [
             (own, node) for k, (own, part) in enumerate(pieces) for node in (part if k == 0 else part[1:])
         ]

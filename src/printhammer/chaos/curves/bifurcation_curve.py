@@ -1,8 +1,8 @@
-"""The curve of a bifurcation in the plane of two constants, from an event of a branch or a saved curve.
+"""Bifurcation curves in the plane of two constants, from an event of a branch or a saved curve.
 
-BifurcationCurve: where in the plane of two constants an orbit bifurcates, and where two things meet.
+`BifurcationCurve` holds the points at which an orbit bifurcates, and the points of codimension two.
 
-To what trains from rest settle over the plane of two constants, in the lanes of an ensemble.
+`settled_plane` computes the periods of trains from rest over the plane, as an ensemble.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ class BifurcationCurve(Result, rows="point"):
 
     regime: Regime = part("hammer and periodic drive at the start")
     kind: str = scalar("", '"fold", "period doubling", "Neimark-Sacker" or "grazing"')
-    surface: str = scalar("", 'of a grazing: "pack" or "backstop"; else empty')
-    names: tuple[str, str] = scalar("", "the two constants")
-    units: tuple[str, str] = scalar("", "their SI units")
-    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "their ranges")
+    surface: str = scalar("", 'surface of a grazing: "pack" or "backstop"; else empty')
+    names: tuple[str, str] = scalar("", "names of the two constants")
+    units: tuple[str, str] = scalar("", "SI units of the constants")
+    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "ranges of the constants")
     firings: int = scalar("1", "number of firings after which the orbits repeat")
     tolerance: float = part("tolerance of the integration")
     first: FloatArray = column("SI", "the first constant", "point")
@@ -109,11 +109,11 @@ class BifurcationCurve(Result, rows="point"):
 
     @property
     def title(self) -> str:
-        """One line that says what the curve is."""
+        """Title of the result, in one line."""
         return f"{self.kind} of period-{self.firings} orbits of {self.regime.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return what the curve is, and its points of codimension two."""
+        """Summarise the curve and its points of codimension two."""
         if not self.points:
             return Summary([self.message])
         first, second = (unit if unit != "1" else "" for unit in self.units)
@@ -128,14 +128,14 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
     def limits(self) -> BoolArray:
-        """Whether the other multiplier lies inside the unit circle, so that stability is lost, shape (N,)."""
+        """Mask of the points where stability is lost, the other multiplier in the unit circle, (N,)."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)
 
     @property
     def criticality(self) -> tuple[str, ...]:
-        """Of a period doubling at each point: "supercritical", "subcritical" or, not known, ""."""
+        """Criticality of a period doubling at each point: "supercritical", "subcritical" or "" if unknown."""
         if self.kind != "period doubling":
             return ("",) * len(self)
         words = {1.0: "supercritical", -1.0: "subcritical"}
@@ -143,7 +143,7 @@ class BifurcationCurve(Result, rows="point"):
 
     @property
     def message(self) -> str:
-        """What the curve is, what happens on it, and why it ends, in one line."""
+        """Description of the curve, its special points, and the reasons for stopping, in one line."""
         count = len(self)
         spans = " and ".join(
             f"{name} from {values.min():.9g} to {values.max():.9g} {unit}".removesuffix(" 1")
@@ -163,7 +163,7 @@ class BifurcationCurve(Result, rows="point"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the curve comes from."""
+        """Provenance of the curve."""
         regime = self.regime
         return provenance(
             hammer=regime.hammer,
@@ -174,14 +174,14 @@ class BifurcationCurve(Result, rows="point"):
         )
 
     def at(self, name: str, value: float | str) -> list[tuple[float, float]]:
-        """Return both constants where the curve passes a value of one of them, solved for anew.
+        """Find both constants where the curve passes a value of one of them.
 
         Parameters
         ----------
         name : str
-            One of the two constants.
+            Name of one of the two constants.
         value : float or str
-            SI or text with a unit.
+            Value in SI, or text with a unit.
         """
         if name not in self.names:
             raise InputError.of("name", name, f"{self.names[0]} or {self.names[1]}")
@@ -190,7 +190,7 @@ class BifurcationCurve(Result, rows="point"):
         return [(place.first, place.second) for place in self.crossings(which, level)]
 
     def notes(self) -> dict[str, Any]:
-        """Return how the curve ends, and the points of codimension two, for the attributes of the Dataset."""
+        """Return reasons for stopping and points of codimension two, for the attributes of the Dataset."""
         first, last = (stop.sentence for stop in self.stops)
         return {
             "first_end": first,
@@ -222,7 +222,7 @@ class BifurcationCurve(Result, rows="point"):
 
 
 GRID_TOLERANCE: Final = 1e-9
-"""Tolerance of the trains."""
+"""Tolerance of the trains from rest."""
 
 _FIRINGS: Final = 300
 _JUDGED: Final = 64
@@ -235,10 +235,10 @@ def settled_plane(
     grid: tuple[int, int],
     threads: int | None,
 ) -> tuple[tuple[FloatArray, FloatArray], IntArray]:
-    """Return the values of both constants, and after how many firings trains from rest repeat there.
+    """Compute the periods, in firings, of trains from rest over a grid of both constants.
 
-    0 where one does not repeat, -1 where its run stopped; shape (n, m) for m values of the first constant and
-    n of the second. InputError where the numbers of values are negative.
+    Returns the values of the first constant, (m,), of the second, (n,), and the periods, (n, m): 0 without a
+    period, -1 where the run ended early. InputError if the numbers of values are negative.
     """
     if min(grid) < 0:
         raise InputError.of("grid", grid, "two numbers of values, not negative")
@@ -258,13 +258,13 @@ def settled_plane(
 
 
 def _period(states: States, train: Train) -> int:
-    """Return after how many firings a train repeats, 0 where that is not known."""
+    """Return the period of a train in firings, 0 if unknown."""
     ends_at = states.settled(train, states.distances(train))
     return 0 if ends_at is None or ends_at.period is None else ends_at.period
 
 
 MOST: Final = 200
-"""Number of steps of a curve in either direction unless told otherwise."""
+"""Default maximum number of steps of a curve in each direction."""
 
 
 def bifurcation_curve(
@@ -284,32 +284,33 @@ def bifurcation_curve(
     Parameters
     ----------
     source : Branch, Reopened or path
-        A branch from `printhammer.continuation`; or a file with one, with several, of which the first counts,
-        or with a curve, which is then followed anew from one of its points. Its constant is the first one.
+        A branch from `printhammer.continuation`, or a file. Of a file with several branches the first is
+        used; a curve in a file is followed anew from one of its points. The constant of the source is the
+        first constant.
     second : str
         The second constant, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
         Its least and largest value, SI or text with a unit.
     event : BranchEvent, int or str, optional
-        Where the curve begins: an event of the branch, or its number, from 0 on; a kind, of which the first
-        event counts; or "first" or "last", where the branch ends in a grazing. By default the first event
-        that can be followed. Of a curve in a file the number of a point, "first" or "last".
+        Start of the curve: an event of the branch, or its index, from 0 on; a kind, for its first event; or
+        "first" or "last", for a branch that ends in a grazing. By default the first event that can be
+        followed. For a curve in a file the index of a point, "first" or "last".
     regime : Regime, optional
-        Of a file: the hammer and how it is fired.
+        For a file: the hammer and how it is fired.
     first : tuple, optional
         Least and largest value of the first constant, by default those of the branch.
     grid : tuple of int, optional
-        Numbers of values of the two constants at which trains from rest are judged; by default none.
+        Numbers of values of the two constants at which trains from rest are judged (default: none).
     most : int, optional
-        Number of steps in either direction.
+        Maximum number of steps in each direction.
     threads : int, optional
-        By default as many as there are cores; the curve does not depend on it.
+        Number of threads; by default the number of cores. The curve does not depend on it.
 
     Returns
     -------
     BifurcationCurve
-        Every point is met by Newton's method to a correction of 1e-12 of the scales, or to the noise of the
-        map where that is larger.
+        Every point is converged by Newton's method to a correction of 1e-12 of the scales, or to the noise of
+        the map where that is larger.
     """
     start = start_of(source, event, regime)
     unit = start.regime.quantity(start.first).si
@@ -343,7 +344,7 @@ def _nearest(traced: Traced, value: float) -> int:
 
 
 def curve_of(plane: Plane, traced: Traced, grid: tuple[int, int], threads: int | None) -> BifurcationCurve:
-    """Return a curve that was followed as a result."""
+    """Build the result from a traced curve."""
     places = traced.places
     coefficients, sides = traced.coefficients, np.zeros((len(places), MOST_PERIODS + 1), np.int64)
     if traced.kind == GRAZING and traced.surface == "backstop":

@@ -1,4 +1,4 @@
-"""Points of codimension two on a curve of bifurcations, at which two things happen at once.
+"""Points of codimension two on a bifurcation curve, at which two degeneracies coincide.
 
 | kind | on | what vanishes |
 |---|---|---|
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from printhammer.chaos.curves.systems import Place, Plane
 
 RESONANCES: Final = 3
-"""Most passages of a grazing orbit that are tested for a resonance."""
+"""Largest number of passages of a grazing orbit that is tested for a resonance."""
 
 _LEVEL: Final = 1e-3
-"""Component of a tangent of length 1 below which a curve stands still in a constant."""
+"""Component of a unit tangent below which a curve is stationary in a constant."""
 _VANISHES: Final = 0.1
-"""Component of a tangent at a cusp, as a fraction of that beside it, below which it vanishes there."""
+"""Component of a tangent at a cusp, relative to that beside it, below which it vanishes."""
 _ROUNDS: Final = 20
 _MOVE: Final = 1e-6
 _PRECISION: Final = 1e-11
@@ -51,25 +51,27 @@ _NOISE: Final = 1e-8
 
 
 class CodimensionTwo(Declared):
-    """A point of a curve at which a second thing happens."""
+    """A point of codimension two on a bifurcation curve."""
 
-    kind: str = part('such as "cusp", "fold-flip" or "resonant grazing"')
-    first: float = part("the first constant, SI")
-    second: float = part("the second constant, SI")
+    kind: str = part(
+        'such as "cusp", "fold-flip" or "kind, such as "cusp", "fold-flip" or "resonant grazing""'
+    )
+    first: float = part("value of the first constant, SI")
+    second: float = part("value of the second constant, SI")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
     phase: float = part("part of the period from the firing to the section")
-    multipliers: npt.NDArray[np.complex128] = part("of the orbit there, shape (2,)")
-    after: int = part("number of the point of the curve that it follows; -1 before the first")
-    passages: int = part("of a resonant grazing: n; else 1", default=1)
+    multipliers: npt.NDArray[np.complex128] = part("multipliers of the orbit, shape (2,)")
+    after: int = part("index of the point of the curve before it; -1 before the first")
+    passages: int = part("n of a resonant grazing; else 1", default=1)
 
     @property
     def message(self) -> str:
-        """What happens, in a few words."""
+        """The event in a few words."""
         return f"{self.kind} of {self.passages} passages" if self.passages > 1 else self.kind
 
 
 def point_of(kind: str, place: Place, after: int, passages: int = 1) -> CodimensionTwo:
-    """Return a place of a curve as a point of codimension two."""
+    """Build the point of codimension two at a place of a curve."""
     multipliers = place.multipliers
     return CodimensionTwo(
         kind, place.first, place.second, place.state, place.phase, multipliers, after, passages
@@ -96,7 +98,7 @@ def _along(direction: FloatArray) -> Callable[[Node], float]:
 
 
 def _tests(kind: str, rigid: bool) -> dict[tuple[str, int], Callable[[Node], float]]:
-    """Return what vanishes at points of codimension two, by their kind and number of passages."""
+    """Return the test functions of the points of codimension two, by kind and number of passages."""
     if kind == "fold":
         return {
             ("fold-flip", 1): lambda node: _determinant(node) + 1.0,
@@ -130,9 +132,10 @@ def points_along(
     coefficients: FloatArray,
     coefficient: Callable[[Place], float],
 ) -> list[CodimensionTwo]:
-    """Return the points of codimension two on a curve, in order.
+    """Locate the points of codimension two on a curve, in order.
 
-    `coefficients` are those of the normal form of a period doubling at the nodes; `coefficient` returns one.
+    `coefficients` are the normal-form coefficients of a period doubling at the nodes; `coefficient` computes
+    one.
     """
     points: list[CodimensionTwo] = []
     tests = _tests(kind, rigid)
@@ -142,7 +145,7 @@ def points_along(
             for (name, passages), test in tests.items()
             if test(here) * test(ahead) < 0.0 and max(abs(test(here)), abs(test(ahead))) > _NOISE
         ]
-        # What one passage does, several do as well.
+        # The effect of one passage is also that of several passages.
         first = {name: passages for name, passages, _ in reversed(named)}
         for name, passages, test in named:
             if passages == first[name]:
@@ -150,10 +153,10 @@ def points_along(
                 place = place_of(node if node is not None else (here, ahead)[int(share > 0.5)])
                 points.append(point_of(name, place, after, passages))
         if kind == "fold" and float(here.tangent[-2:] @ ahead.tangent[-2:]) < 0.0:
-            # The curve turns back in the plane, whatever the direction in which the cusp points.
+            # The curve turns back in the plane, whatever the orientation of the cusp.
             turn = ahead.tangent[-2:] - here.tangent[-2:]
             _, node = zero_between(follower, here, ahead, _along(turn))
-            if node is not None and _stands_still(node, here, ahead):
+            if node is not None and _is_stationary(node, here, ahead):
                 points.append(point_of("cusp", place_of(node), after))
         pair = coefficients[after : after + 2]
         if kind == "period doubling" and pair[0] * pair[1] < 0.0:
@@ -166,11 +169,11 @@ def points_along(
     return points
 
 
-def _stands_still(node: Node, here: Node, ahead: Node) -> bool:
-    """Return whether a curve stands still in both constants at a node between two others.
+def _is_stationary(node: Node, here: Node, ahead: Node) -> bool:
+    """Whether a curve is stationary in both constants at a node between two others.
 
-    Each component of the tangent is compared with itself beside the node: a constant with a wide range has a
-    small one everywhere.
+    Each component of the tangent is compared with its value beside the node, since a constant with a wide
+    range has small components everywhere.
     """
     components = np.abs([each.tangent[-2:] for each in (node, here, ahead)])
     beside = np.maximum(_VANISHES * components[1:].max(axis=0), _NOISE)
@@ -183,18 +186,18 @@ def meeting(
     guess: FloatArray,
     test: Callable[[FloatArray], float],
 ) -> Place | None:
-    """Return the grazing near a guess at which a function of the derivative is zero; None if there is none.
+    """Find the grazing near a guess at which a test function of the derivative vanishes; None if not found.
 
     Parameters
     ----------
     plane : Plane
-        With the firings after which the grazing orbit repeats.
+        Plane of the two constants, with the period of the grazing orbit in firings.
     surface : str
-        Which is touched.
+        Surface that is touched.
     guess : array, shape (3,)
-        Phase of the touch, first and second constant.
+        Initial guess: phase of the touch, first and second constant.
     test : callable
-        Of the derivative of the strobe map without the touch.
+        Test function of the derivative of the strobe map without the touch.
     """
     system = GrazingSystem(plane, surface)
     z = np.asarray(guess, dtype=np.float64) / system.scales
@@ -233,5 +236,5 @@ def _missed(
 
 
 def resonance_test(passages: int) -> Callable[[FloatArray], float]:
-    """Return what vanishes at a resonant grazing of so many passages."""
+    """Return the test function of a resonant grazing of a number of passages."""
     return lambda jacobian: float(np.linalg.matrix_power(jacobian, passages)[0, 1])

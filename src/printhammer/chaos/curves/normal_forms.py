@@ -31,18 +31,18 @@ if TYPE_CHECKING:
     from printhammer.chaos.curves.systems import Place, Plane
 
 MOST_PERIODS: Final = 4
-"""Most passages of a grazing after which an orbit with one touch is looked for."""
+"""Largest number of passages of a grazing for which an orbit with one touch is tested."""
 
 _SPACINGS: Final = (2e-3, 2e-4, 5e-5)
 _AGREE: Final = 0.05
-"""Relative difference of coefficients from one spacing and from its half, within which they count."""
+"""Relative difference of coefficients from a spacing and from half of it, within which they are accepted."""
 _DOUBLES: Final = 1e-4
-"""Distance of a multiplier from -1 within which it is known well enough."""
+"""Distance of a multiplier from -1 within which the doubling is accurate enough."""
 _FEW: Final = 1e-9
 
 
 def doubling_coefficient(plane: Plane, place: Place) -> float:
-    """Return c of an orbit that doubles its period; NaN where differences do not tell."""
+    """Compute c of an orbit that doubles its period; NaN if finite differences are inconclusive."""
     regime = replace(plane.at(place.first, place.second), phase=place.phase)
     quiet = quiet_section(regime, place.state, plane.firings, plane.tolerance)
     if quiet is None:
@@ -88,7 +88,7 @@ def doubling_coefficient(plane: Plane, place: Place) -> float:
 
 
 def root_coefficient(plane: Plane, place: Place) -> float:
-    """Return (1 + e) sqrt(2 a), m^(1/2)/s: the velocity by the root of the depth that a touch adds."""
+    """Compute (1 + e) sqrt(2 a), m^(1/2)/s: the velocity added by a touch, per square root of its depth."""
     try:
         restitution = plane.at(place.first, place.second).value("backstop.restitution")
     except InputError:
@@ -97,13 +97,13 @@ def root_coefficient(plane: Plane, place: Place) -> float:
 
 
 def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
-    """Return on which side of a grazing of a rigid backstop orbits exist, as the first constant goes.
+    """Determine the sides of a grazing of a rigid backstop, along the first constant, on which orbits exist.
 
     Returns
     -------
     tuple of int
-        Of the orbit without the touch, then of those with one touch in 1, 2, 3 and 4 of its periods: 1 for
-        larger values of the constant, -1 for smaller ones, 0 where there is none on either side.
+        Side of the orbit without the touch, then of the orbits with one touch in 1, 2, 3 and 4 of its
+        periods: 1 for larger values of the constant, -1 for smaller values, 0 for neither side.
     """
     matrix, root = place.jacobian, root_coefficient(plane, place)
     if place.slope is None or not math.isfinite(root):
@@ -115,10 +115,9 @@ def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
 
 
 def _touching_side(matrix: FloatArray, slope: FloatArray, kick: FloatArray, periods: int) -> int:
-    """Return on which side an orbit with one touch in so many periods exists, see `grazing_sides`.
+    """Determine the side on which an orbit with one touch in `periods` periods exists.
 
-    In units of the root of the depth, u_0 = (0, v) and the move of the constant solve
-    u_0 = A^n (u_0 + kick) + (A^(n - 1) + ... + I) slope move; on the way the armature stays off the surface.
+    In units of the square root of the depth, u_0 = (0, v) and the shift of the constant solve
     """
     power = np.linalg.matrix_power(matrix, periods)
     summed = sum((np.linalg.matrix_power(matrix, k) for k in range(periods)), np.zeros((2, 2))) @ slope

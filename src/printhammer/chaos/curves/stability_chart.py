@@ -1,11 +1,11 @@
-"""The designer's chart: where in the plane of two constants an orbit is stable, and what ends it.
+"""Stability chart: the region of two constants where an orbit is stable, and its boundaries.
 
 An orbit loses its stability at a fold, a period doubling or a Neimark-Sacker point, each a curve in the plane
-(`printhammer.chaos.curves.systems`). Beside the curves the chart shows to what a train from rest settles, on
-a grid; a stable orbit need not be what is reached from there.
+(`printhammer.chaos.curves.systems`). The chart also shows, on a grid, the periods that trains from rest
+settle to; a stable orbit need not be reached from rest.
 
-Curves are begun where the branch along the first constant meets a limit, and where branches along the second
-one do, which begin at orbits of the former. A closed curve that none of them meets is not found.
+Curves start where the branch along the first constant meets a stability limit, and where branches along the
+second constant, from orbits of the former, do. A closed curve that none of these branches meets is missed.
 """
 
 from __future__ import annotations
@@ -45,21 +45,21 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch import BranchEvent
 
 GRID: Final = (48, 32)
-"""Numbers of values of the two constants at which trains from rest are judged."""
+"""Default numbers of values of the two constants at which trains from rest are judged."""
 
 _ACROSS: Final = (0.02, 0.98)
-"""Places in the range of the first constant at which branches along the second one begin."""
+"""Fractions of the range of the first constant at which branches along the second constant start."""
 
 
 class StabilityChart(Result):
-    """Where in the plane of two constants an orbit is stable, and what ends it."""
+    """Region in the plane of two constants where an orbit is stable, and its boundaries."""
 
     regime: Regime = part("hammer and periodic drive of the branch it came from")
     names: tuple[str, str] = scalar("", "the two constants")
     units: tuple[str, str] = scalar("", "their SI units")
     bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "their ranges")
     firings: int = scalar("1", "number of firings after which the orbit repeats")
-    curves: tuple[BifurcationCurve, ...] = part("on which it loses its stability", repr=False)
+    curves: tuple[BifurcationCurve, ...] = part("curves on which the orbit loses its stability", repr=False)
     grid: tuple[FloatArray, FloatArray] = part(
         "values of the two constants, shapes (m,) and (n,), at which trains from rest were judged", repr=False
     )
@@ -77,17 +77,17 @@ class StabilityChart(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the chart is."""
+        """Title of the result, in one line."""
         return f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return what was found, in one line."""
+        """Summarise the chart in one line."""
         return Summary([self.message])
 
     @property
     @derived("", "what was found")
     def message(self) -> str:
-        """What was found, in one line."""
+        """Summary of the chart in one line."""
         kinds = [curve.kind for curve in self.curves]
         counts = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
         share = float(np.mean(self.settled == self.firings)) if self.settled.size else 0.0
@@ -104,7 +104,7 @@ class StabilityChart(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the chart comes from; the tolerance is that of the trains from rest."""
+        """Provenance of the chart; the tolerance is that of the trains from rest."""
         regime, waveform = self.regime, self.regime.fired
         return provenance(
             hammer=regime.hammer,
@@ -150,30 +150,31 @@ def stability_chart(
     effort: Effort = DEFAULT,
     **firing: Unpack[FiredAtFixedTolerance],
 ) -> StabilityChart:
-    """Follow the limits of stability of a branch through a second constant.
+    """Compute the stability chart of a branch in the plane of its constant and a second constant.
 
     Parameters
     ----------
     branch : Branch, Regime or Hammer
-        From `printhammer.continuation`, usually in the rate; its constant is the first one, in its bounds. Of
-        a regime, or of a hammer with all that `firing` says of it, the branch along `first` is followed.
+        Branch from `printhammer.continuation`, usually along the rate; its constant is the first constant, in
+        its bounds. For a regime, or a hammer with the keywords `firing`, the branch along `first` is
+        computed.
     second : str
         The second constant, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
-        Its least and largest value, SI or text with a unit.
+        Least and largest value of the second constant, SI or text with a unit.
     first : tuple, optional
-        Of a regime or hammer: the first constant, its least and its largest value.
+        For a regime or hammer: the first constant, its least and its largest value.
     grid : tuple of int, optional
         Numbers of values of the two constants at which trains from rest are judged; (0, 0) for none.
     most : int, optional
-        Number of steps of a curve in either direction.
+        Maximum number of steps of a curve in each direction.
 
     Returns
     -------
     StabilityChart
-        With the curves on which the branch's orbit loses its stability, one through each limit that lies on
-        no other curve, and what trains from rest settle to. Limits are sought along the branch, and along the
-        second constant from two of its orbits; a curve that meets neither is not in the chart.
+        Curves on which the orbit of the branch loses its stability, one through each limit that lies on no
+        other curve, and the periods of trains from rest. Limits are sought along the branch, and along the
+        second constant from two of its orbits; a curve that meets neither is missed.
     """
     if isinstance(branch, Branch):
         if first is not None or firing:
@@ -215,7 +216,7 @@ def stability_chart(
 
 
 def _limits(branch: Branch) -> list[BranchEvent]:
-    """Return the events at which a branch loses its stability: the other multiplier is in the unit circle."""
+    """List the events at which a branch loses its stability: the other multiplier is in the unit circle."""
     lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
     return [event for event in lost if event.kind in TESTS]
 
@@ -230,10 +231,10 @@ class _Chart:
         self.value = branch.regime.value(second)
 
     def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
-        """Return values of the first constant, and the limits that branches along the second meet there."""
+        """Find the limits of branches along the second constant; return their first constants, and limits."""
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
-        # A stable orbit where there is one: at its limits stability is lost.
+        # A stable orbit is preferred: stability is lost at its limits.
         among = np.flatnonzero(branch.stable) if branch.stable.any() else np.arange(len(values))
         aims = [low + place * (high - low) for place in _ACROSS]
         numbers = dict.fromkeys(int(among[np.argmin(np.abs(values[among] - aim))]) for aim in aims)
@@ -255,36 +256,36 @@ class _Chart:
         return effort.quiet.mapped(along, list(numbers), length=1)
 
     def second(self, start: Start) -> float:
-        """Return the second constant at a start."""
+        """Return the value of the second constant at a start."""
         return self.value if start.other is None else start.other
 
     def curves(self, starts: list[Start], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
-        """Return a curve through each start, but those that lie on one already."""
+        """Trace a curve through each start that lies on no earlier curve."""
         curves: list[BifurcationCurve] = []
         refused: list[str] = []
         left = starts
         while left:
-            left = [start for start in left if not any(self.on(curve, start) for curve in curves)]
-            # As many at once whatever the number of threads, so that the outcome is the same.
+            left = [start for start in left if not any(self.is_on(curve, start) for curve in curves)]
+            # The batch size is independent of the number of threads, so that the outcome is, too.
             now, left = left[:2], left[2:]
             for start, curve in zip(now, effort.quiet.mapped(self.curve, now, length=1), strict=True):
                 if isinstance(curve, str):
                     refused.append(curve)
-                elif not any(self.on(other, start) for other in curves):
+                elif not any(self.is_on(other, start) for other in curves):
                     curves.append(curve)
             effort.report(len(starts) - len(left), len(starts))
         return curves, refused
 
     def curve(self, start: Start) -> BifurcationCurve | str:
-        """Return the curve through an event of the branch, or why there is none."""
+        """Trace the curve through an event of the branch; return it, or the reason for a failure."""
         try:
             traced = CurveTracer(self.plane, start.kind, self.steps).trace(start, self.second(start), 1)
         except InputError as error:
             return str(error)
         return curve_of(self.plane, traced, (0, 0), 1)
 
-    def on(self, curve: BifurcationCurve, start: Start) -> bool:
-        """Return whether an event of the branch lies on a curve, between two of its points."""
+    def is_on(self, curve: BifurcationCurve, start: Start) -> bool:
+        """Whether an event of the branch lies on a curve, between two of its points."""
         if curve.kind != start.kind:
             return False
         second = self.second(start)
@@ -296,6 +297,6 @@ class _Chart:
         with np.errstate(invalid="ignore", divide="ignore"):
             shares = np.clip(((place - points[:-1]) * along).sum(axis=1) / lengths, 0.0, 1.0)
         feet = points[:-1] + np.nan_to_num(shares)[:, np.newaxis] * along
-        # A chord leaves its curve by a part of its length.
+        # The distance of a chord from its curve is a small fraction of its length.
         near = np.sqrt(((feet - place) ** 2).sum(axis=1)) <= 0.1 * np.sqrt(lengths) + SAME
         return bool(near.any())

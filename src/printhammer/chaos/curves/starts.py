@@ -1,4 +1,4 @@
-"""Where a curve begins: an event of a branch, also of one from a file, or a point of a saved curve."""
+"""Start of a curve: an event of a branch, in memory or in a file, or a point of a saved curve."""
 
 from __future__ import annotations
 
@@ -28,42 +28,42 @@ _LIST: Final = ", ".join(KINDS)
 
 @dataclass(frozen=True)
 class Start:
-    """A bifurcation of an orbit, as far as it is known before Newton's method."""
+    """Initial guess of a bifurcation of an orbit, before Newton's method."""
 
     kind: str
     regime: Regime
-    """With the phase at which the state is known."""
+    """Regime with the phase at which the state is known."""
     first: str
-    """The constant along which it was found."""
+    """Name of the constant along which the bifurcation was found."""
     bounds: tuple[float, float]
     firings: int
     tolerance: float
     state: FloatArray
     value: float
     other: float | None = None
-    """The second constant, where it is not that of the regime."""
+    """Value of the second constant, unless it is that of the regime."""
 
 
 def start_of(
     source: Branch | Reopened | str | Path, event: BranchEvent | int | str | None, regime: Regime | None
 ) -> Start:
-    """Return where a curve begins.
+    """Determine the start of a curve.
 
     Parameters
     ----------
     source : Branch, Reopened or path
         A branch, or a file with a branch, branches or a curve.
     event : BranchEvent, int or str, optional
-        An event of the branch; its number in the table of events, from 0 on; "first" or "last", where the
-        branch ends in a grazing; or a kind, of which the first event counts. By default the first that can
-        be followed. Of a curve the number of a point, "first" or "last"; by default the first one.
+        An event of the branch; its index in the table of events, from 0 on; "first" or "last", for a branch
+        that ends in a grazing; or a kind, for its first event. By default the first event that can be
+        followed. For a curve the index of a point, "first" or "last"; by default the first point.
     regime : Regime, optional
-        Of a file: the hammer and how it is fired.
+        For a file: the hammer and how it is fired.
 
     Raises
     ------
     InputError
-        There is no such event, the file holds something else, or is of another hammer.
+        There is no such event, the file contains another kind of result, or it is of another hammer.
     """
     if isinstance(source, Branch):
         if regime is not None:
@@ -109,7 +109,7 @@ def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
 
 
 def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, whose: str) -> int:
-    """Return the number of the event that is meant."""
+    """Return the index of the selected event."""
     known = ", ".join(dict.fromkeys(kinds)) or "none"
     if isinstance(event, int | np.integer):
         if not 0 <= event < len(kinds):
@@ -158,7 +158,7 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
             key="branch",
         )
     if "branch" in dataset["event_kind"].dims:
-        # Of several branches the first is meant, which is the one that was asked for.
+        # Of several branches the first is used: the branch that was asked for.
         dataset = dataset.isel(branch=0)
     kinds = [EVENTS[code] if code >= 0 else "" for code in dataset["event_kind"].values]
     located = [bool(value == 1) for value in dataset["event_located"].values]
@@ -184,7 +184,7 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
 
 def _of_curve(opened: Reopened, point: int | str | None, regime: Regime) -> Start:
     dataset, notes = opened.dataset, opened.attributes
-    # Of a table the points are its rows.
+    # In a table each row is a point.
     (along,) = dataset["first"].dims
     count = dataset.sizes[along]
     number: Any = _ENDS.get(point, point) if isinstance(point, str) else point or 0

@@ -1,4 +1,4 @@
-"""Bifurcations of codimension one as fixed points of larger maps, to be followed in two constants.
+"""Bifurcations of codimension one as fixed points of extended maps, for continuation in two constants.
 
 An orbit of the strobe map G with two constants p and r loses its stability where
 
@@ -8,12 +8,12 @@ These are the fixed points of the map (u, p) -> (G, p + f) with the parameter r:
 section the constant p is unknown, and the curve is followed by `printhammer.chaos.continuation.arclength`
 (Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer 2004, section 10.3).
 
-Grazings, and orbits that bounce off a rigid backstop, are in `printhammer.chaos.curves.systems`.
+Grazings, and orbits with impacts on a rigid backstop, use the touch as the section.
 
-Orbits from one touch of a surface to the next: grazings, and what bounces off a rigid backstop.
+*Section at a touch.*
 
-The section is put at the touch: there the displacement is that of the surface, b, and unknown are the phase s
-of the drive and the velocity v. Without velocity the touch is a grazing,
+At the touch the displacement is that of the surface, b; the unknowns are the phase s of the drive and the
+velocity v. A touch with zero velocity is a grazing,
 
     G((b, 0); s, p, r) = (b, 0),
 
@@ -22,10 +22,11 @@ after its firings with w, obeys G((b, v); s, p, r) = (b, w), v = -e w, and with 
 
     f = 0,   J = S M,   S = [[-e, 0], [(a_out + e a_in) / w, -e]],
 
-S being the saltation matrix of the impact with the accelerations on both sides of it. A rigid backstop bends
-the strobe map of a fixed section by a square root at a grazing, and S is infinite there; here all is smooth,
-also w f, and v may pass through 0. To that end the motion close to the touch is computed without the surface.
-Where an impact meets a fixed section its state jumps, which does not happen here.
+where S is the saltation matrix of the impact with the accelerations on both sides of it. A rigid backstop
+gives the strobe map of a fixed section a square root at a grazing, where S is infinite. Here all functions
+are smooth, also w f, and v may pass through 0; to that end the motion close to the touch is computed without
+the surface. The state jumps where an impact meets a fixed section; with the section at the touch this does
+not happen.
 """
 
 from __future__ import annotations
@@ -60,21 +61,21 @@ TESTS: Final[dict[str, Callable[[FloatArray], float]]] = {
     "period doubling": doubling_test,
     "Neimark-Sacker": torus_test,
 }
-"""What vanishes of the monodromy matrix, by the kind of bifurcation."""
+"""Test functions of the monodromy matrix, by the kind of bifurcation."""
 
 GRAZING: Final = "grazing"
 KINDS: Final = (*TESTS, GRAZING)
-"""The kinds of bifurcation that can be followed."""
+"""Kinds of bifurcation that can be followed."""
 
 SPACING: Final = 1e-6
-"""Of differences, in scales; they only steer Newton's method."""
+"""Step size of finite differences, in scales; they only steer Newton's method."""
 _PARTS: Final = 5.0
-"""Parts of the range of a constant that count as much as half a width of the window."""
+"""The range of a constant divided by this is its scale, as half-widths are those of the state."""
 
 
 @dataclass(frozen=True)
 class Plane:
-    """The plane of two constants, and the orbits above it."""
+    """Plane of two constants, with the orbits above it."""
 
     regime: Regime
     names: tuple[str, str]
@@ -84,17 +85,17 @@ class Plane:
 
     @cached_property
     def scales(self) -> FloatArray:
-        """By which displacement, velocity and both constants are divided, shape (4,)."""
+        """Scales of displacement, velocity and both constants, shape (4,)."""
         widths = [(high - low) / _PARTS for low, high in self.bounds]
         return np.array([*self.regime.window.half_widths, *widths])
 
     def at(self, first: float, second: float) -> Regime:
-        """Return the regime with these constants; InputError where they are not possible."""
+        """Return the regime with these constants; InputError if they are impossible."""
         return self.regime.with_(self.names[1], float(second)).with_(self.names[0], float(first))
 
 
 def check_two(first: str, second: str) -> None:
-    """Refuse the same constant twice; a rate is its period. InputError says so."""
+    """Check that two constants differ; a rate is the same constant as its period."""
     if second == first or {first, second} == {PERIOD, RATE}:
         raise InputError.of("second", second, f"another constant than that of the branch, {first}")
 
@@ -102,8 +103,8 @@ def check_two(first: str, second: str) -> None:
 class Place(Declared):
     """A point of a curve in the plane, with the orbit there."""
 
-    first: float = part("the first constant, SI")
-    second: float = part("the second constant, SI")
+    first: float = part("value of the first constant, SI")
+    second: float = part("value of the second constant, SI")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
     phase: float = part("part of the period from the firing to the section")
     jacobian: FloatArray = part("derivative of the strobe map, shape (2, 2)")
@@ -111,7 +112,9 @@ class Place(Declared):
     slope: FloatArray | None = part(
         "derivative of the state after the firings with respect to the first constant", default=None
     )
-    acceleration: float = part("at the touch of a grazing, m/s^2; NaN of others", default=math.nan)
+    acceleration: float = part(
+        "acceleration at the touch of a grazing, m/s^2; NaN for other kinds", default=math.nan
+    )
 
     @property
     def multipliers(self) -> npt.NDArray[np.complex128]:
@@ -121,14 +124,14 @@ class Place(Declared):
 
 
 class MultiplierSystem:
-    """Orbits with a multiplier of 1 or -1, or a pair on the unit circle: state and first constant."""
+    """Extended map of orbits with a critical multiplier; unknowns are the state and the first constant."""
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind, self.test = plane, kind, TESTS[kind]
         self.scales = plane.scales
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Return the map of state and first constant at a value of the second one."""
+        """Evaluate the map of state and first constant at a value of the second constant."""
         plane, scales = self.plane, self.scales
         moves = SPACING * scales
         point = np.append(whole, other)
@@ -173,15 +176,15 @@ class MultiplierSystem:
 
 
 def place_of(node: Node) -> Place:
-    """Return what a fixed point of such a map is in the plane."""
+    """Return the place in the plane that a fixed point of an extended map represents."""
     place: Place = node.value.extra
     return place
 
 
 _PHASES: Final = 0.2
-"""Part of the period that counts as much as half a width of the window."""
+"""Fraction of the period that is scaled like one half-width of the window."""
 _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
-"""f as a function of trace and determinant of J: the factor of the trace; the rest is 1 + det, or det - 1."""
+"""f as a function of trace and determinant of J: factor of the trace; the rest is 1 + det, or det - 1."""
 
 
 def _flight(
@@ -191,16 +194,16 @@ def _flight(
 
 
 class GrazingSystem:
-    """Orbits that touch a surface with no velocity: phase of the touch and first constant."""
+    """Extended map of orbits that graze a surface; unknowns are phase of the touch and first constant."""
 
     def __init__(self, plane: Plane, surface: Surface) -> None:
         self.plane, self.kind, self.surface = plane, GRAZING, surface
         self.scales = np.array([_PHASES, *plane.scales[2:]])
 
     def at(self, phase: float, first: float, second: float) -> tuple[Place, FloatArray] | str:
-        """Return the orbit that leaves a touch, and by how far it misses the next one; text where it ends.
+        """Compute the orbit that leaves a touch, and its miss at the next touch; text if it ends early.
 
-        In scales of the state; InputError where the constants are not possible.
+        The miss distance is in scales of the state; InputError if the constants are impossible.
         """
         flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
         if flight.trouble:
@@ -212,7 +215,7 @@ class GrazingSystem:
         return place, (flight.end - at) / self.plane.scales[:2]
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Return the map of phase and first constant at a value of the second one."""
+        """Evaluate the map of phase and first constant at a value of the second constant."""
         steps, point = SPACING * self.scales, np.append(whole, other)
         missed = []
         for phase, first, second in [point, *(point + step for step in np.diag(steps))]:
@@ -237,14 +240,14 @@ class GrazingSystem:
 
 
 class ImpactSystem:
-    """As `MultiplierSystem`, of orbits that bounce off a rigid backstop: phase and velocity there instead."""
+    """As `MultiplierSystem`, for orbits with impacts on a rigid backstop; unknowns are phase and velocity."""
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind = plane, kind
         self.scales = np.array([_PHASES, *plane.scales[1:]])
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Return the map of phase and velocity after the impact, and of the first constant."""
+        """Evaluate the map of phase and velocity after the impact, and of the first constant."""
         moves, point = SPACING * self.scales, np.append(whole, other)
         try:
             flights = [
@@ -276,11 +279,11 @@ class ImpactSystem:
 
     @property
     def _sign(self) -> float:
-        """Minus the multiplier that is known along the curve; 0 without one."""
+        """Minus the multiplier that is known along the curve; 0 if none is known."""
         return _IN_TRACE[self.kind]
 
     def _miss(self, flight: Flight, speed: float) -> FloatArray:
-        """Return by how far an orbit misses the next impact and the bifurcation, scaled as the unknowns."""
+        """Compute the scaled residuals of the next impact and of the bifurcation condition."""
         matrix, e, w = flight.jacobian, flight.rebound, float(flight.end[1])
         determinant = e * e * float(np.linalg.det(matrix))
         trace, rest = self._sign, determinant + (1.0 if self._sign else -1.0)
@@ -293,7 +296,7 @@ class ImpactSystem:
 
 
 def _monodromy(flight: Flight) -> tuple[FloatArray, float]:
-    """Return the derivative from one impact to behind the next, and its determinant."""
+    """Compute the derivative from one impact to just after the next, and its determinant."""
     e, w = flight.rebound, float(flight.end[1])
     jump = flight.accelerations[0] + e * flight.accelerations[1]
     with np.errstate(divide="ignore", invalid="ignore"):

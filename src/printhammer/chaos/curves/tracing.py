@@ -1,4 +1,4 @@
-"""How a curve of bifurcations is followed: from where, with which system, to what ends."""
+"""Tracing of bifurcation curves: start, extended map, changes of section, and stops."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps, Stop, follow
 from printhammer.chaos.continuation.branch_points import zero_between
-from printhammer.chaos.continuation.family import rigid_backstop
+from printhammer.chaos.continuation.family import has_rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.chaos.continuation.flights import near_touches
 from printhammer.chaos.curves.codimension import (
@@ -44,21 +44,21 @@ PRECISION: Final = 1e-12
 """Scaled correction of Newton's method below which a point is on the curve."""
 
 _NOISY: Final = 1e-9
-"""Scaled miss of an orbit that Newton's method takes for closed, beyond which it is not."""
+"""Scaled closing error above which an orbit that Newton's method accepts is rejected."""
 _GENTLE: Final = 1e-6
 _SLOW: Final = 0.05
-"""Speeds of an impact, in half-widths of the window: at which a curve ends, and which may come to that."""
+"""Impact speeds, in half-widths of the window: at which a curve ends, and below which it may."""
 _FAR: Final = 0.02
-"""Distance in the plane, in scales, within which a point of codimension two is the end of a curve."""
+"""Distance in the plane, in scales, within which a point of codimension two ends a curve."""
 _TURNS: Final = 8
-"""Most changes of the section on the way."""
+"""Maximum number of section changes along a curve."""
 
 System = MultiplierSystem | ImpactSystem | GrazingSystem
 
 
 @dataclass
 class Traced:
-    """A curve that was followed."""
+    """A traced curve."""
 
     kind: str
     surface: str
@@ -70,11 +70,11 @@ class Traced:
 
     @property
     def places(self) -> list[Place]:
-        """The points of the curve."""
+        """Points of the curve."""
         return [place_of(node) for node in self.nodes]
 
     def crossings(self, which: int, value: float) -> list[Place]:
-        """Return where the curve passes a value of the first constant (0) or the second (1)."""
+        """Find the points where the curve passes a value of the first constant (0) or the second (1)."""
         places: list[Place] = []
         for system, nodes in self.pieces:
             corrector = Corrector(system, system.scales, PRECISION)
@@ -88,24 +88,24 @@ class Traced:
                 z = begin + share * (end - begin)
                 z[column] = level
                 node = corrector.correct(z, row)
-                if node is not None and not any(_same(place_of(node), place) for place in places):
+                if node is not None and not any(_is_same(place_of(node), place) for place in places):
                     places.append(place_of(node))
         return places
 
 
-def _same(one: Place, other: Place) -> bool:
+def _is_same(one: Place, other: Place) -> bool:
     return bool(np.allclose([one.first, one.second], [other.first, other.second], rtol=1e-9, atol=0.0))
 
 
 class CurveTracer:
-    """Follows one curve through a plane."""
+    """Traces a curve through a plane."""
 
     def __init__(self, plane: Plane, kind: str, steps: Steps) -> None:
         self.plane, self.kind, self.steps = plane, kind, steps
-        self.rigid = rigid_backstop(plane.regime)
+        self.rigid = has_rigid_backstop(plane.regime)
 
     def trace(self, start: Start, second: float, threads: int | None) -> Traced:
-        """Return the curve through a start; InputError where there is none."""
+        """Trace the curve through a start; InputError if there is none."""
         system, unknown = self.begin(start, second)
         at = f"{self.kind} at {start.first} = {start.value:.9g} {start.regime.quantity(start.first).si}"
         try:
@@ -142,7 +142,7 @@ class CurveTracer:
         points.sort(key=lambda point: point.after)
         for end, inner in ((0, 1), (-1, -2)):
             if stops[end].reason == "resonance" and len(nodes) > 1:
-                # The points were found with the node beyond it.
+                # The points were found together with the node beyond.
                 node = self.resonance(pieces[end][0], nodes[inner], nodes[end])
                 nodes[end] = pieces[end][1][end] = node
         if not curve.closed:
@@ -152,7 +152,7 @@ class CurveTracer:
         return Traced(self.kind, surface, nodes, (first, last), points, coefficients, pieces)
 
     def resonance(self, system: System, here: Node, beyond: Node) -> Node:
-        """Return the point of a torus between two others at which both its multipliers become real."""
+        """Locate the point of a torus curve between two others at which both multipliers become real."""
         sign = float(np.sign(np.trace(place_of(beyond).jacobian)))
         corrector = Corrector(system, system.scales, self.steps.precision)
         _, node = zero_between(
@@ -161,11 +161,11 @@ class CurveTracer:
         return here if node is None else node
 
     def coefficient(self, place: Place) -> float:
-        """Return the coefficient of the normal form of a period doubling."""
+        """Compute the normal-form coefficient of a period doubling."""
         return doubling_coefficient(self.plane, place)
 
     def begin(self, start: Start, second: float) -> tuple[System, FloatArray]:
-        """Return the system of a curve and its unknowns at the start."""
+        """Choose the extended map of a curve, and return its unknowns at the start."""
         plane, tolerance = self.plane, self.plane.tolerance
         regime = replace(plane.at(start.value, second), phase=start.regime.phase)
         near = near_touches(regime, start.state, plane.firings, tolerance)
@@ -187,7 +187,7 @@ class CurveTracer:
         return MultiplierSystem(moved, self.kind), np.append(quiet[1], start.value)
 
     def state_at(self, start: Start, second: float) -> FloatArray:
-        """Return displacement and velocity of an orbit at the section at which its curve has it."""
+        """Compute displacement and velocity of an orbit at the section that its curve uses."""
         system, unknown = self.begin(start, second)
         if isinstance(system, MultiplierSystem):
             return np.asarray(unknown[:2])
@@ -195,7 +195,7 @@ class CurveTracer:
         return np.array([surface, unknown[1]])
 
     def watch(self, system: System) -> Watch:
-        """Return what is asked between any two points: whether the curve ends there."""
+        """Build the callback that decides between two points whether the curve ends there."""
         low, high = self.plane.bounds[0]
         corrector = Corrector(system, system.scales, self.steps.precision)
         place = system.scales.size - 2
@@ -234,7 +234,7 @@ class CurveTracer:
     def resumed(
         self, nodes: list[Node], stop: Stop, *, first: bool
     ) -> tuple[list[tuple[System, list[Node]]], Stop]:
-        """Return how a curve goes on from an end at another section, piece by piece, and its new stop."""
+        """Continue a curve past a section change; return the new pieces and the reason for stopping."""
         pieces: list[tuple[System, list[Node]]] = []
         for _ in range(_TURNS):
             if stop.reason not in ("lost", "jump", "no value"):
@@ -276,7 +276,7 @@ class CurveTracer:
         return pieces, stop
 
     def meetings(self, nodes: list[Node], begin: int) -> list[CodimensionTwo]:
-        """Return where a fold or doubling meets a grazing of a surface that gives way, which it passes."""
+        """Locate the points where a fold or doubling curve meets a grazing of a compliant surface."""
         if self.rigid or self.kind not in ("fold", "period doubling"):
             return []
         points = []
@@ -294,16 +294,16 @@ class CurveTracer:
 
     @property
     def short(self) -> str:
-        """The kind in one word."""
+        """Kind of the bifurcation in one word."""
         return self.kind.removeprefix("period ")
 
     def distance(self, one: Place, other: Place) -> float:
-        """Return how far two places lie apart in the plane, in scales."""
+        """Compute the distance of two places in the plane, in scales."""
         away = np.array([one.first - other.first, one.second - other.second]) / self.plane.scales[2:]
         return float(np.linalg.norm(away))
 
     def grazing_near(self, place: Place, within: float) -> Place | None:
-        """Return the grazing that an orbit of the curve is nearest to, where it obeys the same test."""
+        """Find the grazing nearest to an orbit of the curve that satisfies the same test."""
         regime = replace(self.plane.at(place.first, place.second), phase=place.phase)
         for touch in near_touches(regime, place.state, self.plane.firings, self.plane.tolerance)[:3]:
             guess = np.array([touch.phase, place.first, place.second])
@@ -315,7 +315,7 @@ class CurveTracer:
     def with_ends(
         self, nodes: list[Node], stops: list[Stop], points: list[CodimensionTwo]
     ) -> list[CodimensionTwo]:
-        """Return the points with those at which the curve ends in a grazing."""
+        """Add the points at which the curve ends in a grazing."""
         if self.kind not in ("fold", "period doubling"):
             return points
         for end, (node, after) in enumerate(((nodes[0], -1), (nodes[-1], len(nodes) - 1))):
@@ -328,7 +328,7 @@ class CurveTracer:
         return points
 
     def end_at(self, place: Place, after: int) -> CodimensionTwo | None:
-        """Return the point of codimension two at which a curve ends beside a place."""
+        """Find the point of codimension two at which a curve ends beside a place."""
         speed = float(place.state[1]) / float(self.plane.scales[1])
         if self.rigid and 0.0 < speed < _SLOW:
             guess = np.array([place.phase, place.first, place.second])
@@ -343,12 +343,12 @@ class CurveTracer:
         return None if met is None else point_of(f"{self.short} meets grazing", met, after)
 
     def at_value(self, which: int, value: float) -> str:
-        """Return a value of one of the constants with its name and unit."""
+        """Format a value of one of the constants with its name and unit."""
         name = self.plane.names[which]
         return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}".removesuffix(" 1")
 
     def in_words(self, stop: Stop, points: list[CodimensionTwo], end: int) -> Stop:
-        """Return a stop whose sentence names the constants and, where there is one, the point of its end."""
+        """Return a stop whose sentence names the constants and, if there is one, the point at the end."""
         at = self.at_value(1, stop.parameter)
         if stop.reason == "grazing" and points:
             point = points[-1 if end else 0]

@@ -1,13 +1,13 @@
-"""Lyapunov exponents of many trains: how a hammer behaves against the time between firings.
+"""Lyapunov exponents of many trains, against the time between firings, and finite-time exponents.
 
-Finite-time exponents: how the growth over a few firings is distributed along one train.
+Finite-time exponents are the distribution, along one train, of the mean growth over a few firings.
 
-The mean growth over n firings is another number wherever one begins. Its mean is the Lyapunov exponent; its
-standard deviation falls as n^-1/2 where growth is forgotten fast, and less where a motion stays near regular
-orbits for long (A. Prasad and R. Ramaswamy, Phys. Rev. E 60 (1999) 2761). The share of stretches with a
-negative exponent tells how often neighbouring motions come together for a while, although the train is
-chaotic. Weakness: stretches follow one another on one train; a part of the attractor that it has not visited
-has none.
+The mean growth over n firings depends on where the stretch begins. Its mean is the Lyapunov exponent; its
+standard deviation falls as n^-1/2 if correlations decay fast, and more slowly if a motion stays near regular
+orbits for long (A. Prasad and R. Ramaswamy, Phys. Rev. E 60 (1999) 2761). The fraction of stretches with a
+negative exponent shows how often neighbouring motions converge for a while, although the train is chaotic.
+Limitation: the stretches are taken from one train; parts of the attractor that it has not visited do not
+contribute.
 """
 
 from __future__ import annotations
@@ -78,11 +78,11 @@ class LyapunovChart(Result, rows="period"):
 
     @property
     def title(self) -> str:
-        """One line that says what the exponents are of."""
+        """Title of the result, in one line."""
         return f"Lyapunov exponents of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Return exponents and verdicts, a row for each train, and how often both tests agree."""
+        """Tabulate exponents and verdicts, a row for each train, and how often both tests agree."""
         from printhammer.chaos.exponents.lyapunov import dimension_text, verdict_text
 
         pairs = list(zip(self.growth, self.zero_one, strict=True))
@@ -116,13 +116,13 @@ class LyapunovChart(Result, rows="period"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the exponents come from: fingerprint, waveform, tolerance, versions."""
+        """Provenance of the exponents: fingerprint, waveform, tolerance, versions."""
         waveform, overlap = self.drive.waveform, self.drive.overlap
         return provenance(hammer=self.hammer, waveform=waveform, overlap=overlap, tolerance=self.tolerance)
 
     @classmethod
     def of(cls, trains: Sequence[Lyapunov]) -> LyapunovChart:
-        """Make a chart of results for single trains; InputError where there are none."""
+        """Combine the results of single trains to a chart; InputError for an empty sequence."""
         if not trains:
             raise InputError("periods: expected at least one train", key="periods")
         points = trains[0].points
@@ -131,11 +131,11 @@ class LyapunovChart(Result, rows="period"):
         return _chart(points.hammer, points.drive, firings, points.tolerance, rows)
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return all columns over `period`, and both exponents side by side."""
+        """Return all columns over `period`, and the two exponents over `exponent`."""
         return {**super().entries(), "exponent": EXPONENT}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row for each train, the exponents side by side."""
+        """Convert the chart to a table with a row for each train, exponents in columns."""
         table = super().to_dataframe()
         for k in (1, 0):
             table.insert(1, f"standard error {k + 1} [{PER_FIRING}]", self.standard_errors[:, k])
@@ -155,7 +155,7 @@ def lyapunovs(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> LyapunovChart:
-    """Return the Lyapunov exponents of many trains from rest, computed on all cores; see `lyapunov`.
+    """Compute the Lyapunov exponents of many trains from rest in parallel; see `lyapunov`.
 
     Parameters
     ----------
@@ -167,19 +167,19 @@ def lyapunovs(
     Returns
     -------
     LyapunovChart
-        A row for each train, and the same that each has alone, to the last bit.
+        A row for each train, identical to the last bit to the result of `lyapunov`.
     """
     counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
     trains = [Train.of(regime.at_firings, sum(counts) + 1) for regime in regimes]
-    # Only a row is kept of each train, so that memory does not grow with their length.
+    # Only one row per train is stored, so that memory does not grow with the length of the trains.
     rows = effort.mapped(lambda train: _row(exponents_of_train(train, counts, effort.tolerance)), trains)
     first = counts[1] + 1
     return _chart(trains[0].hammer, trains[0].drive, (first, first + counts[0]), effort.tolerance, rows)
 
 
 def _row(train: Lyapunov) -> dict[str, Any]:
-    """Return what a chart keeps of a train."""
+    """Extract the row of a chart from the exponents of a train."""
     named = ("period", "exponents", "standard_errors", "total", "total_error", "dimension", "dimension_error")
     test = train.zero_one
     return {name: getattr(train, name) for name in (*named, "growth", "status", "smooth")} | {
@@ -201,54 +201,54 @@ def _chart(
 
 
 LENGTHS: Final = (1, 2, 5, 10, 20, 50)
-"""Firings of a stretch unless told otherwise."""
+"""Default numbers of firings of a stretch."""
 FEWEST: Final = 10
-"""Stretches below which there is no distribution."""
+"""Smallest number of stretches that define a distribution."""
 LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 class FiniteTime(Result, rows="length"):
-    """The distribution of the largest exponent over stretches of some lengths, one after the other."""
+    """Distribution of the largest exponent over successive stretches of several lengths."""
 
     lengths: IntArray = coordinate("1", "firings of a stretch", "length", name="length", dtype=np.int32)
-    level: FloatArray = coordinate("1", "part of the stretches that lie below a quantile", "level")
+    level: FloatArray = coordinate("1", "quantile level", "level")
     stretches: IntArray = column("1", "number of stretches", "length", dtype=np.int32)
     mean: FloatArray = column(PER_FIRING, "mean of the exponents of the stretches", "length")
     deviation: FloatArray = column(PER_FIRING, "their standard deviation", "length")
-    negative: FloatArray = column("1", "part of the stretches whose exponent is negative", "length")
+    negative: FloatArray = column("1", "fraction of the stretches whose exponent is negative", "length")
     quantiles: FloatArray = column(PER_FIRING, "quantiles of the exponents", "length level", name="quantile")
     values: tuple[FloatArray, ...] = part("exponents of the stretches of each length, 1/firing", repr=False)
     lyapunov: Lyapunov = part("the exponents over the whole train", repr=False)
 
     @property
     def title(self) -> str:
-        """One line that says what this is."""
+        """Title of the result, in one line."""
         return f"finite-time exponents of {self.lyapunov.hammer.name}"
 
 
 def finite_time(
     train: Lyapunov | Regime, *, lengths: Sequence[SupportsIndex] = LENGTHS, firings: SupportsIndex = 5000
 ) -> FiniteTime:
-    """Return how the largest exponent is distributed over stretches of a train.
+    """Compute the distribution of the largest exponent over stretches of a train.
 
     Parameters
     ----------
     train : Lyapunov or Regime
         The exponents of a train, see `printhammer.lyapunov`; or a regime, whose train is followed from rest.
     lengths : sequence of int, optional
-        Firings of a stretch, ascending.
+        Numbers of firings of a stretch, ascending.
     firings : int, optional
-        Of a regime: number of firings over which growth counts.
+        For a regime: number of firings over which growth is averaged.
 
     Returns
     -------
     FiniteTime
-        For each length.
+        The distribution for each length.
 
     Raises
     ------
     InputError
-        The run ended early, lengths do not ascend, or there are fewer than ten stretches of one.
+        The run ended early, lengths do not ascend, or a length has fewer than ten stretches.
     """
     known = train if isinstance(train, Lyapunov) else lyapunov(train, firings=firings)
     wanted = [read_count(length, "lengths") for length in lengths]

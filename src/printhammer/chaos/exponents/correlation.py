@@ -1,14 +1,14 @@
-"""Correlation dimension of an attractor, with its plateau and an interval that says what is known.
+"""Correlation dimension of an attractor by the Grassberger-Procaccia algorithm, with an interval.
 
-The correlation sum C(r) is the part of the pairs of states that lie closer than r; on an attractor of
-dimension D2 it goes as r^D2 where r is neither so large that the shape shows nor so small that few pairs are
+The correlation sum C(r) is the fraction of pairs of states closer than r; on an attractor of dimension D2 it
+scales as r^D2 for r neither so large that the shape of the attractor matters nor so small that few pairs are
 left (P. Grassberger and I. Procaccia, Physica D 9 (1983) 189). Pairs close in time are left out (J. Theiler,
 Phys. Rev. A 34 (1986) 2427). The dimension is the slope of ln C over ln r on a *plateau*: the widest range
-over which the slope of short pieces stays within a tolerance.
+over which the local slope stays within a tolerance.
 
-Weakness: of N states distances below about N^(-2/D2) of the whole are not seen, and a set with gaps has
-slopes that waver however many states there are. The interval therefore has room for every slope on the
-plateau, and for the scatter between parts of the series; without a plateau there is no dimension.
+Limitations: N states do not resolve distances below about N^(-2/D2) of the size of the attractor, and a set
+with gaps has fluctuating slopes for any number of states. The interval therefore covers every slope on the
+plateau, and the scatter between sections of the series; without a plateau no dimension is returned.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ FEWEST: Final = 200
 """Smallest number of states."""
 THEILER: Final = 10
 FLAT: Final = 0.1
-"""Range of local slopes on a plateau, unless told otherwise."""
+"""Default range of local slopes on a plateau."""
 
 _PER_OCTAVE: Final = 2
 _PIECE: Final = 4
-"""Radii over which a local slope is taken."""
+"""Number of radii over which a local slope is fitted."""
 _SHORTEST: Final = 3 * _PER_OCTAVE
-"""Radii of the shortest plateau: a factor of 8."""
+"""Number of radii of the shortest plateau: a factor of 8."""
 _FEW_PAIRS: Final = 200
 _LARGEST: Final = 0.25
-"""Share of pairs above which the shape of the attractor shows."""
+"""Fraction of pairs above which the shape of the attractor matters."""
 _PARTS: Final = 5
 
 
 class CorrelationDimension(Result, rows="radius"):
-    """Correlation sums of a series of states, their local slopes, and the dimension if there is a plateau."""
+    """Correlation sums of a series of states, local slopes, and the dimension if there is a plateau."""
 
     radius: FloatArray = coordinate("1", "distance of states", "radius", more="in units of the scales")
     sums: FloatArray = column("1", "part of the pairs that lie closer", "radius", name="correlation_sum")
@@ -55,7 +55,7 @@ class CorrelationDimension(Result, rows="radius"):
         "1", "slope of its logarithm over that of the distance", "radius", more="nan at the ends"
     )
     states: int = scalar("1", "number of states")
-    theiler: int = scalar("1", "states less than so many places apart are not counted")
+    theiler: int = scalar("1", "pairs of states less than this many steps apart are left out")
     flat: float = scalar("1", "largest range of local slopes on a plateau")
     plateau: tuple[float, float] = scalar("1", "distances between which the slope is flat, or nan")
     dimension: float = scalar("1", "correlation dimension", more="nan without a plateau")
@@ -64,7 +64,7 @@ class CorrelationDimension(Result, rows="radius"):
 
     @property
     def title(self) -> str:
-        """One line that says what this is."""
+        """Title of the result, in one line."""
         return f"correlation dimension of {self.states} states"
 
     @property
@@ -86,32 +86,32 @@ def correlation_dimension(
     theiler: SupportsIndex = THEILER,
     flat: float = FLAT,
 ) -> CorrelationDimension:
-    """Return the correlation dimension of a series of states, or of the points of a strobe.
+    """Estimate the correlation dimension of a series of states, or of strobe points.
 
     Parameters
     ----------
     states : array, Strobe or Regime
-        One row for each state, or one number; 200 to 50,000. Of strobe points: displacement, velocity and
-        memory of the pack. Of a regime a thousand points are taken, after a thousand firings; a few
-        thousand tell more. The distance is the largest difference of a component.
+        One row, or one number, for each state; 200 to 50,000 states. Of strobe points displacement, velocity
+        and memory of the pack are used. For a regime a thousand points are computed, after a thousand
+        firings; a few thousand are more accurate. The distance is the largest difference of a component.
     scales : array, optional
-        By which the components are divided; by default the half-widths of the window of a strobe, and 1 for
-        other states.
+        Scales of the components; by default the half-widths of the window of a strobe, and 1 for other
+        states.
     theiler : int, optional
-        States less than so many places apart are not counted.
+        Theiler window: pairs of states less than this many steps apart are left out.
     flat : float, optional
         Largest range of local slopes on a plateau.
 
     Returns
     -------
     CorrelationDimension
-        The interval goes to either side of the dimension as far as the local slopes on the plateau, and
-        twice the standard error between five parts of the series beyond.
+        The interval covers the local slopes on the plateau, widened by twice the standard error between five
+        sections of the series.
 
     Raises
     ------
     InputError
-        Too many or too few states, states not finite, all equal, or scales that do not fit.
+        There are too many or too few states, they are not finite or all equal, or the scales do not fit.
     """
     rows, units = rows_of(points_of(states, {}), scales, MOST)
     apart, tolerance = read_count(theiler, "theiler"), read_positive(flat, "1", "flat")
@@ -163,9 +163,9 @@ def correlation_dimension(
 
 
 def correlation_sums(states: FloatArray, radius: FloatArray, theiler: int) -> tuple[FloatArray, int]:
-    """Return the part of the pairs of states that lie within some distances, and how many pairs count.
+    """Compute the fractions of pairs of states within several distances, and the number of pairs.
 
-    States less than `theiler` places apart are not counted.
+    Pairs less than `theiler` steps apart are left out.
     """
     from scipy.spatial import cKDTree
 
@@ -180,7 +180,7 @@ def correlation_sums(states: FloatArray, radius: FloatArray, theiler: int) -> tu
 
 
 def local_slopes(radius: FloatArray, sums: FloatArray) -> FloatArray:
-    """Return the slope of ln C over ln r at each distance, from the straight line through its neighbours."""
+    """Fit the local slope of ln C over ln r at each distance by a straight line through its neighbours."""
     slopes = np.full(len(radius), np.nan)
     half = _PIECE // 2
     for k in range(half, len(radius) - half):
@@ -197,7 +197,7 @@ def _slope(radius: FloatArray, sums: FloatArray) -> float:
 
 
 def _plateau(slopes: FloatArray, tolerance: float) -> tuple[int, int] | None:
-    """Return the ends of the longest row of slopes within a tolerance, of rows as long the flattest."""
+    """Find the longest run of slopes within a tolerance, the flattest if tied; return its ends."""
     best: tuple[int, float, int] | None = None
     for first in range(len(slopes)):
         least, most = math.inf, -math.inf

@@ -1,9 +1,9 @@
-"""Lyapunov exponents of the stroboscopic map: how fast neighbouring motions part, or come together.
+"""Lyapunov exponents of the stroboscopic map: the mean growth rates of small perturbations.
 
 From firing to firing the tangent flow (docs/tangent.md) stretches one direction of the plane of displacement
-and velocity and shrinks the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is
-the mean logarithm of the determinant. A third one, that of the memory of the pack, is minus infinity. The
-exponents of the flow in time are these over the period, and a zero for the direction of time.
+and velocity and contracts the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is
+the mean logarithm of the determinant. A third exponent, that of the memory of the pack, is minus infinity.
+The exponents of the flow in time are these divided by the period, and a zero for the direction of time.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from printhammer.chaos.exponents.zero_one import FEWEST, ZeroOne, zero_one
 from printhammer.chaos.strobe.points import Strobe, strobe_of
-from printhammer.chaos.strobe.train import States, Train, exponents_of, forgets, run_trains
+from printhammer.chaos.strobe.train import States, Train, exponents_of, is_memoryless, run_trains
 from printhammer.chaos.strobe.verdict import FORGETS, SIGNIFICANT, Verdict, verdict
 from printhammer.derivatives.states import Exponent, standard_error
 from printhammer.drive.input import read_count
@@ -39,10 +39,10 @@ from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 
 FIRINGS: Final = 1000
-"""Number of firings over which growth counts unless told otherwise."""
+"""Default number of firings over which growth is averaged."""
 
 TRANSIENT: Final = 1000
-"""Number of firings left out before them."""
+"""Default number of firings to discard before them."""
 
 PER_FIRING: Final = "1/firing"
 """Unit of exponents."""
@@ -51,29 +51,29 @@ EXPONENT: Final = (
     Column("1", "number of the exponent, largest first", ("exponent",), "coordinate", name="exponent"),
     np.array([1, 2], np.int32),
 )
-"""Coordinate of both exponents."""
+"""Coordinate of the exponents."""
 
 _GROWTH: Final = ("firing", "exponent")
 _RUNNING: Final = ("count", "exponent")
 _COUNTS: Final = 100
 _CYCLES: Final = 8
-"""Number of cycles below which their scatter says nothing."""
+"""Smallest number of cycles whose scatter gives a standard error."""
 
 
 def dimension_text(value: float, error: float) -> str:
-    """Return a dimension with its standard error; a dash where it is not known."""
+    """Format a dimension with its standard error; a dash if it is unknown."""
     if math.isnan(value):
         return "–"
     return f"{value:.4g} ± {error:.1g}" if error else f"{value:.4g}"
 
 
 def verdict_text(verdict: str) -> str:
-    """Return a verdict as a summary shows it."""
+    """Format a verdict for a summary."""
     return judged(verdict != "undecided", verdict.replace("period-", "period "))
 
 
 class Lyapunov(Result, rows="firing exponent"):
-    """Lyapunov exponents of one train, and two opinions on what kind of motion it is."""
+    """Lyapunov exponents of one train, and two verdicts on the kind of motion."""
 
     points: Strobe = part(
         "the states at the firings between which growth counts, and the verdict on them",
@@ -107,11 +107,11 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def title(self) -> str:
-        """One line that says what the exponents are of."""
+        """Title of the result, in one line."""
         return f"Lyapunov exponents of {self.hammer.name}, fired every {self.period:.9g} s"
 
     def summary(self) -> Summary:
-        """Return what is known of the train: exponents, dimension, and both tests."""
+        """Summarise exponents, dimension, and both tests."""
         rows: list[FactRow] = [("period", f"{self.period:.9g} s")]
         for k in (0, 1):
             each, error, second = (
@@ -158,7 +158,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def ok(self) -> bool:
-        """Whether the run went as asked."""
+        """Whether the run came to its end."""
         return self.points.ok
 
     @property
@@ -171,7 +171,7 @@ class Lyapunov(Result, rows="firing exponent"):
     @property
     @derived("1/s", "exponents per second", name="exponents_per_second")
     def per_second(self) -> FloatArray:
-        """The exponents per second, 1/s, shape (2,)."""
+        """Exponents per second, 1/s, shape (2,)."""
         return self.exponents / self.period
 
     @property
@@ -182,32 +182,32 @@ class Lyapunov(Result, rows="firing exponent"):
     @property
     @derived("", "what the largest exponent alone says")
     def growth(self) -> str:
-        """What the largest exponent alone says: "chaotic", "regular", or "undecided" within three errors."""
+        """Verdict of the largest exponent alone: "chaotic", "regular", or "undecided" within three errors."""
         return _growth(float(self.exponents[0]), float(self.standard_errors[0]), self.smooth)
 
     @property
     def agree(self) -> bool | None:
-        """Whether exponent and 0-1 test say the same; None where one of them does not decide."""
+        """Whether exponent and 0-1 test agree; None if one of them is undecided."""
         other = "undecided" if self.zero_one is None else self.zero_one.verdict
         return None if "undecided" in (self.growth, other) else self.growth == other
 
     def running(self, counts: npt.ArrayLike | None = None) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Return the estimates from the first firings only, to see whether they have settled.
+        """Compute running estimates over the first firings, to show their convergence.
 
         Parameters
         ----------
         counts : int array, optional
-            Numbers of firings, from 1 to all, of which whole cycles are taken; by default about a hundred,
-            evenly spaced in their logarithm.
+            Numbers of firings, from 1 to all, rounded to whole cycles; by default about a hundred, evenly
+            spaced in their logarithm.
 
         Returns
         -------
         counts : int array, shape (k,)
             The numbers of firings.
         means : array, shape (k, 2)
-            The exponents over so many firings.
+            Exponents over these numbers of firings.
         errors : array, shape (k, 2)
-            Their standard errors.
+            Standard errors of the exponents.
         """
         q = self.cycle
         whole = whole_cycles(self.factors, q)
@@ -224,18 +224,18 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the points come from."""
+        """Provenance of the points."""
         return self.points.provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return the verdicts on the points, for the attributes of the Dataset."""
+        """Return the verdicts, for the attributes of the Dataset."""
         second = {} if self.zero_one is None else {"k": self.zero_one.k, "zero_one": self.zero_one.verdict}
         return {**second, "phase": self.points.phase, **self.points.notes()}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return growth and states over `firing`, running estimates over `count`.
 
-        The first firing has no growth, NaN.
+        The growth of the first firing is NaN.
         """
         counts, means, errors = self.running()
         own = self.points.entries()
@@ -262,30 +262,30 @@ def lyapunov(
     tolerance: float = TOLERANCE,
     **firing: Unpack[Firing],
 ) -> Lyapunov:
-    """Return the Lyapunov exponents of a train, with error bars, and the 0-1 test as a second opinion.
+    """Compute the Lyapunov exponents of a train, with standard errors, and the 0-1 test for comparison.
 
-    Two changes of the state are carried along with the motion and made orthonormal again at every step (G.
-    Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they begin up to a
-    hundred firings earlier, to find their directions. Standard errors are those of the means of
-    autocorrelated series, from overlapping batch means (`printhammer.derivatives.states.standard_error`); of
-    a periodic train, of whole cycles.
+    Two tangent vectors are carried along with the motion and orthonormalised at every step (G. Benettin, L.
+    Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they begin up to a hundred
+    firings earlier, to align with their directions. Standard errors are those of means of autocorrelated
+    series, from overlapping batch means (`printhammer.derivatives.states.standard_error`); for a periodic
+    train, from whole cycles.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer; or the hammer with all that `firing` says of it. Growth is taken from firing to firing,
+        The hammer, or a regime; a hammer needs the keywords `firing`. Growth is taken from firing to firing,
         whatever the phase.
     firings : int, optional
-        Number of firings over which growth counts.
+        Number of firings over which growth is averaged.
     transient : int, optional
-        Number of firings left out before them.
+        Number of firings to discard before them.
     state, tolerance, **firing
         As for `printhammer.strobe`.
 
     Returns
     -------
     Lyapunov
-        With a status; a run that could not go on is no exception.
+        With a status; a run that ends early is not an exception.
     """
     counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     train = Train.of(Regime.of(hammer, **firing).at_firings, sum(counts) + 1, state)
@@ -293,12 +293,12 @@ def lyapunov(
 
 
 def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
-    """Return the Kaplan-Yorke dimension of a map of the plane, and its standard error.
+    """Compute the Kaplan-Yorke dimension of a map of the plane, and its standard error.
 
-    D = 1 - lambda_1/lambda_2 where lambda_1 > 0 > lambda_1 + lambda_2, 2 where areas do not shrink, 0 where
-    lambda_1 < 0 (J. L. Kaplan and J. A. Yorke, Lect. Notes Math. 730 (1979) 204). The error is that of the
-    mean of (D's slopes) x (growth), which knows how both exponents waver together. The flow in time has one
-    dimension more.
+    D = 1 - lambda_1/lambda_2 if lambda_1 > 0 > lambda_1 + lambda_2, 2 if areas do not shrink, 0 if lambda_1 <
+    0 (J. L. Kaplan and J. A. Yorke, Lect. Notes Math. 730 (1979) 204). The standard error is that of the mean
+    of (gradient of D) x (growth), which includes the correlation of the two exponents. The flow in time has
+    one dimension more.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
     Returns
     -------
     dimension, error : float
-        NaN where the sign of the largest exponent is not known to three standard errors.
+        NaN unless the sign of the largest exponent is significant by three standard errors.
     """
     one, two = (float(mean) for mean in factors.mean(axis=0))
     sign = _growth(one, standard_error(factors[:, 0]), True)
@@ -324,26 +324,26 @@ def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
 
 
 def cycle_of(period: int | None, firings: int) -> int:
-    """Return over how many firings to average growth first, so that a cycle does not count as scatter."""
+    """Return the number of firings to average over first, so that a cycle does not count as scatter."""
     return period if period is not None and firings >= _CYCLES * period else 1
 
 
 def whole_cycles(factors: FloatArray, cycle: int) -> FloatArray:
-    """Return means over whole cycles, shape (n // cycle, 2), the first few firings left out if need be."""
+    """Average growth over whole cycles, shape (n // cycle, 2), without an incomplete cycle at the start."""
     return np.asarray(factors[len(factors) % cycle :].reshape(-1, cycle, 2).mean(axis=1))
 
 
 def _growth(value: float, error: float, smooth: bool) -> str:
     if math.isnan(value) or not smooth:
         return "undecided"
-    # Of a motion that forgets its past altogether there is no scatter to speak of.
+    # A motion that forgets its past has infinite negative growth and no scatter.
     if value == -math.inf or value < -SIGNIFICANT * error:
         return "regular"
     return "chaotic" if value > SIGNIFICANT * error else "undecided"
 
 
 def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) -> Lyapunov:
-    """Return the exponents of a train over a number of firings, after another number that is left out."""
+    """Compute the exponents of a train over a number of firings, after a number of discarded firings."""
     first = counts[1] + 1
     last = first + counts[0]
     (exponent,) = exponents_of([train], (first, last), Effort(tolerance, threads=1))
@@ -351,7 +351,7 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
     factors = np.column_stack([exponent.factors, exponent.second_factors])
     judged = points.verdict
     if judged is not None and judged.exponent == -math.inf and exponent.ok:
-        # Between two rests a run over long times may leave its cycle; the sum over a cycle is minus infinity.
+        # Between two rests a long run may leave its cycle; the sum over a cycle is minus infinity.
         none = np.full(len(exponent.factors), -math.inf)
         exponent = replace(exponent, factors=none, second_factors=none)
     whole = whole_cycles(factors, cycle_of(None if judged is None else judged.period, len(factors)))
@@ -379,7 +379,7 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
 
 
 def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: float) -> Strobe:
-    """Return the states that the tangent flow passed, judged."""
+    """Judge the states that the tangent flow passed."""
     firing = np.arange(first, last + 1)
     x, v, mode, memory, *electric = exponent.states.T
     branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)
@@ -391,8 +391,8 @@ def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: 
     stopped = "" if exponent.ok else exponent.status
     distances = states.distances(train)
     ends_at = None if stopped else states.settled(train, distances)
-    if forgets(train.regime) and not stopped:
-        # A period at a time, where rounding does not grow with time.
+    if is_memoryless(train.regime) and not stopped:
+        # One period at a time, so that rounding does not grow with time.
         _states, (judged,) = run_trains([train], firing, (first, last), Effort(tolerance, threads=1))
     else:
         judged = verdict(distances, (first, last), tolerance, exponent, stopped, ends_at)

@@ -1,9 +1,9 @@
-"""Recurrence plots: when a motion comes back to where it was, and in what patterns.
+"""Recurrence plots and recurrence quantification: when, and in what patterns, a motion returns.
 
-The recurrence matrix has a point at (i, j) where the states i and j lie within a threshold of each other.
-Its diagonal lines are stretches during which the motion repeats what it did before; its vertical ones,
-stretches during which it stays where it is. The quantities are those of N. Marwan, M. C. Romano, M. Thiel and
-J. Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
+The recurrence matrix has a point at (i, j) where the states i and j lie within a threshold of each other. Its
+diagonal lines are stretches during which the motion repeats an earlier stretch; its vertical lines, stretches
+during which the motion stays in place. The quantities are those of N. Marwan, M. C. Romano, M. Thiel and J.
+Kurths, Phys. Rep. 438 (2007) 237, section 3.5.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MOST: Final = 4096
-"""Largest number of states; a matrix of so many squared has 16 million points."""
+"""Largest number of states; the matrix then has 16 million points."""
 
 RATE: Final = 0.05
-"""Recurrence rate unless a threshold is given."""
+"""Default recurrence rate if no threshold is given."""
 
 SHORTEST: Final = 2
-"""Points from which on a row of them is a line."""
+"""Default length, in points, of the shortest line."""
 
 _ROWS: Final = 256
 
 
 class Recurrence(Result):
-    """A recurrence plot and what is counted in it."""
+    """A recurrence plot and its quantification."""
 
     matrix: BoolArray = column(
         "1", "whether two states lie within the threshold of each other", "i j", name="recurs", dtype=np.int8
@@ -45,11 +45,11 @@ class Recurrence(Result):
     )
     theiler: int = scalar(
         "1",
-        "states less than so many places apart are not counted",
+        "pairs of states less than this many steps apart are left out",
         more="1 leaves out the main diagonal alone",
     )
-    shortest: int = scalar("1", "points from which on a row of them is a line")
-    rate: float = scalar("1", "part of the counted pairs that recur")
+    shortest: int = scalar("1", "length of the shortest line, in points")
+    rate: float = scalar("1", "fraction of the counted pairs that recur")
     determinism: float = scalar(
         "1", "part of the recurring pairs that lie on diagonal lines", more="nan where nothing recurs"
     )
@@ -68,12 +68,12 @@ class Recurrence(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what this is."""
+        """Title of the result, in one line."""
         return "recurrence plot"
 
     @property
     def quantities(self) -> dict[str, float]:
-        """The quantities by name."""
+        """Quantities by name."""
         names = (
             *("rate", "determinism", "mean_diagonal", "longest_diagonal", "entropy"),
             *("laminarity", "trapping", "longest_vertical"),
@@ -90,42 +90,44 @@ def recurrence(
     theiler: SupportsIndex = 1,
     shortest: SupportsIndex = SHORTEST,
 ) -> Recurrence:
-    """Return the recurrence plot of a series of states, or of the points of a strobe.
+    """Compute the recurrence plot of a series of states, or of strobe points.
 
     Parameters
     ----------
     states : array, Strobe or Regime
-        One row for each state, or one number; at most 4096. Of strobe points: displacement, velocity
-        and memory of the pack. Of a regime a thousand points are taken, after a thousand firings.
+        One row, or one number, for each state; at most 4096 states. Of strobe points displacement, velocity
+        and memory of the pack are used. For a regime a thousand points are computed, after a thousand
+        firings.
     threshold : float, optional
         Largest distance of states that count as the same, in units of the scales. The distance is the largest
         difference of a component.
     rate : float, optional
-        Instead: the recurrence rate to have, from which the threshold follows; 0.05 where neither is given.
-        Where many distances are equal, the rate comes out larger; so it does for
-        strobe points that agree as closely as a verdict asks for.
+        Recurrence rate from which the threshold follows, instead of `threshold`; 0.05 if neither is given.
+        Where many distances are equal, the rate comes out larger; so it does for strobe points that agree as
+        closely as a verdict requires.
     scales : array, optional
-        By which the components are divided; by default the half-widths of the window of a strobe, and 1 for
-        other states.
+        Scales of the components; by default the half-widths of the window of a strobe, and 1 for other
+        states.
     theiler : int, optional
-        States less than so many places apart are not counted, so that a slow motion is no recurrence.
+        Theiler window: pairs of states less than this many steps apart are left out, so that a slow motion is
+        not a recurrence.
     shortest : int, optional
-        Points from which on a row of them is a line.
+        Length of the shortest line, in points.
 
     Returns
     -------
     Recurrence
-        The matrix, and what is counted in it.
+        The matrix and its quantification.
 
     Raises
     ------
     InputError
-        Too many or too few states, states not finite, such as those of a strobe whose run ended early; both a
-        threshold and a rate; scales that do not fit.
+        There are too many or too few states, they are not finite, as for a strobe whose run ended early; both
+        threshold and rate are given; or the scales do not fit.
     """
     points = points_of(states, {})
     rows, units = rows_of(points, scales, MOST)
-    # Of a train that has settled only the noise of the arithmetic differs.
+    # After a train has settled only rounding noise differs.
     floor = AGREEMENT if isinstance(points, Strobe) and scales is None else 0.0
     count = len(rows)
     apart, least = read_count(theiler, "theiler"), read_count(shortest, "shortest")
@@ -143,9 +145,9 @@ def recurrence(
 
 
 def counted(matrix: BoolArray, threshold: float, theiler: int, shortest: int) -> Recurrence:
-    """Count the lines of a recurrence matrix: symmetric, true on the main diagonal."""
+    """Quantify the lines of a recurrence matrix: symmetric, true on the main diagonal."""
     count = len(matrix)
-    # The matrix is symmetric: one half of it has all diagonal lines.
+    # The matrix is symmetric: one half of it contains all diagonal lines.
     diagonals = np.sort(
         np.concatenate([run_lengths(matrix.diagonal(k)) for k in range(theiler, count)] or [np.zeros(0, int)])
     )
@@ -171,13 +173,13 @@ def counted(matrix: BoolArray, threshold: float, theiler: int, shortest: int) ->
 
 
 def run_lengths(points: BoolArray) -> IntArray:
-    """Return the lengths of the unbroken rows of true values, in order."""
+    """Compute the lengths of the runs of true values, in order."""
     steps = np.diff(np.concatenate([[0], points.astype(np.int8), [0]]))
     return np.asarray(np.flatnonzero(steps == -1) - np.flatnonzero(steps == 1), dtype=np.int64)
 
 
 def _distances(scaled: FloatArray) -> FloatArray:
-    """Return the largest differences of a component of all pairs."""
+    """Compute the distances of all pairs: the largest difference of a component."""
     count = len(scaled)
     distances = np.empty((count, count))
     for first in range(0, count, _ROWS):
@@ -187,7 +189,7 @@ def _distances(scaled: FloatArray) -> FloatArray:
 
 
 def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
-    """Return the smallest threshold with which at least this part of the counted pairs recurs."""
+    """Find the smallest threshold whose recurrence rate is at least `rate`."""
     if not 0.0 < rate <= 1.0:
         raise InputError.of("rate", rate, "a part of all pairs, above 0 up to 1")
     pairs = distances[np.triu_indices(len(distances), theiler)]

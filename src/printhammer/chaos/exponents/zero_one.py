@@ -1,16 +1,15 @@
-"""The 0-1 test: is a series of numbers chaotic or regular? A second opinion that needs no tangent flow.
+"""The 0-1 test for chaos in a series of numbers: a second opinion without a tangent flow.
 
-The numbers phi(1), phi(2), ... push a point about in a plane, each in a direction that turns on by an angle
-c,
+The numbers phi(1), phi(2), ... drive a point in a plane, each in a direction that advances by an angle c,
 
     p_c(n) = sum of phi(j) cos(j c),   q_c(n) = sum of phi(j) sin(j c),   j = 1 ... n.
 
-Where the series is regular the point stays within bounds; where it is chaotic it wanders off like a random
-walk, and its mean square displacement M_c(n) grows in proportion to n. The growth is measured by the
-correlation K_c of M_c(n) with n (G. A. Gottwald and I. Melbourne, Proc. R. Soc. Lond. A 460 (2004) 603; SIAM
-J. Appl. Dyn. Syst. 8 (2009) 129; the correlation method and its limits: same authors, Springer Lect. Notes
-Phys. 915 (2016) 221). K is the median over many angles, since at the few that resonate with the series a
-regular one walks away too.
+For a regular series the point stays bounded; for a chaotic series it performs a random walk, and its mean
+square displacement M_c(n) grows in proportion to n. The growth is measured by the correlation K_c of M_c(n)
+with n (G. A. Gottwald and I. Melbourne, Proc. R. Soc. Lond. A 460 (2004) 603; SIAM J. Appl. Dyn. Syst. 8
+(2009) 129; the correlation method and its limits: same authors, Springer Lect. Notes Phys. 915 (2016) 221). K
+is the median over many angles, since at the few angles that resonate with a regular series its path grows,
+too.
 """
 
 from __future__ import annotations
@@ -31,45 +30,45 @@ from printhammer.run.regime import Firing, Regime
 from printhammer.support.arrays import FloatArray
 
 ANGLES: Final = 100
-"""Number of angles c unless told otherwise."""
+"""Default number of angles c."""
 
 RANGE: Final = (math.pi / 5.0, 4.0 * math.pi / 5.0)
-"""Angles lie between these: nearer to 0 and pi short cycles resonate."""
+"""Range of the angles: nearer to 0 and pi, short cycles resonate."""
 
 SEED: Final = 1983
-"""Seed of the angles unless told otherwise."""
+"""Default seed of the angles."""
 
 REGULAR: Final = 0.2
 CHAOTIC: Final = 0.8
-"""K up to which a series is regular, and from which on it is chaotic.
+"""Values of K up to which a series is regular, and from which on it is chaotic.
 
-K^2 is the part of the ups and downs of M_c(n) that a straight line accounts for: less than a twentieth, or
-about two thirds and more.
+K^2 is the fraction of the variance of M_c(n) that a straight line explains: less than a twentieth, or about
+two thirds and more.
 """
 
 FEWEST: Final = 100
-"""Least length of a series; the mean square displacement is taken up to a tenth of it."""
+"""Smallest length of a series; the mean square displacement is computed up to a tenth of it."""
 
 SETTLING: Final = 0.5
-"""Changes die out that are smaller by this factor in the last quarter of a series than in the first."""
+"""A series is a transient if its changes shrink by this factor from the first quarter to the last."""
 
 LONGEST_CYCLE: Final = 64
-"""Largest number q after which a series may repeat itself; at most a quarter of its length."""
+"""Largest cycle length q of a series; at most a quarter of its length."""
 
 CYCLES: Final = 5
-"""Growth counts as chaos where it is seen over so many cycles q; within one, any path may go away."""
+"""Number of cycles q over which growth has to be seen to count as chaos; within one, any path may grow."""
 
 FOLLOWS: Final = 0.7
-"""Numbers follow from those before where images of neighbours are closer than this share of any two."""
+"""A series is deterministic if images of neighbours are closer than this fraction of any two images."""
 
 _CUT: Final = 10
 _PASSES: Final = 4
 _TOGETHER: Final = 1 << 20
-"""Complex numbers that are worked on together."""
+"""Number of complex numbers processed in one batch."""
 
 
 class ZeroOne(Result):
-    """What the 0-1 test says of a series."""
+    """Result of the 0-1 test of a series."""
 
     k: float = scalar(
         "1",
@@ -102,13 +101,13 @@ class ZeroOne(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what this is."""
+        """Title of the result, in one line."""
         return "0-1 test for chaos"
 
     @property
     def phrase(self) -> str:
         """The outcome in one line."""
-        # Without the sign of a zero.
+        # Avoids a negative zero.
         k = round(self.k, 3) + 0.0
         return f"K = {k:.3f}, median of {len(self.angles)} angles over {self.length} numbers"
 
@@ -136,31 +135,31 @@ def zero_one(
     seed: int = SEED,
     **firing: Unpack[Firing],
 ) -> ZeroOne:
-    """Return what the 0-1 test says of a series, or of the displacements at the points of a strobe.
+    """Apply the 0-1 test to a series, or to the displacements of strobe points.
 
-    What repeats itself only makes M_c(n) oscillate, and hides slow growth. The test of 2009 takes out what
-    the mean adds, (mean)^2 (1 - cos n c)/(1 - cos c). Here the mean is taken out of the series itself, which
-    is the same in the limit and loses no digits; and of a series that nearly repeats itself every q numbers
-    the mean of each q-th one is, so that chaos within narrow bands is seen in short series too.
+    Periodic components make M_c(n) oscillate, and hide slow growth. The test of 2009 subtracts the
+    contribution of the mean, (mean)^2 (1 - cos n c)/(1 - cos c). Here the mean is subtracted from the series
+    itself, which is the same in the limit and loses no digits; from a series that nearly repeats every q
+    numbers the mean of each q-th number is subtracted, so that chaos within narrow bands is seen in short
+    series, too.
 
-    What is left of a series that has settled is the noise of the arithmetic, which wanders like chaos. So an
-    oscillation of the size of `resolution` is added, (resolution)^2 sin(n sqrt 2), as J. H. P. Dawes and M.
-    C. Freeland (2008, unpublished; see the review of 2016) do to damp weak noise: growth counts where it
-    exceeds that. A series whose changes die out is a transient, of which the test can say nothing.
+    The remainder of a settled series is rounding noise, which wanders like chaos. So an oscillation of the
+    size of `resolution` is added, (resolution)^2 sin(n sqrt 2), as J. H. P. Dawes and M. C. Freeland (2008,
+    unpublished; see the review of 2016) do to damp weak noise: only growth beyond it counts. A series whose
+    changes die out is a transient, on which the test cannot decide.
 
     Parameters
     ----------
     series : array, Strobe, Regime or Hammer
-        At least 100 numbers; or strobe points, whose displacements are taken; or a regime, or a hammer and
-        how it is fired, of which a thousand points are, after a thousand firings.
+        At least 100 numbers; or strobe points, whose displacements are used; or a regime, or a hammer with
+        the keywords `firing`, for which a thousand points are computed, after a thousand firings.
     resolution : float, optional
-        Amplitude up to which changes count as none, in the unit of the series. By default 1e-12 of the
-        largest absolute value; for strobe points what also counts as agreement there, 1e-6 of the half-width
-        of the window.
+        Amplitude below which changes are ignored, in the unit of the series. By default 1e-12 of the largest
+        absolute value; for strobe points the agreement of a verdict, 1e-6 of the half-width of the window.
     angles : int, optional
         Number of random angles.
     seed : int, optional
-        Of the angles.
+        Seed of the angles.
     **firing
         How a hammer is fired, as for `printhammer.Regime.of`.
 
@@ -206,7 +205,7 @@ def zero_one(
         correlations = np.concatenate(
             [_correlations(_displacements(_paths(rest, some), least)) for some in pieces]
         )
-        # The lower of the two in the middle, so that there is an angle which has it.
+        # The lower of the two middle values, so that an angle has it.
         shown = int(np.argsort(correlations, kind="stable")[(many - 1) // 2])
         path = _paths(rest, chosen[shown : shown + 1])
         displacement = _displacements(path, least)[0]
@@ -230,7 +229,7 @@ def zero_one(
 
 
 def _judged(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
-    """Return verdict and, where it is "undecided", the reason."""
+    """Return the verdict and, if it is "undecided", the reason."""
     if k <= REGULAR:
         return "regular", ""
     quarter = rest.size // 4
@@ -253,19 +252,19 @@ def _paths(rest: FloatArray, angles: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> FloatArray:
-    """Return mean square displacements up to a tenth of the length, weak noise damped."""
+    """Compute mean square displacements up to a tenth of the length, with weak noise damped."""
     moved = mean_square_displacements(paths, paths.shape[1] // _CUT)
     steps = np.arange(1, moved.shape[1] + 1)
     return np.asarray(moved + resolution**2 * np.sin(math.sqrt(2.0) * steps))
 
 
 def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArray]:
-    """Return after how many numbers a series most nearly repeats itself, and what is left without that part.
+    """Estimate the cycle length of a series, and return the series without the means over the cycle.
 
-    That is the number q, 1 for the mean alone, whose q means are worth their number by the criterion of G.
-    Schwarz (Ann. Statist. 6 (1978) 461): n ln(variance left) + q ln(n) is least. Left is the series without
-    the means of every q-th number. Changes up to the resolution count as none. Where what would be left does
-    not follow from itself, it is noise on a cycle: by itself that wanders like chaos, so it stays on it.
+    The cycle length q, 1 for the mean alone, minimises the criterion of G. Schwarz (Ann. Statist. 6 (1978)
+    461), n ln(residual variance) + q ln(n), and the means of every q-th number are subtracted. Changes up to
+    the resolution are ignored. A residual that is not deterministic is noise on a cycle, which by itself
+    wanders like chaos; then the cycle is not subtracted.
     """
     worth = []
     for q in range(1, min(LONGEST_CYCLE, numbers.size // _PASSES) + 1):
@@ -274,15 +273,15 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
         worth.append(numbers.size * math.log(variance) + q * math.log(numbers.size))
     cycle = int(np.argmin(worth)) + 1
     rest = _less_means(numbers, cycle)
-    if cycle > 1 and float(rest.std()) > resolution and not _follows_from_itself(rest, cycle):
+    if cycle > 1 and float(rest.std()) > resolution and not _is_deterministic(rest, cycle):
         return 1, _less_means(numbers, 1)
     return cycle, rest
 
 
-def _follows_from_itself(rest: FloatArray, q: int) -> bool:
-    """Tell whether neighbours at the same place of a cycle of q numbers are neighbours one number later, too.
+def _is_deterministic(rest: FloatArray, q: int) -> bool:
+    """Whether neighbours at the same phase of a cycle of q numbers are neighbours one number later.
 
-    Neighbours are told by their numbers alone, or by the ones before as well.
+    Neighbours are determined by their numbers alone, or together with the numbers before.
     """
     shares = []
     for before in (0, 1):
@@ -308,9 +307,9 @@ def _less_means(numbers: FloatArray, q: int) -> FloatArray:
 
 
 def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> FloatArray:
-    """Return mean |z(j + n) - z(j)|^2 over j, for n from 1 to `cut`, of each of m rows z, shape (m, cut).
+    """Compute mean |z(j + n) - z(j)|^2 over j, for n from 1 to `cut`, for each of m rows z, shape (m, cut).
 
-    j runs over the first N - cut of N places, so that all means are of equally many.
+    j runs over the first N - cut of N indices, so that all means have the same number of terms.
     """
     many, count = paths.shape
     first = count - cut
@@ -325,7 +324,7 @@ def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> Fl
 
 
 def _correlations(displacements: FloatArray) -> FloatArray:
-    """Return the correlation of each row with 1, 2, ...; 0 for a row that does not change at all."""
+    """Compute the correlation of each row with 1, 2, ...; 0 for a constant row."""
     count = displacements.shape[1]
     away = np.arange(count) - 0.5 * (count - 1)
     rows = displacements - displacements.mean(axis=1, keepdims=True)

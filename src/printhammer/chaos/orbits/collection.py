@@ -1,4 +1,4 @@
-"""The periodic orbits that a search has found, and how sure it is that there are no others."""
+"""Result of a search for periodic orbits, with estimates of the number of missing orbits."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ _STYLES: Final[dict[str, Style]] = {
 
 
 def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest: int) -> dict[int, int]:
-    """Return the sums of the indices of the fixed points over 1, 2, ... firings.
+    """Compute the sums of the indices of the fixed points over 1, 2, ... firings.
 
     The index of a fixed point is the sign of det(I - M), M the derivative of the map over so many firings: -1
     for a saddle with a multiplier beyond +1, else +1. If the map is continuous and maps a disc into itself,
     the indices of all fixed points in it add up to 1 (S. Lefschetz, Trans. Am. Math. Soc. 28 (1926) 1).
-    Orbits are pairs of firings and multipliers.
+    `orbits` are pairs of firings and multipliers.
     """
     sums = {}
     for count in range(1, longest + 1):
@@ -73,15 +73,15 @@ def energies_of(regime: Regime) -> list[str]:
 
 
 class Orbits(Result):
-    """The periodic orbits that a search has found, and what became of the search.
+    """Periodic orbits found by a search, and the outcome of its guesses.
 
-    That an orbit is not among them does not prove that there is none.
+    The list may be incomplete: further orbits may exist.
     """
 
     regime: Regime = part("hammer and periodic drive")
     found: tuple[Orbit, ...] = part("the orbits, by number of firings, stable ones first")
-    longest: int = scalar("1", "largest number of firings that was looked for")
-    starts: int = scalar("1", "number of motions in which close returns were looked for")
+    longest: int = scalar("1", "largest orbit period searched for, in firings")
+    starts: int = scalar("1", "number of motions searched for close returns")
     guesses: tuple[int, ...] = scalar("1", "number of guesses for orbits of 1, 2, ... firings")
     repeats: int = scalar("1", "how many guesses led to an orbit of another one, or to one of fewer firings")
     hits: tuple[int, ...] = scalar("1", "how many guesses led to each orbit")
@@ -90,11 +90,11 @@ class Orbits(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the orbits are."""
+        """Title of the result, in one line."""
         return f"periodic orbits of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def summary(self) -> Summary:
-        """Return the orbits, a row each, and how the search ended."""
+        """Tabulate the orbits, a row each, and the outcome of the search."""
         if not self.found:
             return Summary([self.message])
         columns = [
@@ -122,42 +122,42 @@ class Orbits(Result):
 
     @property
     def stable(self) -> tuple[Orbit, ...]:
-        """Those that are stable."""
+        """The stable orbits."""
         return tuple(orbit for orbit in self.found if orbit.kind == STABLE)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of orbits of each kind that there is."""
+        """Number of orbits of each kind."""
         counts = Counter(orbit.kind for orbit in self.found)
         return {kind: counts[kind] for kind in KINDS if counts[kind]}
 
     @property
     def coverage(self) -> float:
-        """Estimated share of further guesses that close which would lead to one of the list; NaN without any.
+        """Estimated fraction of further converging guesses that lead to a known orbit; NaN without guesses.
 
-        No bound: orbits that no guess came near are not counted.
+        Not a bound: orbits that no guess came near are not counted.
 
-        One less the share of those that led to an orbit to which no other one did (I. J. Good, Biometrika 40
-        (1953) 237).
+        Good-Turing estimate: 1 minus the fraction of guesses whose orbit no other guess led to (I. J. Good,
+        Biometrika 40 (1953) 237).
         """
         return 1.0 - self.hits.count(1) / sum(self.hits) if self.hits else math.nan
 
     @property
     def unseen(self) -> float:
-        """Estimated least number of orbits that are not in the list.
+        """Estimated lower bound of the number of orbits that are not in the list.
 
-        f1 (f1 - 1) / (2 (f2 + 1)), with f1 orbits to which one guess led and f2 to which two did (A. Chao,
-        Scand. J. Statist. 11 (1984) 265). Of orbits to which no guess leads it knows nothing; but where the
-        indices do not add up, one at least for each of those numbers of firings.
+        f1 (f1 - 1) / (2 (f2 + 1)), with f1 orbits that one guess led to and f2 that two guesses led to (A.
+        Chao, Scand. J. Statist. 11 (1984) 265). Orbits that no guess leads to are not estimated; but where
+        the indices do not add up, at least one for each of these numbers of firings.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
         return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(len(self.incomplete)))
 
     @property
     def indices(self) -> dict[int, int]:
-        """Sum of the indices of the fixed points of the strobe map over 1, 2, ... firings.
+        """Sums of the indices of the fixed points of the strobe map over 1, 2, ... firings.
 
-        See `index_sums`. Empty where no theorem says what they add up to.
+        See `index_sums`. Empty if no theorem gives the sum.
         """
         if not indices_add_up(self.regime) or any(orbit.kind == UNDECIDED for orbit in self.found):
             return {}
@@ -165,12 +165,12 @@ class Orbits(Result):
 
     @property
     def incomplete(self) -> tuple[int, ...]:
-        """Numbers of firings over which the indices do not add up to 1: there orbits are missing."""
+        """Numbers of firings over which the indices do not add up to 1, so that orbits are missing."""
         return tuple(count for count, total in self.indices.items() if total != 1)
 
     @property
     def message(self) -> str:
-        """What was found and what became of the other guesses, in one line."""
+        """Summary of the orbits and of the outcome of the guesses, in one line."""
         what = ", ".join(f"{number} {kind}" for kind, number in self.counts.items())
         count = len(self.found)
         most = "1 firing" if self.longest == 1 else f"up to {self.longest} firings"
@@ -196,12 +196,12 @@ class Orbits(Result):
         return f"{head}{f' ({what})' if what else ''}; {tried}{': ' if ends else ''}{'; '.join(ends)}{sure}"
 
     def notes(self) -> dict[str, Any]:
-        """Return what became of the search, for the attributes of the Dataset."""
+        """Return the outcome of the search, for the attributes of the Dataset."""
         ends = "; ".join(f"{number}: {reason}" for reason, number in sorted(self.failures.items()))
         return {"failures": ends, "search": self.message}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return what is known of the orbits over `orbit`, `firing` and `multiplier`.
+        """Return the properties of the orbits over `orbit`, `firing` and `multiplier`.
 
         Beyond the last firing of an orbit numbers are NaN, and the mode is -1.
         """
@@ -209,5 +209,5 @@ class Orbits(Result):
         return {"orbit": (number, np.arange(len(self.found))), **stacked(self.found, "orbit", Orbit)}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row for each firing of each orbit."""
+        """Convert the orbits to a table with a row for each firing of each orbit."""
         return orbits_table(self.found, self.attributes)

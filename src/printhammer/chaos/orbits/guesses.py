@@ -1,8 +1,8 @@
-"""Guesses of periodic orbits: stretches of motions that nearly come back to where they began.
+"""Initial guesses of periodic orbits: stretches of motions that nearly return to their starts.
 
 Close returns of a recorded motion lie near unstable orbits (D. Auerbach et al., Phys. Rev. Lett. 58 (1987)
-2387). Here the record is one long train from rest, and many short ones from states spread evenly over the
-plane, so that orbits which no train from rest comes near are found too.
+2387). Here the record is one long train from rest, and many short motions from states spread evenly over the
+plane, to find orbits that no train from rest approaches.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 PHASES: Final = (0.0, 0.5)
-"""Sections at which orbits are looked for; the second one where the first falls into the pack."""
+"""Phases of the sections at which orbits are sought; the second is for orbits in the pack at the first."""
 
 _ALIKE: Final = 0.02
-"""Distance, in half-widths, up to which guesses count as the same."""
+"""Distance, in half-widths, below which guesses are duplicates."""
 _EARLY_ALIKE: Final = 0.1
-"""The same for those that begin early, so that they lie all over the plane."""
+"""As `_ALIKE`, for guesses from the beginning of a record, which are to cover the plane."""
 _LOOKED_AT: Final = 4000
-"""Returns that are looked at, closest first, for guesses that are not alike."""
+"""Number of returns, closest first, that are tested for duplicates."""
 _EARLY: Final = 2
-"""Firings of a record that count as early."""
+"""Number of firings of a record that count as its beginning."""
 _LEAST: Final = 16
-"""Least number of firings for which a motion is followed."""
+"""Smallest number of firings for which a motion is followed."""
 _ROOM: Final = 1.2
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
@@ -43,30 +43,30 @@ _PLASTIC: Final = 1.324717957244746
 
 
 class Records(Declared):
-    """States of many motions at the sections, from one on."""
+    """States of many motions at the sections of one phase."""
 
     states: FloatArray = part(
         "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run ended before"
     )
-    usable: BoolArray = part("whether that is the whole state, shape (M, n)")
-    begins: bool = part("whether the first one is the long one", default=True)
+    usable: BoolArray = part("whether displacement and velocity are the whole state, shape (M, n)")
+    begins: bool = part("whether the first record is the long one", default=True)
 
     def rows(self, begin: int, end: int) -> Records:
-        """Return the records from one number to before another."""
+        """Return the records with indices from `begin` to before `end`."""
         return Records(self.states[begin:end], self.usable[begin:end], begins=not begin)
 
 
 def firings_for(period: int) -> int:
-    """Return for how many firings motions are followed to find orbits of a period."""
+    """Compute the number of firings for which motions are followed to find orbits of a period."""
     return max(2 * period, _LEAST)
 
 
 def record(
     regime: Regime, starts: FloatArray, firings: int, long: int, threads: int | None = None
 ) -> list[Records]:
-    """Follow a hammer from states at a firing, shape (M, 2), and return a record for each of `PHASES`.
+    """Follow a hammer from states at a firing, shape (M, 2); return the records at each of `PHASES`.
 
-    From the first one for `long` firings, from the others for `firings`.
+    The motion from the first state is followed for `long` firings, the others for `firings`.
     """
     longest = max(firings, long) if len(starts) else 0
     drive, _ = regime.train(longest + 1)
@@ -95,11 +95,11 @@ def record(
 
 
 def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
-    """Return states spread evenly: half of them over the window, half over all that a motion visits.
+    """Spread states evenly: half of them over the window, half over the region that motions visit.
 
-    Where the way is not bounded by both backstop and pack, the latter is no smaller than six times the scales
-    of the motion, which then are the half-widths of the window: a ball that bounces once a period rises five
-    of them high. States are displacement, m, and velocity, m/s, a row each.
+    Where backstop and pack do not both bound the displacement, the region is at least six times the scales of
+    the motion, which then are the half-widths of the window: a ball that bounces once a period rises five of
+    them high. States are displacement, m, and velocity, m/s, a row each.
     """
     window = regime.window
     low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])
@@ -121,7 +121,7 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
     share = (0.5 + number * np.array([1.0 / _PLASTIC, 1.0 / _PLASTIC**2])) % 1.0
     odd = (number % 2).astype(bool)
     states: FloatArray = np.where(odd, wide_low + share * (wide_high - wide_low), low + share * (high - low))
-    # A motion may begin where the law of the magnet holds, and not behind a rigid backstop.
+    # A state is valid where the law of the magnet holds and no rigid backstop is penetrated.
     magnet, backstop = regime.hammer.magnet, regime.hammer.backstop
     least, most = magnet.domain if magnet is not None else (-np.inf, np.inf)
     if backstop is not None and backstop.law == "rigid":
@@ -131,7 +131,7 @@ def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
 
 
 def first_state(regime: Regime) -> tuple[float, float]:
-    """Return the rest state of the hammer, or where it has none, the middle of its window."""
+    """Return the rest state of the hammer or, if it has none, the middle of its window."""
     try:
         return rest_state(regime.hammer), 0.0
     except InputError:
@@ -140,11 +140,11 @@ def first_state(regime: Regime) -> tuple[float, float]:
 
 
 def touches(regime: Regime, count: int) -> FloatArray:
-    """Return states at a firing of motions that have just left a rigid backstop, shape (count, 2).
+    """Compute states at a firing of motions that have just left a rigid backstop, shape (count, 2).
 
-    Phases and speeds are spread evenly, slow ones more densely: near a chatter, where an armature bounces
-    ever lower, orbits crowd that no even spread over the plane comes near. Where a run ends before the
-    firing, the rest state.
+    Phases and speeds are spread evenly, low speeds more densely: near a chatter, where the bounces of an
+    armature accumulate, orbits are so dense that no even spread over the plane resolves them. If a run ends
+    before the firing, the rest state is returned.
     """
     number = np.arange(1, count + 1)
     phases, shares = ((0.5 + number / _PLASTIC**k) % 1.0 for k in (1, 2))
@@ -161,12 +161,12 @@ def touches(regime: Regime, count: int) -> FloatArray:
 def close_returns(
     records: Records, period: int, most: int, scales: FloatArray, within: int
 ) -> tuple[list[Guess], list[Guess]]:
-    """Return the closest returns of records after `period` firings that are not alike, half of `most` each.
+    """Select the closest returns of records after `period` firings that are no duplicates.
 
-    Of the short records the first `within` firings count.
+    Only the first `within` firings of the short records are used.
 
-    First the closest of all, then the closest of those that begin early; distances are in the scales, the
-    half-widths of the window. With a larger `most` both lists begin as they do with a smaller one.
+    Half of `most` are the closest returns of all, half the closest returns that begin early; distances are in
+    the scales, the half-widths of the window. With a larger `most` both lists are extended.
     """
     scaled = records.states / scales
     count = scaled.shape[1] - period
@@ -177,7 +177,7 @@ def close_returns(
     # The first record is the long one.
     rows = slice(1, None) if records.begins else slice(None)
     gap[rows, max(within - period + 1, 0) :] = np.inf
-    # Late returns lie close to what attracts, early ones everywhere.
+    # Late returns are close to attractors, early returns cover the plane.
     early = gap.copy()
     early[:, _EARLY:] = np.inf
     lists: list[list[Guess]] = []
@@ -203,10 +203,10 @@ def close_returns(
 def joined(
     shorter: Sequence[Guess], period: int, most: int, scales: FloatArray, known: Collection[tuple[int, int]]
 ) -> list[Guess]:
-    """Return guesses of `period` firings made of two shorter orbits, one run through after the other.
+    """Concatenate pairs of shorter orbits to guesses of `period` firings.
 
-    `most` at most, those with the smallest jump from one orbit to the other first; none of the pairs of
-    places that are known.
+    At most `most` pairs are used, those with the smallest jumps between the orbits first; pairs of indices in
+    `known` are left out.
     """
     guesses: list[tuple[float, Guess]] = []
     for k, orbit in enumerate(shorter):
@@ -223,7 +223,7 @@ def joined(
 
 
 def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
-    """Tell whether a cycle is none of others, whichever of its states comes first."""
+    """Whether a cycle differs from all others, up to a cyclic shift."""
     if not len(kept):
         return True
     return all(

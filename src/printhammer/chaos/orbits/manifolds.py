@@ -1,16 +1,16 @@
 """Stable and unstable manifolds of saddles of the strobe map, as curves in the plane of states.
 
-The unstable manifold of a saddle is the set of states that come from it, the stable one that of the states
-which are led to it; the latter bounds basins. Both are tangent at the saddle to an eigenvector of the
-monodromy matrix. The unstable one is grown from a fundamental segment on that eigenvector, whose images under
-the map are the whole curve; where two images lie too far apart or the curve bends too much, a point of the
-segment between them is followed as well (D. Hobson, J. Comput. Phys. 104 (1993) 14). Time does not run back
-through the paper's pack or a contact at rest, so the stable one is continued instead: each further point is
-the state whose image is a point of the curve already known, by Newton's method with the tangent flow (J. P.
-England, B. Krauskopf and H. M. Osinga, SIAM J. Appl. Dyn. Syst. 3 (2004) 161).
+The unstable manifold of a saddle is the set of states whose backward orbits converge to it, the stable
+manifold the set of states whose forward orbits do; the latter bounds basins. Both are tangent at the saddle
+to an eigenvector of the monodromy matrix. The unstable manifold is grown from a fundamental segment on that
+eigenvector, whose images under the map are the whole curve; where two images lie too far apart or the curve
+bends too much, a point of the segment between them is added (D. Hobson, J. Comput. Phys. 104 (1993) 14). The
+map has no inverse through the paper's pack or a contact at rest, so the stable manifold is continued instead:
+each further point is the state whose image is a point of the known curve, found by Newton's method with the
+tangent flow (J. P. England, B. Krauskopf and H. M. Osinga, SIAM J. Appl. Dyn. Syst. 3 (2004) 161).
 
-Lengths are in half-widths of the strobe window. Weakness: a curve ends where the map has no derivative or the
-state is none, such as below a rigid backstop; what lies beyond is not found.
+Lengths are in half-widths of the strobe window. Limitation: a curve ends where the map is not differentiable
+or the state is invalid, as below a rigid backstop; its continuation beyond is not found.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from printhammer.support.arrays import FloatArray, IntArray
 
 KINDS: Final = ("stable", "unstable")
 LENGTH: Final = 10.0
-"""Length of each of the curves unless told otherwise."""
+"""Default length of each curve."""
 POINTS: Final = 4000
-"""Points of each of the curves, at most, unless told otherwise."""
+"""Default maximum number of points of each curve."""
 SPACING: Final = 0.02
-"""Distance of neighbouring points that is aimed at, unless told otherwise."""
+"""Default target distance of neighbouring points."""
 BEND: Final = 0.2
-"""Angle between neighbouring pieces, rad, above which the curve gets more points."""
+"""Angle between neighbouring segments, rad, above which points are added."""
 
 _NEAR: Final = 1e-5
-"""Distance from the saddle up to which a manifold is taken to be straight."""
+"""Distance from the saddle within which a manifold is straight."""
 _FINEST: Final = 1e-3
-"""Share of the spacing below which a bend gets no more points."""
+"""Fraction of the spacing below which a bend gets no more points."""
 _TIGHT: Final = 1e-12
-"""Distance of points of a fundamental segment below which what lies apart is a jump."""
+"""Distance of points of a fundamental segment below which a gap of their images is a jump."""
 _SETTLED: Final = 0.1
-"""Extent of the image of a fundamental segment, as a fraction of the spacing, that may be at a sink."""
+"""Extent of the image of a fundamental segment, as a fraction of the spacing, at which a sink is tested."""
 _CLOSE: Final = 1e-10
 _NEWTON: Final = 8
 _FEW: Final = 4
@@ -57,7 +57,7 @@ _FEW: Final = 4
 class Manifolds(Result, rows="point"):
     """Stable and unstable manifolds of one saddle: curves from each of its states to both sides.
 
-    A jump of the strobe map, where a contact happens at the section, shows as a row of NaN.
+    A jump of the strobe map, where a contact happens at the section, appears as a row of NaN.
     """
 
     orbit: Orbit = part("the saddle")
@@ -72,11 +72,11 @@ class Manifolds(Result, rows="point"):
         'why each curve ends: "length"; "points"; "sink", where it runs into a stable orbit; "no preimage",'
         ' where Newton\'s method finds none; "no value", where no run comes through'
     )
-    spacing: float = part("distance of neighbouring points that was aimed at")
+    spacing: float = part("target distance of neighbouring points")
 
     @property
     def title(self) -> str:
-        """One line that says what the curves are."""
+        """Title of the result, in one line."""
         return f"manifolds of the {self.orbit.name} of {self.orbit.regime.hammer.name}"
 
     def points(self, number: int) -> FloatArray:
@@ -103,30 +103,30 @@ def manifolds(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[AtFixedTolerance],
 ) -> Manifolds:
-    """Return the stable and unstable manifolds of a saddle, at the phase of its section.
+    """Compute the stable and unstable manifolds of a saddle, at the phase of its section.
 
     Parameters
     ----------
     orbit : Orbit
         A saddle, see `printhammer.orbits`.
     length : float, optional
-        Of each curve, in half-widths of the strobe window, along it.
+        Arc length of each curve, in half-widths of the strobe window.
     points : int, optional
-        Of each curve, at most.
+        Maximum number of points of each curve.
     spacing : float, optional
-        Distance of neighbouring points that is aimed at, in the same unit.
+        Target distance of neighbouring points, in half-widths of the strobe window.
     kinds : tuple of str, optional
         "stable", "unstable", or both.
 
     Returns
     -------
     Manifolds
-        Of an orbit of n firings 2 n curves of each kind.
+        For an orbit of n firings 2 n curves of each kind.
 
     Raises
     ------
     InputError
-        The orbit is no saddle with a derivative, or an argument is not what is described above.
+        The orbit is not a saddle with a derivative, or an argument is not as described above.
     """
     if not orbit.ok or orbit.kind != SADDLE:
         raise InputError(
@@ -171,28 +171,28 @@ class _Limits:
 
 @dataclass
 class _Curve:
-    """A curve from a saddle on, in half-widths of the window."""
+    """A curve starting at a saddle, in half-widths of the window."""
 
     points: FloatArray
     end: str
 
 
 class Scaled:
-    """The strobe map in half-widths of the window, with its derivative."""
+    """The strobe map and its derivative, in half-widths of the window."""
 
     def __init__(self, regime: Regime, tolerance: float) -> None:
         self.maps, self.scales = ExactMaps(regime, Effort(tolerance, threads=1)), regime.window.half_widths
 
     def inward(self, states: FloatArray) -> FloatArray:
-        """Return states, m and m/s, in half-widths."""
+        """Convert states, m and m/s, to half-widths."""
         return np.asarray(states / self.scales)
 
     def outward(self, points: FloatArray) -> FloatArray:
-        """Return points in half-widths as states, m and m/s."""
+        """Convert points in half-widths to states, m and m/s."""
         return np.asarray(points * self.scales)
 
     def image(self, point: FloatArray, firings: int) -> tuple[FloatArray, FloatArray]:
-        """Return the image of a point and the derivative there; NaN where there is none."""
+        """Compute the image of a point and the derivative; NaN if the run fails."""
         images = self.maps(self.outward(point)[np.newaxis], np.array([firings]))
         if images.reasons[0] != CLOSED:
             return np.full(2, np.nan), np.full((2, 2), np.nan)
@@ -201,12 +201,12 @@ class Scaled:
 
 
 def _direction(own: Scaled, saddle: FloatArray, firings: int, stable: bool) -> tuple[FloatArray, float, int]:
-    """Return the eigenvector at a saddle, how it grows in a number of firings, and that number.
+    """Return the eigenvector at a saddle, its factor over a number of firings, and that number.
 
-    Where the multiplier is negative a state changes sides, so that two periods of the orbit are one step.
+    With a negative multiplier a state changes sides, so that one step is two periods of the orbit.
     """
     _, jacobian = own.image(saddle, firings)
-    # Of the two the smaller one would drown in the rounding of the trace.
+    # The smaller eigenvalue would be lost in the rounding of the trace.
     large, small = (float(value.real) for value in multipliers_of(jacobian[np.newaxis]))
     multiplier = small if stable else large
     first = jacobian - multiplier * np.eye(2)
@@ -238,7 +238,7 @@ def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits
         row = [own.image(point, firings)[0] if np.isfinite(point).all() else point for point in row]
         k = 0
         while k + 1 < len(row):
-            gap, close = _gap(row, k, limits.spacing), shares[k + 1] - shares[k] <= _TIGHT
+            gap, close = _has_gap(row, k, limits.spacing), shares[k + 1] - shares[k] <= _TIGHT
             if gap and not close and len(points) + len(row) < 2 * limits.points:
                 shares.insert(k + 1, 0.5 * (shares[k] + shares[k + 1]))
                 row.insert(k + 1, on_segment(shares[k + 1], level))
@@ -263,7 +263,7 @@ def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits
 
 
 def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> FloatArray | None:
-    """Return the stable fixed point no farther than the spacing from a point, if Newton's method finds it."""
+    """Find the stable fixed point within the spacing from a point by Newton's method; None if not found."""
     guess = point
     for _ in range(_NEWTON):
         image, jacobian = own.image(guess, firings)
@@ -278,12 +278,12 @@ def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> Float
     return None
 
 
-def _gap(row: list[FloatArray], k: int, spacing: float) -> bool:
-    """Return whether a curve needs a point after its k-th one."""
+def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
+    """Whether a curve needs a point after its k-th point."""
     here, there = row[k], row[k + 1]
     step = float(np.hypot(*(there - here)))
     if not math.isfinite(step):
-        # Beside the end of a curve: as close to it as to its other points.
+        # Points at the end of a curve are tested against their neighbours and the end.
         return bool(np.isfinite(here).any() != np.isfinite(there).any())
     if step > spacing:
         return True
@@ -294,7 +294,7 @@ def _gap(row: list[FloatArray], k: int, spacing: float) -> bool:
 
 
 def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
-    """Continue a stable manifold: each point is the state whose image lies on the curve, further in."""
+    """Continue a stable manifold: each point is the state whose image lies on the known curve."""
     vector, shrink, firings = _direction(own, saddle, firings, stable=True)
     made = _Inward(saddle, side * _NEAR * vector, shrink)
     place, step, total = 1.0, 0.05, 0.0
@@ -307,10 +307,10 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
             end = "no preimage"
             break
         last, wanted = made.points[-1], made.at(place + step - 1.0)
-        # The curve goes on as it was; at first it is straight.
+        # The prediction extrapolates the curve, which is straight at first.
         ahead = made.at(place + step) if len(made.points) >= _FEW else made.ahead(step)
         move = ahead - last
-        # Far away a run may cost anything.
+        # Far away the cost of a run is unbounded.
         near = float(np.hypot(*move)) <= 2.0 * limits.spacing
         solved = _preimage(own, wanted, last + move, firings, limits.spacing) if near else None
         if solved is None:
@@ -333,14 +333,14 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
 
 @dataclass
 class _Inward:
-    """A stable manifold as far as it is known, by a place that grows by 1 from a point to its preimage.
+    """Known section of a stable manifold, parametrised so that a preimage is 1 further along.
 
-    Up to the place 1 it is straight.
+    Up to the parameter 1 it is straight.
     """
 
     saddle: FloatArray
     reach: FloatArray
-    """From the saddle to the place 1."""
+    """Vector from the saddle to the parameter 1."""
     shrink: float
     points: list[FloatArray] = field(default_factory=list)
     places: list[float] = field(default_factory=list)
@@ -350,13 +350,13 @@ class _Inward:
         self.places.append(1.0)
 
     def ahead(self, step: float) -> FloatArray:
-        """Return where the curve would be a step beyond its last place, were it straight."""
+        """Extrapolate the curve linearly a step beyond its last parameter."""
         return np.asarray(self.saddle + (self.points[-1] - self.saddle) * self.shrink**-step)
 
     def at(self, place: float) -> FloatArray:
-        """Return the point at a place: beyond 1 by the cubic through four neighbours.
+        """Interpolate the point at a parameter: beyond 1 by the cubic through four neighbours.
 
-        Of distances from the saddle in units of those that they would have if all were linear.
+        Interpolated are distances from the saddle, divided by the distances of the linear map.
         """
         if place <= 1.0:
             return np.asarray(self.saddle + self.shrink ** (1.0 - place) * self.reach)
@@ -374,7 +374,7 @@ class _Inward:
 def _preimage(
     own: Scaled, wanted: FloatArray, guess: FloatArray, firings: int, spacing: float
 ) -> FloatArray | None:
-    """Return the state near a guess that the map takes to a point, if Newton's method finds it."""
+    """Find the preimage of a point near a guess by Newton's method; None if not found."""
     point = guess
     for _ in range(_NEWTON):
         image, jacobian = own.image(point, firings)
@@ -391,12 +391,12 @@ def _preimage(
 
 
 def _angle(one: FloatArray, other: FloatArray) -> float:
-    """Return the angle between two directions, rad."""
+    """Compute the angle between two directions, rad."""
     across = one[0] * other[1] - one[1] * other[0]
     return abs(math.atan2(across, float(one @ other)))
 
 
 def _along(points: FloatArray) -> FloatArray:
-    """Return the way along a curve at its points; a jump has none."""
+    """Compute the arc length along a curve at its points; a jump has length 0."""
     steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
     return np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,14 +1,14 @@
-"""Newton's method for periodic orbits: many at once, each with several states along the orbit.
+"""Multiple shooting for periodic orbits: damped Newton's method on many orbits at once.
 
-A small error of the state grows from firing to firing on an unstable orbit, by the power of the number of its
-firings. So not one state is looked for, but one at the start of each of several segments, such that the end
-of each is the start of the next (multiple shooting; H. B. Keller, Numerical Methods for Two-Point
-Boundary-Value Problems, Blaisdell 1968).
+On an unstable orbit an error of the state grows exponentially with the number of firings. So the unknowns are
+the states at the starts of several segments, and the end of each segment has to be the start of the next
+(multiple shooting; H. B. Keller, Numerical Methods for Two-Point Boundary-Value Problems, Blaisdell 1968).
 
-Images of many states under the strobe map, in two ways: exact with the tangent flow, or fast side by side.
+Images of many states under the strobe map are computed in two ways: exactly, with the tangent flow, or fast,
+as an ensemble.
 
-The fast way integrates three neighbours of each state together with those of all others, and takes the
-derivative from their differences: good enough for Newton's method to come close.
+The fast way integrates three neighbours of each state, and takes the derivative from their differences,
+accurate enough for the first iterations of Newton's method.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from printhammer.chaos.strobe.map import (
     WITH_MEMORY,
     Image,
     image_of,
-    possible,
-    usable,
+    is_possible,
+    is_usable,
 )
 from printhammer.results import Declared, part
 from printhammer.run.effort import Effort
@@ -37,7 +37,7 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 
 CLOSED: Final = ""
-"""What is told of an orbit that closes; of others it is the reason why it does not."""
+"""Status of an orbit that closes; otherwise the status is the reason why it does not."""
 
 STUCK: Final = "comes no closer"
 TOO_LONG: Final = "too many iterations"
@@ -45,12 +45,12 @@ SINGULAR: Final = "singular derivative"
 
 _LONGEST_STEP: Final = 1.0
 _LEAST_SHARE: Final = 2.0**-7
-"""Longest step, in half-widths of the window, and the least share of a step that is tried."""
+"""Longest step, in half-widths of the window, and smallest step fraction of the damping."""
 
 
 @dataclass(frozen=True)
 class Images:
-    """Images of many states, one row each: states, derivatives, differentiability, reasons of failure."""
+    """Images of many states, a row each: states, derivatives, differentiability, reasons of failure."""
 
     states: FloatArray
     jacobians: FloatArray
@@ -59,7 +59,7 @@ class Images:
 
     @classmethod
     def empty(cls, count: int) -> Images:
-        """Return images of which nothing is known yet."""
+        """Return images that have not been computed yet."""
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, 2, 2), np.nan),
@@ -69,10 +69,10 @@ class Images:
 
 
 class StrobeMaps(Protocol):
-    """Makes the images of states, shape (n, 2), each after its own number of firings, shape (n,)."""
+    """Computes the images of states, shape (n, 2), each after its own number of firings, shape (n,)."""
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Return the images."""
+        """Compute the images."""
 
 
 class Guess(Declared):
@@ -83,7 +83,7 @@ class Guess(Declared):
 
 
 class Closing(Guess):
-    """What Newton's method made of one guess."""
+    """Result of Newton's method for one guess."""
 
     jacobians: FloatArray = part("derivative of the end of each segment by its start, shape (m, 2, 2)")
     residual: float = part("largest distance of an end from the next start, in half-widths of the window")
@@ -106,12 +106,12 @@ def close_orbits(
     enough: float,
     iterations: int,
 ) -> list[Closing]:
-    """Make guesses of orbits, all of as many segments, close by Newton's method with shortened steps.
+    """Converge guesses of orbits, with equal numbers of segments, by damped Newton's method.
 
     Guesses are states at the starts of the segments, shape (n, m, 2), with numbers of firings, shape (n, m);
-    the scales are the half-widths of the window, m and m/s. In units of these, `goal` is the residual at
-    which no more is asked for, and `enough` that which will do where it gets no smaller; `iterations` is the
-    largest number of evaluations of each orbit.
+    the scales are the half-widths of the window, m and m/s. In units of these, iteration stops at the
+    residual `goal`, and a residual of `enough` is accepted if it gets no smaller; `iterations` is the maximum
+    number of evaluations of each orbit.
     """
     search = _Search(maps, guesses, firings, scales)
     for _ in range(iterations):
@@ -122,7 +122,7 @@ def close_orbits(
 
 
 class _Search:
-    """The state of Newton's method for many guesses; all distances in half-widths."""
+    """State of Newton's method for many guesses; all distances in half-widths."""
 
     def __init__(self, maps: StrobeMaps, guesses: FloatArray, firings: IntArray, scales: FloatArray) -> None:
         count, self.segments = guesses.shape[:2]
@@ -141,7 +141,7 @@ class _Search:
         self.open &= np.isfinite(self.residual)
 
     def step(self, goal: float, enough: float) -> IntArray:
-        """Try one step of every orbit that is open; return which those were."""
+        """Try one step of every open orbit; return the indices of these orbits."""
         self._end(self.open & (self.residual <= goal), CLOSED)
         rows = np.flatnonzero(self.open)
         if not rows.size:
@@ -164,7 +164,7 @@ class _Search:
         return rows
 
     def result(self, enough: float) -> list[Closing]:
-        """Return what has become of all guesses."""
+        """Return the outcome of every initial guess."""
         self._end(self.open & (self.residual <= enough), CLOSED)
         return [
             Closing(
@@ -183,7 +183,7 @@ class _Search:
         self.open[rows] = False
 
     def _evaluate(self, z: FloatArray, rows: IntArray) -> tuple[Images, FloatArray, FloatArray, TextArray]:
-        """Return the images of all starts, the gaps to the starts that follow, their size, and reasons."""
+        """Compute the images of all starts, the gaps to the following starts, their norms, and reasons."""
         images = self.maps((z * self.scales).reshape(-1, 2), self.firings[rows].reshape(-1))
         ends = images.states.reshape(z.shape) / self.scales
         defects = ends - np.roll(z, -1, axis=1)
@@ -202,7 +202,7 @@ class _Search:
         reasons: TextArray,
         which: BoolArray | None = None,
     ) -> None:
-        """Keep what was found at the new places, and find out where to go next."""
+        """Accept the values at the new points, and compute the next steps."""
         chosen = np.ones(len(residual), np.bool_) if which is None else which
         shape = (len(residual), self.segments, 2, 2)
         jacobians = images.jacobians.reshape(shape) * self.scales / self.scales[:, np.newaxis]
@@ -215,7 +215,7 @@ class _Search:
         self._aim(rows[~bad])
 
     def _aim(self, rows: IntArray) -> None:
-        """Solve the linear equations of the full step, and shorten it to the longest allowed."""
+        """Solve the linear system of the full step, and clip it to the longest allowed step."""
         m = self.segments
         matrix = np.zeros((len(rows), 2 * m, 2 * m))
         for i in range(m):
@@ -235,9 +235,9 @@ class _Search:
 
 
 _SPACING: Final = 1e-5
-"""Distance of neighbours, in half-widths of the window."""
+"""Finite-difference step, in half-widths of the window."""
 _PIECE: Final = 30_000
-"""States that are integrated together at most, which bounds the memory."""
+"""Maximum number of states integrated in one batch, which bounds the memory."""
 
 
 class ExactMaps:
@@ -247,7 +247,7 @@ class ExactMaps:
         self.regime, self.effort = regime, effort.quiet
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Return the images of states, each after its own number of firings."""
+        """Compute the images of states, each after its own number of firings."""
 
         def image(i: int) -> Image:
             return image_of(self.regime, states[i], int(firings[i]), self.effort.tolerance, contacts=False)
@@ -270,13 +270,13 @@ class FastMaps:
         self.scales = regime.window.half_widths
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Return the images of states, each after its own number of firings."""
+        """Compute the images of states, each after its own number of firings."""
         images = Images.empty(len(states))
         step, hammer = _SPACING * self.scales, self.regime.hammer
         neighbours = states[:, np.newaxis] + np.array([[0.0, 0.0], [step[0], 0.0], [0.0, step[1]]])
         allowed, whole = (
             np.array([all(test(hammer, x, v) for x, v in three) for three in neighbours], np.bool_)
-            for test in (possible, usable)
+            for test in (is_possible, is_usable)
         )
         images.reasons[~allowed] = RANGE_LEFT
         images.reasons[allowed & ~whole] = IN_PACK

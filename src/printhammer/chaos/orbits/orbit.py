@@ -1,4 +1,4 @@
-"""Orbit: a motion that repeats after some firings, stable or not, and what it does in a period."""
+"""Periodic orbit, stable or not: states, multipliers, contacts and energies of one period."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ UNDECIDED: Final = "undecided"
 KINDS: Final = (STABLE, SADDLE, UNSTABLE, UNDECIDED)
 
 NEUTRAL: Final = 1e-6
-"""Distance of the absolute value of a multiplier from 1 within which it does not tell."""
+"""Distance of the absolute value of a multiplier from 1 within which stability is undecided."""
 
 CLOSES: Final = 1e-6
 """Largest distance from itself after a whole period, in half-widths of the window and units of the larger
@@ -43,7 +43,7 @@ multiplier if that is more than 1, with which an orbit counts as one."""
 
 _OK: Final = "ok"
 _KIND: Final = Column(
-    "1", "what becomes of small changes of the state", (), name="kind", dtype=np.int32, codes=KINDS
+    "1", "fate of small perturbations of the state", (), name="kind", dtype=np.int32, codes=KINDS
 )
 _ENERGIES: Final = {
     "coil_work": "work of the coil in a period of the orbit",
@@ -63,7 +63,7 @@ class Orbit(Result):
     """A periodic motion of a hammer under a periodic drive.
 
     Its Floquet multipliers are the eigenvalues of the monodromy matrix, the derivative of the state after a
-    period of the orbit with respect to that before it.
+    period of the orbit with respect to the initial state.
     """
 
     regime: Regime = part("hammer, periodic drive, and phase of the section at which the orbit was found")
@@ -123,12 +123,12 @@ class Orbit(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the orbit is."""
+        """Title of the result, in one line."""
         return f"{self.name} of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     @property
     def ok(self) -> bool:
-        """Whether there is such an orbit."""
+        """Whether the orbit exists: Newton's method converged."""
         return self.status == _OK
 
     @property
@@ -145,9 +145,9 @@ class Orbit(Result):
 
     @property
     def kind(self) -> str:
-        """What becomes of small changes of the state.
+        """Fate of small perturbations of the state.
 
-        "stable": all die out; "saddle": some grow and others die out; "unstable": all grow; "undecided": a
+        "stable": all decay; "saddle": some grow and others decay; "unstable": all grow; "undecided": a
         multiplier lies within 1e-6 of the unit circle, or the motion has no derivative.
         """
         sizes = np.abs(self.multipliers)
@@ -157,7 +157,7 @@ class Orbit(Result):
 
     @property
     def stable(self) -> bool:
-        """Whether all small changes of the state die out."""
+        """Whether all small perturbations of the state decay."""
         return self.kind == STABLE
 
     @property
@@ -187,29 +187,29 @@ class Orbit(Result):
     @property
     @derived("s", "from the firing to the touch of the pack", "firing", name="flight_time")
     def flight_times(self) -> FloatArray:
-        """Time from each firing to its dot, s; NaN for a lost one."""
+        """Time from each firing to its dot, s; NaN for a lost dot."""
         return _numbers(dot.flight_time for dot in self.dots)
 
     @property
     @derived("N", "largest pack force of the dot", "firing", name="peak_force")
     def peak_forces(self) -> FloatArray:
-        """Largest pack force of each dot, N; NaN for a lost one."""
+        """Peak pack force of each dot, N; NaN for a lost dot."""
         return _numbers(dot.peak_force for dot in self.dots)
 
     @property
     def name(self) -> str:
-        """What it is in a few words, such as "period-2 saddle"."""
+        """Short name, such as "period-2 saddle"."""
         return f"period-{self.firings} {self.kind}" if self.ok else f"no period-{self.firings} orbit"
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the orbit comes from: fingerprint, drive, tolerance, versions."""
+        """Provenance of the orbit: fingerprint, drive, tolerance, versions."""
         return {**super().provenance, "period": self.regime.period}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return states over `firing`, multipliers over `multiplier`, and numbers of the whole orbit."""
+        """Return states over `firing`, multipliers over `multiplier`, and scalars of the whole orbit."""
         own = super().entries()
-        # Under an endless force there are no dots, and yet firings.
+        # Under an endless force there are firings but no dots.
         for name in ("flight_time", "peak_force"):
             note, values = own[name]
             own[name] = note, values if len(values) else np.full(self.firings, np.nan)
@@ -228,18 +228,18 @@ class Orbit(Result):
         return own
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row for each firing, with what is known of the whole orbit in each."""
+        """Convert the orbit to a table with a row for each firing; values of the whole orbit repeat."""
         return orbits_table([self], self.attributes)
 
     def motion(self) -> Motion:
-        """Return one period of the orbit, re-integrated from its section.
+        """Re-integrate one period of the orbit from its section.
 
-        It begins `phase` periods after a firing of a train that has fired before, so not at time 0.
+        The motion begins `phase` periods after a firing of a train that has fired before, so not at time 0.
 
         Raises
         ------
         ValueError
-            There is no such orbit.
+            The orbit does not exist.
         """
         if not self.ok:
             raise ValueError(f"there is no such orbit: {self.status}")
@@ -247,7 +247,7 @@ class Orbit(Result):
 
 
 def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orbit:
-    """Return an orbit that there is none of, and why."""
+    """Return the result for an orbit that was not found, with the reason."""
     none = np.full(firings, np.nan)
     return Orbit(
         regime=regime,
@@ -270,7 +270,7 @@ def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orb
 
 
 def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
-    """Return all about an orbit that Newton's method has closed, or why it has not."""
+    """Compute the properties of a converged orbit, or return the reason for its failure."""
     firings = int(closing.firings.sum())
     if not closing.closed:
         return no_orbit(regime, firings, tolerance, closing.reason)
@@ -283,7 +283,7 @@ def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
     residual = float(np.abs((returned - start) / regime.window.half_widths).max())
     jacobians = np.roll(closing.jacobians, -first, axis=0)
     multipliers = multipliers_of(jacobians)
-    # What Newton's method left open grows on the way round.
+    # The residual of Newton's method grows along the orbit.
     if not residual <= CLOSES * max(1.0, abs(multipliers[0])):
         return no_orbit(regime, firings, tolerance, "does not close when re-integrated as a whole")
     states = run.at_firings()
@@ -310,10 +310,10 @@ def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
 
 
 def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
-    """Return the eigenvalues of a product of matrices, shape (m, 2, 2), the last one on the left.
+    """Compute the eigenvalues of a product of matrices, shape (m, 2, 2), the last factor on the left.
 
-    From trace and determinant, the latter from those of the factors: the small eigenvalue of a strong
-    contraction would drown in the rounding of the product.
+    Trace and determinant are used, the latter as the product of the factors' determinants, since the small
+    eigenvalue of a strong contraction would be lost in the rounding of the product.
     """
     product = np.eye(2)
     for factor in jacobians:
@@ -329,7 +329,7 @@ def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 class _Run:
-    """Some periods of the drive from a section on, in a train that has fired before."""
+    """A run of several drive periods from a section on, in a train that has fired before."""
 
     def __init__(self, regime: Regime, start: FloatArray, periods: int, tolerance: float) -> None:
         self.regime, self.periods = regime, periods
@@ -341,7 +341,7 @@ class _Run:
 
     @property
     def motion(self) -> Motion:
-        """The motion, on a grid of its own."""
+        """The motion, on a time grid of its own."""
         end = float(self.sections[-1])
         times = np.linspace(float(self.sections[0]), float(self.record.nodes[-1, 0]), _POINTS)
         return Motion(self.problem, self.record, end, times, "default")
@@ -349,7 +349,7 @@ class _Run:
     def at_firings(self) -> FloatArray:
         """Return displacement, velocity, mode and memory at as many firings as there are periods.
 
-        The first of them is that before the section, or at it.
+        The first firing is the last one before the section, or at it.
         """
         firings = self.regime.moments(self.train, self.periods, 0.0)
         marks = firings[:-1] if self.regime.phase == 0.0 else firings[1:]
@@ -361,11 +361,11 @@ class _Run:
 def _contacts_and_dots(
     regime: Regime, start: FloatArray, firings: int, tolerance: float
 ) -> tuple[Rows[Contact], Rows[Dot]]:
-    """Return what begins in one period of an orbit; its run goes on until all of that has ended."""
+    """Return the contacts and dots that begin in one period of an orbit; the run continues until they end."""
     skipped = 0 if regime.phase == 0.0 or regime.drive is not None else 1
     run = _Run(regime, start, firings + skipped + 1, tolerance)
     motion, period = run.motion, firings * regime.period
-    # Under an endless force there is no firing to begin with, and the period begins at the section.
+    # Under an endless force no firing marks the period; it begins at the section.
     begin = run.fired_at + skipped * regime.period if regime.drive is None else float(run.sections[0])
     before = regime.memory
     contacts = []
@@ -399,7 +399,7 @@ def _numbers(values: Iterable[float | None]) -> FloatArray:
 
 
 def orbits_table(orbits: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
-    """Return orbits as a table, a row for each firing of each."""
+    """Convert orbits to a table with a row for each firing of each orbit."""
     import pandas as pd
 
     tables = []

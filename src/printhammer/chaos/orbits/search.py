@@ -1,4 +1,4 @@
-"""Search for periodic orbits, stable and unstable: guesses from motions, closed by Newton's method."""
+"""Search for periodic orbits, stable and unstable: close returns of motions, converged by Newton's method."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.collection import Orbits
 
 LONGEST: Final = 8
-"""Largest number of firings of the orbits that are looked for unless told otherwise."""
+"""Default of the largest orbit period to search for, in firings."""
 
 MOST_FIRINGS: Final = 64
 STARTS: Final = 1024
@@ -44,31 +44,32 @@ def orbits(
 ) -> Orbits:
     """Search for the periodic orbits of a hammer under a periodic drive, stable and unstable.
 
-    Motions from rest and from states spread over the plane are followed; where one nearly comes back to
-    where it was some firings before, Newton's method on the strobe map is tried. Nothing is left to chance:
-    the same search finds the same orbits, whatever the number of threads.
+    Motions from rest and from states spread over the plane are followed; each close return after a number of
+    firings is an initial guess for Newton's method on the strobe map. The search is deterministic, for any
+    number of threads.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer; or the hammer with all that `firing` says of it. The search chooses the phase itself.
+        The hammer, or a regime; a hammer needs the keywords `firing`. The search chooses the phase itself.
     longest : int, optional
-        Largest number of firings of an orbit, at most 64.
+        Largest orbit period to search for, in firings, at most 64.
     starts : int, optional
-        Number of states from which motions are followed beside that from rest, made up to 128, 1024, 2048,
-        4096 and so on. A search with more starts or guesses finds all that one with fewer does.
+        Number of states, beside the rest state, from which motions are followed, rounded up to 128, 1024,
+        2048, 4096 and so on. A search with more starts or guesses finds all orbits of a search with fewer.
     guesses : int, optional
-        Number of guesses for each number of firings in each block of starts, made up to 8, 48, 96 and so on;
-        eight times as many for 1, four times for 2, and twice for 3 and 4. Others are made of shorter orbits
-        that are known by then.
+        Number of guesses for each number of firings in each block of starts, rounded up to 8, 48, 96 and so
+        on; eight times as many for 1, four times for 2, and twice for 3 and 4. Further guesses are
+        concatenations of known shorter orbits.
     follow : int, optional
-        Through orbits of up to so many firings branches are followed over 5 % of the period on either side:
-        where they come by the period again there are further orbits. None for 0.
+        Largest period, in firings, of the orbits whose branches are followed over 5 % of the drive period on
+        either side; where a branch returns to the period of the drive there are further orbits. 0 for no
+        branches.
 
     Returns
     -------
     Orbits
-        With a count of what became of the guesses; a search that finds nothing is no exception.
+        Orbits, with the outcome of the guesses; a search that finds no orbit is not an exception.
     """
     regime = Regime.of_firing(hammer, firing)
     most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
@@ -89,7 +90,7 @@ def orbit(
     effort: Effort = MAP_EFFORT,
     **_keywords: Unpack[InThreads],
 ) -> Orbit:
-    """Return the periodic orbit near a strobe point.
+    """Find the periodic orbit near a strobe point.
 
     Parameters
     ----------
@@ -98,16 +99,16 @@ def orbit(
     state : array, shape (2,)
         Displacement, m, and velocity, m/s, at a section.
     firings : int, optional
-        Number of firings after which the motion is to repeat.
+        Period of the orbit, in firings.
     phase : float, optional
-        Instead of that of the regime. The armature must not be on its way out of the pack there, where the
-        state has a memory.
+        Phase of the section, by default that of the regime. At this phase the armature must not be on its way
+        out of the pack, where the state includes a memory.
 
     Returns
     -------
     Orbit
-        Of fewer firings where the motion repeats after a divisor of theirs. With a status: that there is
-        none near is no exception.
+        The orbit, of fewer firings if the motion repeats after a divisor of `firings`. Has a status: an orbit
+        that is not found is not an exception.
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     states = [read_state(state)]
@@ -120,7 +121,7 @@ def orbit(
         if images.reasons[0] or not np.isfinite(images.states).all():
             break
         states.append(images.states[0])
-    # Where a section in between falls into the pack, the orbit is closed as a whole.
+    # If a section on the way falls into the pack, the orbit is one segment.
     segments = np.ones(count, np.int64) if len(states) == count else np.array([count])
     guess = np.array(states[: len(segments)])
     (closing,) = close_orbits(exact, guess[np.newaxis], segments[np.newaxis], scales, **LONE)

@@ -1,16 +1,16 @@
-"""The period to which a motion has settled: from its states, or by Newton's method where these do not tell.
+"""Period to which a motion has settled, from its states or, if these are ambiguous, by Newton's method.
 
-States that agree q firings apart do not show a period q by themselves. Near a period doubling neighbours take
-turns about an orbit that they approach by a multiplier close to -1: states two firings apart agree long
-before those one firing apart do. Near an unstable orbit, and where a stable one is about to be born, states
-move so slowly that they seem to stand. So a period q counts as shown where
+States that agree q firings apart do not prove a period q. Near a period doubling the states alternate about
+an orbit that they approach with a multiplier close to -1: states two firings apart agree long before states
+one firing apart do. Near an unstable orbit, and near the birth of a stable one, states move so slowly that
+they seem stationary. So the states alone show a period q only if
 
-- states q firings apart have come to agree as closely as the noise of the runs allows, and
+- states q firings apart agree as closely as the noise of the runs allows, and
 - states q / p firings apart are well apart, for all primes p that divide q, and their distance does not
-  shrink any more: the steps of an integrator, which follow the state, make cycles of their own, far smaller.
+  shrink any more; cycles due to the steps of the integrator, which follow the state, are far smaller.
 
-Where one of the two is not so, the period is the smallest divisor d of q for which Newton's method finds a
-stable orbit of d firings close to the states, which these approach.
+Otherwise the period is the smallest divisor d of q for which Newton's method finds a stable orbit of d
+firings close to the states, which these approach.
 """
 
 from __future__ import annotations
@@ -28,39 +28,39 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 AGREES: Final = 1e-8
-"""Distance of states, in half-widths of the window, up to which no more is asked for."""
+"""Distance of states, in half-widths of the window, at which agreement is complete."""
 
 DISTINCT: Final = 1e-3
-"""Distance, in half-widths, from which on states are different whatever the noise of the runs."""
+"""Distance, in half-widths, above which states differ beyond the noise of any run."""
 
 LIES_ON: Final = 1e-6
-"""Distance from a stable orbit, in half-widths, up to which states lie on it but for the noise of runs."""
+"""Distance from a stable orbit, in half-widths, within which states lie on it up to noise."""
 
 NEAR: Final = 0.1
-"""Distance, in half-widths, within which states of an orbit of fewer firings are looked for."""
+"""Distance, in half-widths, within which an orbit of fewer firings is sought."""
 
 _SHRINKS: Final = 1e-5
 _NOISE: Final = 1e-9
-"""Relative and absolute change of a distance that counts as shrinking, the latter in half-widths."""
+"""Relative and absolute decrease of a distance that counts as shrinking, the latter in half-widths."""
 _ITERATIONS: Final = 20
 
 NO_ORBIT: Final = "Newton's method finds no stable orbit of {} there that the states approach"
 
 
 class Settled(Declared):
-    """What a motion has settled to."""
+    """Orbit to which a motion has settled."""
 
-    period: int | None = part("firings after which the orbit repeats; None where there is no saying")
+    period: int | None = part("firings after which the orbit repeats; None if undecided")
     states: FloatArray = part("displacement, m, and velocity, m/s, at its firings, shape (period, 2)")
     multiplier: float = part(
-        "largest absolute value of a Floquet multiplier; NaN where Newton's method was not asked",
+        "largest absolute value of a Floquet multiplier; NaN if Newton's method was not used",
         default=math.nan,
     )
-    reason: str = part("why there is no saying; else empty", default="")
+    reason: str = part("reason if undecided; else empty", default="")
 
 
 def shown(points: FloatArray, period: int) -> BoolArray:
-    """Tell of which motions the states alone show the period, given that these agree so many firings apart.
+    """Mask of the motions whose states alone show the period, all agreeing `period` firings apart.
 
     Points, shape (n, m, k), are the states at m successive firings, divided by the scales.
     """
@@ -74,10 +74,10 @@ def shown(points: FloatArray, period: int) -> BoolArray:
 def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray) -> Settled:
     """Find the orbit to which one motion has settled, whose states agree `period` firings apart.
 
-    Points, shape (m, k), are displacement, m, velocity, m/s, and what else belongs to the state, at
-    successive sections; the scales, shape (k,), the half-widths of the window. Where no derivative is to be
-    had, because a section falls into the pack or on a touch without velocity, or a current flows there,
-    the states alone decide.
+    Points, shape (m, k), are displacement, m, velocity, m/s, and further components of the state, at
+    successive sections; the scales, shape (k,), the half-widths of the window. If no derivative exists,
+    because a section falls into the pack or on a touch without velocity, or a current flows there, the states
+    alone decide.
     """
     scaled = (points / scales)[np.newaxis]
     plane, states = scales[:2], points[:, :2]
@@ -91,7 +91,7 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
     for count in divisors:
         if count < period and _apart(scaled, count, period)[1][0] > NEAR:
             continue
-        # About an orbit that is approached by turns the mean lies closer than any of the states.
+        # If the states alternate about the orbit, their mean is closer to it than any of them.
         guess = states[-period:].reshape(-1, count, 2).mean(axis=0)
         closing = close_orbits(
             maps, guess[np.newaxis], np.ones((1, count), np.int64), plane, goal=1e-13, enough=1e-9,
@@ -102,15 +102,17 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
         largest = float(abs(multipliers_of(closing.jacobians)[0]))
         if not closing.closed or largest >= 1.0:
             continue
-        if approaches(states / plane, closing.states / plane, lies_on=noise_about(largest)):
+        if is_approaching(states / plane, closing.states / plane, lies_on=noise_about(largest)):
             return Settled(count, closing.states, largest)
     return Settled(None, np.zeros((0, 2)), math.nan, NO_ORBIT.format(_firings(period)))
 
 
-def approaches(points: FloatArray, orbit: FloatArray, within: float = NEAR, lies_on: float = LIES_ON) -> bool:
-    """Tell whether states, shape (m, 2), approach the states of an orbit in its order, or lie on it.
+def is_approaching(
+    points: FloatArray, orbit: FloatArray, within: float = NEAR, lies_on: float = LIES_ON
+) -> bool:
+    """Whether states, shape (m, 2), approach the states of an orbit in its order, or lie on it.
 
-    Not so where they come to rest beside it: then they slow down, and their distance from it does not.
+    False if they come to rest beside the orbit: then their steps shrink, but their distance from it does not.
     """
     count = len(orbit)
     whole = points[len(points) % count :].reshape(-1, count, 2)
@@ -124,15 +126,15 @@ def approaches(points: FloatArray, orbit: FloatArray, within: float = NEAR, lies
 
 
 def noise_about(multiplier: float) -> float:
-    """Return how far from an orbit, in half-widths, states may lie for the noise of their runs alone.
+    """Compute the distance from an orbit, in half-widths, that the noise of runs allows.
 
-    What bounds its basin lies further away the smaller the largest multiplier is.
+    The smaller the largest multiplier, the further away is the boundary of the basin.
     """
     return max(LIES_ON, DISTINCT * (1.0 - multiplier))
 
 
 def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
-    """Do as `settled` without derivatives."""
+    """Find the orbit as `settled` does, without derivatives."""
     early, late = _apart(scaled, period, period)
     shrinking = [bool(_shrinking(scaled, d, period)[0]) for d in _largest_divisors(period)]
     if late[0] > max(AGREES, early[0]) or any(shrinking):
@@ -142,7 +144,7 @@ def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
 
 
 def _apart(points: FloatArray, count: int, period: int) -> tuple[FloatArray, FloatArray]:
-    """Return mean distances of states `count` firings apart, early and late, over whole periods."""
+    """Compute mean distances of states `count` firings apart, early and late, over whole periods."""
     apart = np.abs(points[:, count:] - points[:, :-count]).max(axis=2)
     part = period * max(apart.shape[1] // (4 * period), 1)
     return apart[:, :part].mean(axis=1), apart[:, -part:].mean(axis=1)
@@ -154,7 +156,7 @@ def _shrinking(points: FloatArray, count: int, period: int) -> BoolArray:
 
 
 def _largest_divisors(period: int) -> list[int]:
-    """Return the divisors of a number, itself apart, of which all others are divisors."""
+    """Return the maximal proper divisors of a number."""
     primes = [p for p in range(2, period + 1) if period % p == 0 and all(p % k for k in range(2, p))]
     return [period // p for p in primes]
 

@@ -1,9 +1,9 @@
-"""The stages of a search for orbits: blocks of starts, batches of guesses, branches through orbits.
+"""Stages of a search for orbits: blocks of starts, batches of guesses, branches through orbits.
 
-Orbits that a branch leads to: others at the same period, on the branch through a known orbit.
+*Branches.* Further orbits at the same period lie on the branches through known orbits.
 
-A branch of periodic orbits turns back at its folds and comes by the same period again, at orbits so unstable
-that no motion from anywhere comes close to them.
+A branch of periodic orbits turns back at its folds and returns to the same period, at orbits so unstable that
+no motion comes close to them.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.orbit import Orbit
 
 SHARE: Final = 0.05
-"""Part of the period by which it is changed on either side."""
+"""Change of the period on either side over which a branch is followed, as a fraction of the period."""
 
 _PARTS: Final = 5.0
 _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
 def crossings(orbit: Orbit) -> list[FloatArray]:
-    """Return the states at which the branch through an orbit, along the period, comes by its period again."""
+    """Find the states at which the branch through an orbit, along the period, returns to its period."""
     regime, own = orbit.regime, orbit.regime.period
     if PERIOD not in regime.names:
         return []
@@ -76,28 +76,28 @@ def crossings(orbit: Orbit) -> list[FloatArray]:
 
 
 _LONG: Final = 400
-"""Firings of the train from rest in which close returns are looked for."""
+"""Number of firings of the train from rest in which close returns are sought."""
 _BLOCKS: Final = (128, 1024)
 _BATCHES: Final = (8, 48)
-"""Numbers of starts and of guesses to which more are made up, the last doubled on and on."""
+"""Numbers of starts and of guesses to which more are rounded up; the last is doubled repeatedly."""
 _EVEN: Final = 8
-"""Firings up to which fewer of them have more guesses in proportion."""
+"""Number of firings below which orbits get proportionally more guesses."""
 _JOINED: Final = 48
-"""Guesses made of two shorter orbits that a stage tries for each number of firings, at most."""
+"""Maximum number of guesses, per number of firings, that join two shorter orbits in a stage."""
 _TOUCHES: Final = 4
-"""One state just behind a touch of a rigid backstop for so many states spread over the plane."""
+"""Number of spread states per state just behind a touch of a rigid backstop."""
 _COMPLETED: Final = 6
 _MORE: Final = 512
 """Largest period for which more returns are tried if the indices show a gap, and their number."""
 _SAME: Final = 1e-6
-"""Distance, in half-widths of the window, up to which states of two orbits are one."""
+"""Distance, in half-widths of the window, below which states of two orbits are the same."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
 _EXACT: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
 LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
 
 
 def shortest(closing: Closing, scales: FloatArray) -> Closing:
-    """Return an orbit that is not the repeat of a shorter one."""
+    """Reduce an orbit that repeats a shorter orbit to the latter."""
     ends = np.cumsum(closing.firings)
     total = int(ends[-1])
     for k in range(1, len(closing.states)):
@@ -111,23 +111,23 @@ def shortest(closing: Closing, scales: FloatArray) -> Closing:
 
 @dataclass
 class _Known:
-    """An orbit that is known: how many guesses led to it, in which stages of the search."""
+    """A known orbit, with the number of guesses that led to it and the stages that found it."""
 
     closing: Closing
     stages: list[tuple[int, int]]
     hits: int = 1
 
-    def visible(self, block: int, batch: int) -> bool:
-        """Tell whether it was found with no more starts and no more guesses than a stage has."""
+    def is_visible(self, block: int, batch: int) -> bool:
+        """Whether the orbit was found with no more starts and no more guesses than a stage has."""
         return any(i <= block and j <= batch for i, j in self.stages)
 
 
 @dataclass
 class Search:
-    """A search that is under way.
+    """A search in progress.
 
-    It goes in stages: starts come in blocks and guesses in batches, and what a stage finds depends on stages
-    of no more starts and no more guesses alone. So with more of either no orbit is lost.
+    The search is in stages: starts come in blocks and guesses in batches, and the result of a stage depends
+    only on stages with no more starts and no more guesses. So no orbit is lost with more of either.
     """
 
     regime: Regime
@@ -144,7 +144,7 @@ class Search:
         self.done, self.all = 0, 1
 
     def run(self, starts: int) -> Orbits:
-        """Search in motions from at least so many states."""
+        """Search in motions from at least `starts` states."""
         self.blocks, self.batches = _steps(_BLOCKS, starts), _steps(_BATCHES, self.several)
         rest = np.array([first_state(self.regime)])
         self.all = 3 + 2 * self.longest * len(self.blocks) * len(self.batches)
@@ -191,7 +191,7 @@ class Search:
         self.effort.report(self.done, self.all)
 
     def _through(self, regime: Regime, records: Records) -> list[_Known]:
-        """Return the different orbits through one section."""
+        """Find the different orbits through one section."""
         fast = FastMaps(regime, self.longest, self.effort.at(TOLERANCE))
         different: list[_Known] = []
         seen: set[bytes] = set()
@@ -215,9 +215,9 @@ class Search:
         return self._refined(regime, different)
 
     def _further(self, fast: FastMaps, different: list[_Known], records: Records, seen: set[bytes]) -> None:
-        """Try the returns of searches for shorter orbits, those of longer motions, and those after a touch.
+        """Try further returns: those of searches for shorter orbits, of longer motions, and after a touch.
 
-        After all others, so that none of the orbits that these lead to is lost.
+        They come last, so that no orbit of the earlier stages is lost.
         """
         first = len(different)
         begin, last = 0, len(self.batches) - 1
@@ -248,7 +248,7 @@ class Search:
                 self._try(fast, different, more, (len(self.blocks) - 1, last))
 
     def _complete(self, fast: FastMaps, different: list[_Known], records: Records) -> None:
-        """Try more returns for periods whose indices do not add up to 1: orbits are missing there."""
+        """Try more returns for periods whose indices do not add up to 1, where orbits are missing."""
         stage = len(self.blocks) - 1, len(self.batches) - 1
         for period in range(1, min(self.longest, _COMPLETED) + 1):
             own = [
@@ -260,16 +260,16 @@ class Search:
                 self._try(fast, different, [guess for both in returns for guess in both], stage)
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
-        """Return that part of some guesses that is new in a batch."""
+        """Return the guesses that are new in a batch."""
         begin, end = (_share(count, period) // 2 for count in (0, *self.batches)[batch : batch + 2])
         return guesses[begin:end]
 
     def _joined(self, different: list[_Known], period: int, stage: tuple[int, int]) -> list[Guess]:
-        """Return guesses from pairs of the orbits of a stage that no stage before has joined."""
+        """Join pairs of the orbits of a stage that no earlier stage has joined."""
         block, batch = stage
-        seen = [orbit for orbit in different if orbit.visible(block, batch)]
+        seen = [orbit for orbit in different if orbit.is_visible(block, batch)]
         before = [
-            {k for k, orbit in enumerate(seen) if orbit.visible(i, j)}
+            {k for k, orbit in enumerate(seen) if orbit.is_visible(i, j)}
             for i, j in ((block - 1, batch), (block, batch - 1))
         ]
         known = {pair for places in before for pair in itertools.combinations(sorted(places), 2)}
@@ -278,7 +278,7 @@ class Search:
     def _try(
         self, maps: ExactMaps | FastMaps, different: list[_Known], tried: list[Guess], stage: tuple[int, int]
     ) -> None:
-        """Close guesses, and add what is new."""
+        """Converge guesses, and add new orbits."""
         options = _FAST if isinstance(maps, FastMaps) else LONE
         for guess in tried:
             self.tried[int(guess.firings.sum()) - 1] += 1
@@ -286,7 +286,7 @@ class Search:
             self._add(different, _Known(closing, [stage]))
 
     def _refined(self, regime: Regime, different: list[_Known]) -> list[_Known]:
-        """Return orbits closed with the tolerance that was asked for."""
+        """Converge orbits with the requested tolerance."""
         exact = ExactMaps(regime, self.effort)
         refined: list[_Known] = []
         closings = _closed(exact, [orbit.closing for orbit in different], self.scales, _EXACT)
@@ -295,7 +295,7 @@ class Search:
         return refined
 
     def _add(self, different: list[_Known], new: _Known) -> None:
-        """Add an orbit that closes unless it is among them: orbits that share a state are one."""
+        """Add a converged orbit unless it is known: orbits that share a state are the same."""
         if not new.closing.closed:
             self.failures[new.closing.reason] += 1
             return
@@ -311,27 +311,27 @@ class Search:
                 return
         different.append(replace(new, closing=closing))
 
-    def _repeats(self, orbit: Orbit) -> bool:
-        """Tell whether an orbit that was closed as a whole repeats after a part of its firings."""
+    def _is_repeat(self, orbit: Orbit) -> bool:
+        """Whether an orbit converged as one segment repeats after a fraction of its firings."""
         return any(
-            self._same(orbit, replace(orbit, x=orbit.x[[k]], v=orbit.v[[k]], memory=orbit.memory[[k]]))
+            self._is_same(orbit, replace(orbit, x=orbit.x[[k]], v=orbit.v[[k]], memory=orbit.memory[[k]]))
             for k in range(1, orbit.firings)
             if orbit.firings % k == 0
         )
 
     def _describe(self, described: list[tuple[Orbit, int]], known: Sequence[tuple[Regime, _Known]]) -> None:
-        """Add all about orbits, without those that were found at another section too."""
+        """Add the properties of orbits, without those already found at another section."""
         quiet = self.effort.quiet
         orbits = quiet.mapped(lambda pair: orbit_of(pair[0], pair[1].closing, quiet.tolerance), known)
         for orbit, (_regime, own) in zip(orbits, known, strict=True):
             if not orbit.ok:
                 self.failures[orbit.status] += 1
                 continue
-            if self._repeats(orbit):
+            if self._is_repeat(orbit):
                 self.repeats += 1
                 continue
             for place, (other, hits) in enumerate(described):
-                if self._same(orbit, other):
+                if self._is_same(orbit, other):
                     self.repeats += 1
                     described[place] = other, hits + own.hits
                     break
@@ -339,7 +339,7 @@ class Search:
                 described.append((orbit, own.hits))
 
     def _along(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add the orbits to which branches through the known ones lead, and what these are joined to."""
+        """Add the orbits on the branches through known orbits, and the orbits joined from these."""
         first = [orbit for orbit, _hits in described]
         short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
         states = self.effort.quiet.mapped(crossings, short)
@@ -353,7 +353,7 @@ class Search:
         for orbit, _hits in described:
             by_phase.setdefault(orbit.phase, []).append(orbit)
         for phase, every in by_phase.items():
-            # Pairs of the first ones have had their turn; they come first.
+            # Pairs of the first orbits have been tried; they come first.
             old = sum(orbit.phase == phase for orbit in first)
             if old == len(every):
                 continue
@@ -370,9 +370,9 @@ class Search:
             self._describe(described, [(every[0].regime, known) for known in different])
 
     def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add the mirror images of orbits: x -> -x and half a period, where nothing is on one side alone.
+        """Add the mirror images of orbits, x -> -x half a period later, if no surface is one-sided.
 
-        Where the forces are not odd, Newton's method finds none, or another orbit.
+        If the forces are not odd, Newton's method finds none, or another orbit.
         """
         hammer = self.regime.hammer
         if hammer.pack is not None or hammer.backstop is not None or self.regime.drive is None:
@@ -389,7 +389,7 @@ class Search:
                 if closing.closed:
                     self._describe(described, [(regime, _Known(closing, [], hits))])
 
-    def _same(self, orbit: Orbit, other: Orbit) -> bool:
+    def _is_same(self, orbit: Orbit, other: Orbit) -> bool:
         if orbit.firings != other.firings:
             return False
         gaps = np.maximum(
@@ -401,17 +401,17 @@ class Search:
 
 
 def _share(guesses: int, period: int) -> int:
-    """Return how many guesses are tried for a number of firings: as much work for each where few."""
+    """Return the number of guesses for a number of firings, so that the work is about the same for each."""
     return guesses * max(1, _EVEN // period)
 
 
 def _doubled(first: int, below: int) -> list[int]:
-    """Return a number and its doubles below a limit."""
+    """List a number and its doubles below a limit."""
     return [first << k for k in range(below.bit_length()) if first << k < below]
 
 
 def _steps(ladder: Sequence[int], most: int) -> list[int]:
-    """Return the rungs of a ladder, doubled on from its last, up to the first that is at least `most`."""
+    """List the rungs of a ladder, doubled on from its last, up to the first that is at least `most`."""
     rungs = list(ladder)
     while rungs[-1] < most:
         rungs.append(2 * rungs[-1])
@@ -419,7 +419,7 @@ def _steps(ladder: Sequence[int], most: int) -> list[int]:
 
 
 def _guess(orbit: Orbit, maps: ExactMaps) -> Guess:
-    """Return the states of an orbit at its sections; its first alone where one falls into the pack."""
+    """Return the states of an orbit at its sections; only the first if a section falls into the pack."""
     states = [orbit.section]
     for _ in range(orbit.firings - 1):
         images = maps(states[-1][np.newaxis], np.ones(1, np.int64))
@@ -435,7 +435,7 @@ def _closed(
     scales: FloatArray,
     options: Mapping[str, Any],
 ) -> list[Closing]:
-    """Return what becomes of guesses, in their order; those with as many segments are closed together."""
+    """Return the converged orbits, one per guess; guesses with equal numbers of segments are batched."""
     known: dict[int, Closing] = {}
     counts = [len(guess.firings) for guess in tried]
     for segments in sorted(set(counts)):

@@ -1,18 +1,18 @@
-"""The stroboscopic map: from the state at one section to that some firings later, with its derivative.
+"""Stroboscopic map: from the state at a section to the state some firings later, with its derivative.
 
-It is the Poincaré map of a section at a fixed phase of the drive. Its derivative over a period of an orbit is
-the monodromy matrix, whose eigenvalues are the Floquet multipliers; where a motion touches a surface, the
-tangent flow passes it by the saltation matrix (docs/tangent.md).
+The strobe map is the Poincaré map of a section at a fixed phase of the drive. Its derivative over a period of
+an orbit is the monodromy matrix, whose eigenvalues are the Floquet multipliers; at a touch of a surface, the
+tangent flow is multiplied by the saltation matrix (docs/tangent.md).
 
-A section lies at a fixed phase of the period. There the state is displacement and velocity, unless the
-armature is just then in the pack on its way out: then what the pack remembers belongs to it too, and the
-image says "in the pack"; another phase of the period is to be chosen, at which that does not happen.
-Behind a rail no current is to flow at the section, else the image says "a current flows".
+At a section the state is displacement and velocity, unless the armature is in the pack on its way out: then
+the memory of the pack belongs to the state, and the status of the image is "in the pack"; a section at
+another phase of the period avoids this. With a driver of the coil, no current may flow at the section, else
+the status is "a current flows".
 
-A quiet section: the phase of the drive at which an orbit is farthest from all its contacts.
+*Quiet section.* The phase of the drive at which an orbit is farthest from all its contacts.
 
-Where an impact on a rigid backstop meets the section the state there jumps, and in the pack on its way out
-the armature has a memory beside its state. Any orbit can be looked at elsewhere.
+Where an impact on a rigid backstop meets the section the state jumps, and in the pack on its way out the
+armature has a memory beside its state. Any orbit can be observed at another phase.
 """
 
 from __future__ import annotations
@@ -39,32 +39,32 @@ from printhammer.run.supply import emf, linkage
 from printhammer.support.arrays import FloatArray
 
 MAP_TOLERANCE: Final = 1e-13
-"""Tolerance with which the map is computed: its noise limits how well a fixed point can be known."""
+"""Tolerance of the map: its noise limits the accuracy of a fixed point."""
 
 MAP_EFFORT: Final = Effort(MAP_TOLERANCE)
 
 IN_PACK: Final = "in the pack"
-"""Status where the state at a section has a memory of the pack beside displacement and velocity."""
+"""Status where the state at a section includes a memory of the pack."""
 
 WITH_MEMORY: Final = tuple(
     MODE_NAMES.index(name) for name in ("unloading", "reloading", "held on the unloading branch")
 )
-"""Modes whose state has a memory."""
+"""Modes whose state includes a memory."""
 CURRENT: Final = "a current flows"
-"""Status where the coil carries a current at a section under a voltage, which belongs to the state then."""
+"""Status where the coil carries a current at a section, which then belongs to the state."""
 _OK: Final = "ok"
 RANGE_LEFT: Final = "range left"
-"""Status where no motion can be at a displacement."""
+"""Status of a displacement that no motion can have."""
 
 _TURN_STEPS: Final = 60
 _STILL: Final = 1e-9
-"""Speed, in units of the typical one, below which an extremum is found: its place is exact to the square."""
+"""Relative speed at which an extremum counts as located: the error of its place is quadratic."""
 STILL_COIL: Final = 1e-9
-"""Current, or flux linkage of one, in units of the typical one, that counts as none."""
+"""Current, or its flux linkage, relative to the typical one, that counts as zero."""
 
 
 class Image(Declared):
-    """What the strobe map makes of a state."""
+    """Image of a state under the strobe map."""
 
     state: FloatArray = part(
         'displacement, m, and velocity, m/s, at the end, shape (2,); NaN unless the status is "ok"'
@@ -94,12 +94,12 @@ class Image(Declared):
 
     @property
     def ok(self) -> bool:
-        """Whether the state came through."""
+        """Whether the run came to its end."""
         return self.status == _OK
 
 
 def read_state(state: npt.ArrayLike) -> FloatArray:
-    """Read displacement, m, and velocity, m/s; InputError where it is not two finite numbers."""
+    """Parse displacement, m, and velocity, m/s; InputError unless they are two finite numbers."""
     pair = np.asarray(state, dtype=np.float64)
     if pair.shape != (2,) or not np.isfinite(pair).all():
         raise InputError.of("state", state, "two finite numbers, displacement in m and velocity in m/s")
@@ -109,24 +109,24 @@ def read_state(state: npt.ArrayLike) -> FloatArray:
 def image_of(
     regime: Regime, state: FloatArray, firings: int, tolerance: float, *, contacts: bool = True
 ) -> Image:
-    """Return the image of a state, (m, m/s), under the strobe map, iterated, with its derivative.
+    """Compute the image of a state, (m, m/s), under the iterated strobe map, with its derivative.
 
-    The pulses fired before the start are under way at it, as in a train that has always been fired. A run
-    that could not go on, or a state where no force law holds, has a status and is no exception. Contacts and
-    the margin take about a third of the time.
+    The earlier pulses are under way at the start, as in a train that has always been fired. A run that ends
+    early, or a state where no force law holds, has a status and is not an exception. Contacts and the margin
+    take about a third of the time.
     """
     regime.check_planar()
     train, _ = regime.train(firings)
     moments = regime.moments(train, firings)
     start = float(state[0]), float(state[1])
-    if not possible(regime.hammer, *start):
+    if not is_possible(regime.hammer, *start):
         return _no_image(RANGE_LEFT)
-    if not usable(regime.hammer, *start):
+    if not is_usable(regime.hammer, *start):
         return _no_image(IN_PACK)
     problem = Problem(regime.hammer, train, start, float(moments[0]), tolerance)
     columns = np.eye(problem.state_size)[:, :3]
     if problem.laws.circuit:
-        # Without a current the linkage is that of the place.
+        # Without a current the flux linkage follows from the displacement.
         columns[3, 0] = emf(regime.hammer, start[0], 0.0)
     followed = follow(problem, moments[[0, -1]], columns, renormalise=False)
     if followed.status_name != _OK:
@@ -154,7 +154,7 @@ def image_of(
     )
 
 
-def possible(hammer: Hammer, x: float, v: float) -> bool:
+def is_possible(hammer: Hammer, x: float, v: float) -> bool:
     """Whether a motion can begin with a displacement, m, and a velocity, m/s."""
     try:
         initial_state(hammer, (x, v))
@@ -163,7 +163,7 @@ def possible(hammer: Hammer, x: float, v: float) -> bool:
     return True
 
 
-def usable(hammer: Hammer, x: float, v: float) -> bool:
+def is_usable(hammer: Hammer, x: float, v: float) -> bool:
     """Whether displacement, m, and velocity, m/s, alone are a state: not so on the way out of the pack."""
     return not (v <= 0.0 and x > front_with_memory(hammer))
 
@@ -180,7 +180,7 @@ def _no_image(status: str) -> Image:
 
 
 def margin_of(problem: Problem, record: Record) -> float:
-    """Return the signed nearness of a grazing in a run, see `Image`."""
+    """Compute the signed nearness of a grazing in a run, see `Image`."""
     hammer, (way, speed) = problem.hammer, problem.scales
     surfaces = [place for place in (hammer.position, hammer.front) if place is not None]
     _, x, sign = turns(problem, record)
@@ -193,7 +193,7 @@ def margin_of(problem: Problem, record: Record) -> float:
 
 
 def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times, s, and displacements, m, of all local extrema, and 1 for a maximum, -1 for a minimum."""
+    """Locate all local extrema: times, s, displacements, m, and 1 for a maximum, -1 for a minimum."""
     nodes = record.nodes
     before, after = nodes[:-1, 2], nodes[1:, 2]
     rows = np.flatnonzero(
@@ -206,7 +206,7 @@ def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, Flo
     f_low, f_high = before[rows].copy(), after[rows].copy()
     time, kept = high.copy(), np.zeros(len(rows))
     table = problem.resample(record, time)
-    # The method of false position, with the Illinois rule: the end that stays counts half.
+    # Regula falsi with the Illinois rule: the end that stays counts half.
     for _ in range(_TURN_STEPS):
         open_ = (np.abs(table[:, 1]) > _STILL * problem.scales[1]) & (high - low > 4.0 * np.spacing(high))
         if not open_.any():
@@ -232,23 +232,23 @@ _ON_IMPACT: Final = 1e-3
 def quiet_section(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Regime, FloatArray] | None:
-    """Return the regime with the quietest phase for an orbit, and the state of the orbit there.
+    """Choose the quietest phase for an orbit; return the regime and the state of the orbit there.
 
     Parameters
     ----------
     regime : Regime
-        With the phase at which the state is known.
+        Regime with the phase at which the state is known.
     state : array, shape (2,)
         Displacement, m, and velocity, m/s.
     firings : int
-        After which the orbit repeats.
+        Number of firings after which the orbit repeats.
     tolerance : float
         Error allowed in one step.
 
     Returns
     -------
     tuple or None
-        None where a run does not come through.
+        None if a run ends early.
     """
     flight = _around(regime, state, firings, tolerance)
     if flight is None:
@@ -257,7 +257,7 @@ def quiet_section(
     begin = problem.start
     if not times.size:
         return regime, state
-    # Of all firings at once: the section is at the same phase after each.
+    # Contacts of all firings count together: the section is at the same phase after each.
     gaps = np.diff(np.append(times, times[0] + regime.period))
     widest = int(np.argmax(gaps))
     late = (times[widest] + 0.5 * gaps[widest]) % regime.period
@@ -281,7 +281,7 @@ def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: flo
 def _around(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Problem, Record, FloatArray] | None:
-    """Return an orbit from a section on, and times since a section at which it has a contact, ascending."""
+    """Integrate an orbit from a section; return it and times since a section with a contact, ascending."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     try:
@@ -296,7 +296,7 @@ def _around(
 
 
 def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: float) -> FloatArray:
-    """Return the state, (m, m/s), at the next section of another phase; NaN where a run ends before."""
+    """Compute the state, (m, m/s), at the next section of another phase; NaN if the run ends before."""
     train, _ = regime.train(2)
     begin = float(regime.moments(train, 1)[0])
     problem = Problem(regime.hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
@@ -306,7 +306,7 @@ def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: floa
 
 
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
-    """Return times since the section at which there is a contact, close enough together."""
+    """Sample the times since the section at which there is a contact, densely enough."""
     times = [np.zeros(0)]
     for _surface, t_in, _v_in, t_out, *_ in contacts:
         low, high = (begin if np.isnan(t_in) else t_in), (end if np.isnan(t_out) else t_out)

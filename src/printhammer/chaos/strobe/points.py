@@ -1,15 +1,16 @@
-"""Strobe: the state of the armature once a period, as the Poincaré plots of Fig. 11 show it.
+"""Strobe points: the state of the armature once a period, as in the Poincaré plots of Fig. 11.
 
 A train of firings is an iterated map, the stroboscopic map, in the plane of displacement and velocity: from
-the state at one firing to that at the next. Where a firing falls inside a pack contact, the state also has
-the branch of the pack's law and its memory, the latest local maximum.
+the state at one firing to the state at the next. If a firing falls inside a pack contact, the state also
+includes the branch of the pack's law and its memory, the latest local maximum.
 
-Strobe points and verdicts as the two integrators of the paper compute them, on its schedule of steps.
+*The integrators of 1983.* Strobe points and verdicts as computed by the two integrators of the paper, with
+its schedule of steps.
 
-The panels of Fig. 11 were judged by eye from such points. Fixed steps that locate no contact are not the
-motion: they add errors of their own to it, at every touch, and these make a map of their own, which jumps
-where a step just reaches a contact or just does not. It has no tangent, so that no exponent backs a verdict:
-here a train is strange if no period up to 64 is found, which is what a reader of such a plot has to say.
+The panels of Fig. 11 were judged by eye from such points. Fixed steps that locate no contact do not compute
+the motion: every touch adds an error, and the errors define a map of their own, which jumps where a step just
+reaches a contact or just misses it. It has no tangent, so that no exponent supports a verdict: here a train
+is strange if no period up to 64 is found, the criterion of a reader of such a plot.
 """
 
 from __future__ import annotations
@@ -52,10 +53,10 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 POINTS = 200
-"""Number of points unless told otherwise, as in Fig. 11."""
+"""Default number of points, as in Fig. 11."""
 
 _SETTLED = 1000
-"""Points, and firings left out before them, of what is taken for settled."""
+"""Number of points, and of firings to discard before them, of a settled series."""
 
 
 class Strobe(Result):
@@ -96,11 +97,11 @@ class Strobe(Result):
 
     @property
     def title(self) -> str:
-        """One line that says what the points are."""
+        """Title of the result, in one line."""
         return f"strobe points of {self.hammer.name}, every {self.period:.9g} s"
 
     def summary(self) -> Summary:
-        """Return points and verdict."""
+        """Summarise points and verdict."""
         known = np.isfinite(self.x)
         at = f", {self.phase:g} of a period later" if self.phase else ""
         rows: list[FactRow] = [
@@ -120,16 +121,16 @@ class Strobe(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the run went as asked."""
+        """Whether the run came to its end."""
         return self.status == "ok"
 
     @property
     def window(self) -> Window:
-        """The window in which the points are drawn."""
+        """Window in which the points are drawn."""
         return window_of(self.hammer, self.drive)
 
     def entries(self) -> Entries:
-        """Return the states by name, the current only where it belongs to them."""
+        """Return the states by name, and the current if it belongs to them."""
         return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
 
     def notes(self) -> dict[str, Any]:
@@ -149,18 +150,18 @@ def strobe(
     verdict: bool = True,
     **firing: Unpack[Firing],
 ) -> Strobe:
-    """Return the state of a hammer once a period of its drive, and what kind of motion that is.
+    """Compute the state of a hammer once a period of its drive, and judge the kind of motion.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer; or the hammer with all that `firing` says of it.
+        The hammer, or a regime; a hammer needs the keywords `firing`.
     points : int, optional
         Number of points; by default 200, as in Fig. 11.
     transient : int, optional
-        Number of firings left out before the first point.
+        Number of firings to discard before the first point.
     state : sequence of float or str, optional
-        Displacement, m, velocity, m/s, or text with units, and what else belongs to the state at the first
+        Displacement, m, velocity, m/s, or text with units, and further components of the state at the first
         firing, as for `printhammer.simulate`; by default the rest state.
     tolerance : float, optional
         As for `printhammer.simulate`.
@@ -174,7 +175,7 @@ def strobe(
     Returns
     -------
     Strobe
-        With a status; a run that could not go on is no exception.
+        With a status; a run that ends early is not an exception.
     """
     (points_of_train,) = strobes(
         Regime.of(hammer, **firing),
@@ -206,7 +207,7 @@ def strobes(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> list[Strobe]:
-    """Return the strobe points of many trains, computed on all cores; see `strobe`.
+    """Compute the strobe points of many trains in parallel; see `strobe`.
 
     Parameters
     ----------
@@ -215,10 +216,10 @@ def strobes(
     points, transient, verdict
         As for `strobe`, for all trains.
     states : sequence, optional
-        Displacement, m, velocity, m/s, and what else belongs to the state at the first firing of each train,
+        Displacement, m, velocity, m/s, and further components of the state at the first firing of each train,
         as for `printhammer.simulate`, all of one form; by default the rest state.
     firings : tuple of int, optional
-        First and last firing that the verdict is about; the very first one is number 1.
+        First and last firing that is judged; the very first firing is number 1.
     every_exponent : bool, optional
         Whether to compute the exponent of periodic trains too, which takes several times as long as their
         points and does not change the verdict.
@@ -252,9 +253,9 @@ def strobes(
 
 
 def points_of(series: Any, firing: Firing) -> Any:
-    """Return the settled strobe points of a regime, or of a hammer and how it is fired; others as they are.
+    """Return given points, or compute the settled strobe points of a regime or hammer.
 
-    InputError as for `strobe`, or where there are points, and how to fire beside them.
+    InputError as for `strobe`, or if points are given together with keywords of firing.
     """
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)
@@ -266,7 +267,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 def strobe_of(
     train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
-    """Return the strobe points of a train, given its states at some firings and the verdict on it."""
+    """Build the strobe points of a train from its states at some firings and its verdict."""
     return Strobe(
         hammer=train.hammer,
         drive=train.drive,
@@ -292,7 +293,7 @@ def scheme_strobes(
     firings: tuple[int, int] = (FIRST, LAST),
     progress: Progress | None = None,
 ) -> list[Strobe]:
-    """Return the strobe points of trains from rest, as a scheme of 1983 computes them.
+    """Compute the strobe points of trains from rest with an integration scheme of 1983.
 
     Parameters
     ----------
@@ -301,9 +302,9 @@ def scheme_strobes(
     scheme : str
         "runge-kutta-4" or "trapezoid".
     reading : str, optional
-        When the short step is taken, see `printhammer.run.scheme_runs.READINGS`.
+        Rule for the short step, see `printhammer.run.scheme_runs.READINGS`.
     points, firings, progress
-        As for `printhammer.chaos.strobes`; the points are those from the first firing on.
+        As for `printhammer.chaos.strobes`; the points begin at the first firing.
 
     Returns
     -------

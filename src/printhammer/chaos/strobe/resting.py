@@ -1,9 +1,9 @@
-"""Motions that come to rest on a rigid backstop: there they forget their past, and repeat exactly.
+"""Motions that come to rest on a rigid backstop: they forget their past, and repeat exactly.
 
-A ball on a shaken table may bounce ever lower and lie still until the table pushes it off again, always at
-the same phase. What follows is the same each time: a superstable cycle, whose multipliers are 0. It may be
-hundreds of firings long; between two rests small errors grow as in a chaotic motion, so that the length of a
-cycle is often that of the rounding.
+A ball on a shaken table may bounce ever lower and lie still until the table launches it again, always at the
+same phase. The motion that follows is the same each time: a superstable cycle, whose multipliers are 0. It
+may be hundreds of firings long; between two rests small errors grow as in a chaotic motion, so that rounding
+often decides the length of a cycle.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from printhammer.support.arrays import FloatArray
 
 
 def exact_cycle(states: FloatArray) -> int:
-    """Return after how many firings states, shape (n, k), repeat to the last bit, at most n // 2; else 0."""
+    """Return the period, at most n // 2, of exactly repeating states, shape (n, k); else 0."""
     ended = np.flatnonzero((states[:-1] == states[-1]).all(axis=1))
     for count in (len(states) - 1 - int(place) for place in ended[::-1]):
         if count <= len(states) // 2 and np.array_equal(states[count:], states[:-count]):
@@ -25,9 +25,9 @@ def exact_cycle(states: FloatArray) -> int:
 
 
 def rests_of(regime: Regime, states: FloatArray, tolerance: float) -> int:
-    """Return after how many of the states, (m, m/s), at firings the armature rests before the next firing.
+    """Mask of the states, (m, m/s), at firings after which the armature rests before the next firing.
 
-    There the derivative of the state at the next firing is 0.
+    The derivative of the state at the next firing is then 0.
     """
     at_firings = regime.at_firings
     images = (image_of(at_firings, state, 1, tolerance, contacts=False) for state in states)

@@ -1,18 +1,18 @@
-"""Verdicts on very many trains, by a shorter way to the same end.
+"""Verdicts on very many trains, with an early test for periodic trains.
 
-Most trains settle within a few firings, and need not be followed to firing 2000 to know what they do there. A
-train counts as periodic as soon as
+Most trains settle within a few firings, and need not be followed to firing 2000 to know their period. A train
+is periodic as soon as
 
-- its states q firings apart agree a hundred times closer than the verdict asks for, over a window of at least
-  2 q firings, no smaller number of firings does as closely as the verdict asks for, and the distance of
+- its states q firings apart agree a hundred times closer than the verdict requires, over a window of at least
+  2 q firings, no smaller number of firings does as closely as the verdict requires, and the distance of
   states a divisor of q apart does not shrink; and
-- a small change of the state dies out: the derivative of the state after q firings with respect to the state
-  before them has no eigenvalue beyond 0.99 in absolute value.
+- a small perturbation decays: the derivative of the state after q firings with respect to the state before
+  them has no eigenvalue beyond 0.99 in absolute value.
 
-Of a difference d that is left, what adds up later is then at most d / (1 - 0.99), which is within what the
-verdict asks for. All other trains are followed to firing 2000. Those without a period are strange if the
-exponent over three hundred firings on the attractor, from the state at firing 1001 on, is positive by five
-standard errors, more than the verdict asks for; where it is not, it is computed over firings 1001 to 2000.
+A remaining difference d then accumulates to at most d / (1 - 0.99), which is within the tolerance of the
+verdict. All other trains are followed to firing 2000. Aperiodic trains are strange if the exponent over three
+hundred firings on the attractor, from the state at firing 1001 on, is positive by five standard errors, more
+than the verdict requires; otherwise it is computed over firings 1001 to 2000.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import Regime
 
 STAGES: Final = (32, 128)
-"""Numbers of firings after which a train may count as periodic."""
+"""Numbers of firings after which periodicity is tested."""
 
 CLOSER: Final = 1e-2
-"""Part of the agreement asked for at which a train may count as periodic before its end."""
+"""Agreement of an early periodic train, as a fraction of the agreement of the verdict."""
 
 LARGEST_MULTIPLIER: Final = 0.99
-"""Largest absolute value of an eigenvalue with which it does."""
+"""Largest absolute eigenvalue of an early periodic train."""
 
 _SHORT: Final = 301
 _SURE: Final = 5.0
-"""Firings over which an exponent counts at first, and standard errors that it takes then."""
+"""Number of firings of the first exponent, and number of standard errors required of it."""
 
 
 @computation
@@ -53,7 +53,7 @@ def scan(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> list[Verdict]:
-    """Return the verdicts on the trains of a hammer from rest, one for each period.
+    """Judge the trains of a hammer from rest, one for each period.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ def scan(
     periods : array
         Times between firings, s.
     exponents : bool, optional
-        Whether to compute exponents; without them, trains that have no period are left undecided.
+        Whether to compute exponents; without them, aperiodic trains are left undecided.
 
     Returns
     -------
     list of Verdict
-        The firings that a verdict names are those that it rests on: fewer than 1001 to 2000 where that is
-        enough, see the head of this module.
+        A verdict names the firings that it rests on: fewer than 1001 to 2000 for trains decided early, see
+        the head of this module.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def scan(
 def _settled(
     trains: Sequence[Train], states: Sequence[States], firings: tuple[int, int], effort: Effort
 ) -> list[Verdict | None]:
-    """Return the verdicts on trains that have settled, None for the others."""
+    """Judge the trains that have settled; None for the others."""
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
     periods: dict[int, int] = {}
     for i, row in enumerate(distances):
@@ -117,16 +117,16 @@ def _settled(
 
 
 def largest_multiplier(train: Train, states: States, period: int, tolerance: float) -> float:
-    """Return the largest absolute eigenvalue of the derivative of the state after a period by that before it.
+    """Compute the largest absolute eigenvalue of the derivative of the state over a period.
 
-    Infinite where the period begins inside the pack, where the state has a memory, where a shorted turn or a
-    capacitor belongs to it, or the derivative is not known.
+    Infinite if the period begins inside the pack, where the state has a memory, if a shorted turn or a
+    capacitor belongs to the state, or if the derivative is unknown.
     """
     from printhammer.derivatives.states import tangent_map
 
     if _in_pack(train, states, -1) or not train.regime.is_planar:
         return np.inf
-    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
+    # The remainder of earlier pulses is left out: it is the same for all neighbouring motions.
     tangent = tangent_map(
         train.hammer,
         train.regime.pulses(period),
@@ -142,7 +142,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
 
 
 def _followed(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
-    """Return the verdicts on trains that are followed to the end."""
+    """Judge trains that are followed to the end."""
     judged, tolerance = (FIRST, LAST), effort.tolerance
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), None, effort)
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
@@ -156,7 +156,7 @@ def _followed(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[
         if why or not exponents or period_of(row) is not None
     }
     left = [i for i in range(len(trains)) if i not in verdicts]
-    # A start inside the pack would need its memory; such a train gets its exponent the long way.
+    # A start inside the pack would need its memory; such a train gets its exponent from rest.
     on_it = [i for i in left if not _in_pack(trains[i], states[i], 0)]
     begun = [(trains[i].regime, _state(states[i], 0)) for i in on_it]
     for i, exponent in zip(on_it, exponents_onward(begun, _SHORT, effort), strict=True):

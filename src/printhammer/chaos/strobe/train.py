@@ -1,6 +1,6 @@
-"""Trains from rest to their last strobe point, together on all cores, and verdicts on them.
+"""Trains from rest to their last strobe point, run in parallel, and verdicts on them.
 
-States with which a train goes on where another ended, and which trains may be run piece by piece.
+States that continue a train where another ended, and trains that may be run piece by piece.
 """
 
 from __future__ import annotations
@@ -28,28 +28,28 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray
 
 State = tuple[float, ...]
-"""Displacement, m, velocity, m/s, and what belongs to a state beside them: `printhammer.run.start.Beyond`."""
+"""Displacement, m, velocity, m/s, and further components: `printhammer.run.start.Beyond`."""
 
 NO_CURRENT: Final = AT_REST[2:]
-"""The electric part of a state without current."""
+"""Electric part of a state without current."""
 
 FROM_REST: Final[State] = (math.nan, math.nan, *AT_REST)
-"""Row of a state that stands for a train that begins at rest, with nothing fired before."""
+"""State that represents a train from rest, with no firing before."""
 
 LONG_CYCLE: Final = 5
-"""Shortest cycle, in firings, of which rests on the backstop are looked for. Arbitrary."""
+"""Shortest cycle, in firings, that is tested for rests on the backstop. Arbitrary."""
 
 STRETCH: Final = 1
-"""Firings that are run at a time where a train may be run piece by piece.
+"""Number of firings in a run, for trains that may be run piece by piece.
 
-Time is rounded to a part of itself, and the phase of a force with it; a ball that comes to rest on a table
-and leaves it again makes a hundred million times as much of that. Runs of one period each are all alike, so
-that a motion that forgets its past repeats itself to the last bit.
+Rounding of the time, and so of the phase of a force, is proportional to the time; a ball that comes to rest
+on a table and leaves it again amplifies it by 1e8. Runs of one period each have the same rounding, so that a
+motion that forgets its past repeats exactly.
 """
 
 
 def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
-    """Return the branches of the pack on which states lie, 0 outside of it."""
+    """Determine the branches of the pack on which states lie, 0 outside the pack."""
     branches = np.where(x > front, branch, 0).astype(np.int64)
     for held, part_of in HELD_BRANCHES.items():
         branches[branches == held] = part_of
@@ -59,15 +59,15 @@ def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: fl
 def handed_on(
     hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
 ) -> State:
-    """Return the state with which another train goes on; `FROM_REST` where none can."""
+    """Return the state that continues a train; `FROM_REST` if none can."""
     begun = state_to_begin(hammer, x, v, mode, memory)
     return FROM_REST if begun is None else (*begun, *electric)
 
 
-def forgets(regime: Regime) -> bool:
-    """Tell whether displacement and velocity at a firing are all that a motion goes on from, at any time.
+def is_memoryless(regime: Regime) -> bool:
+    """Whether (x, v) at a firing determines the motion that follows, for every firing phase.
 
-    So it is under a force without end, with a rigid backstop and no pack.
+    True under an endless force, with a rigid backstop and no pack.
     """
     backstop = regime.hammer.backstop
     rigid = backstop is not None and backstop.law == "rigid"
@@ -75,14 +75,14 @@ def forgets(regime: Regime) -> bool:
 
 
 _BEFORE: Final = 100
-"""Firings before an exponent counts."""
+"""Number of firings before an exponent is averaged."""
 
 
 class Train(Declared):
-    """A regime fired from a state on, with nothing fired before."""
+    """A regime fired from a state on, with no firing before."""
 
     regime: Regime = part("hammer and periodic drive")
-    drive: Drive = part("so many pulses, or the endless force")
+    drive: Drive = part("a sequence of pulses, or the endless force")
     state: tuple[float, ...] | None = part(
         "displacement, m, velocity, m/s, and what else belongs to the state at time 0, as for"
         " `printhammer.simulate`",
@@ -92,9 +92,9 @@ class Train(Declared):
 
     @classmethod
     def of(cls, regime: Regime, firings: int, state: tuple[float, ...] | None = None) -> Self:
-        """Make a train for states up to a firing.
+        """Build a train for states up to a firing.
 
-        One more is fired: runs end there, so that no state depends on where that is.
+        One more pulse is fired at the end of the run, so that no state depends on where that is.
         """
         return cls(regime, regime.pulses(firings + 1), state)
 
@@ -128,34 +128,34 @@ class States:
     current: FloatArray | None = None
 
     def distances(self, train: Train) -> FloatArray:
-        """Return how far the states are from repeating, see `printhammer.chaos.strobe.verdict.repeats`."""
+        """Compute the closing errors of the states, see `printhammer.chaos.strobe.verdict.repeats`."""
         front = math.inf if train.hammer.front is None else train.hammer.front
         return repeats(self.points, pack_branches(self.x, self.branch, front), _scales(train))
 
     @property
     def points(self) -> FloatArray:
-        """Displacement, velocity and memory, under a voltage current, a row for each firing."""
+        """Displacement, velocity and memory, with a driver also current, a row for each firing."""
         current = [] if self.current is None else [self.current]
         return np.column_stack([self.x, self.v, self.memory, *current])
 
     def scaled(self, train: Train) -> FloatArray:
-        """Return the points in half-widths of the window."""
+        """Normalise the points by the half-widths of the window."""
         return np.asarray(self.points / _scales(train))
 
     def settled(self, train: Train, distances: FloatArray) -> Settled | None:
-        """Return to what the train has settled, from successive states; None if they do not repeat."""
+        """Find the orbit to which the train has settled, from successive states; None if aperiodic."""
         period = period_of(distances)
         if period is None:
             return None
         return settled(train.regime.at_firings, self.points, period, _scales(train))
 
     def resting(self, train: Train, distances: FloatArray, tolerance: float) -> tuple[int, int] | None:
-        """Return the cycle of a motion that comes to rest, in firings, and its rests; None for another one.
+        """Find the cycle of a motion that rests on the backstop, in firings, and its rests; else None.
 
-        The cycle is 0 where the motion does not repeat; then at least two rests are asked for. Cycles of a
-        few firings are left out: rounding does not change them.
+        The cycle is 0 if the motion does not repeat; then at least two rests are required. Cycles of a few
+        firings are left out: rounding does not change them.
         """
-        if not forgets(train.regime):
+        if not is_memoryless(train.regime):
             return None
         count = period_of(distances) or exact_cycle(self.points)
         if 0 < count < LONG_CYCLE:
@@ -178,10 +178,10 @@ def run_trains(
     *,
     every_exponent: bool = False,
 ) -> tuple[list[States], list[Verdict | None]]:
-    """Return the states of trains at chosen firings, each at the phase of its regime, and verdicts on them.
+    """Compute the states of trains at chosen firings, at the phases of their regimes, and verdicts.
 
-    A verdict is about the firings from the first to the last that are `judged`; there is none where that is
-    None. Exponents of periodic trains are computed only where `every_exponent` is true.
+    A verdict covers the firings from the first to the last of `judged`; None for no verdict. Exponents of
+    periodic trains are computed only with `every_exponent`.
     """
     if not trains:
         return [], []
@@ -194,7 +194,7 @@ def run_trains(
     ends = [float(train.times(after)[0]) for train in trains]
     runs = effort.within(0, total if judged is None else 2 * total)
     current: FloatArray | None = None
-    if all(forgets(train.regime) for train in trains):
+    if all(is_memoryless(train.regime) for train in trains):
         x, v, branch, memory, names, reached = _in_stretches(trains, every, runs)
     else:
         result = _ensemble(trains, ends, runs.tolerance).run(strobes=every, **runs.running)
@@ -242,16 +242,15 @@ def run_trains(
 
 
 FINER: Final = (0.1, 0.01)
-"""Shares of the tolerance at which the period of a motion that comes to rest is computed again."""
+"""Factors of the tolerance at which the period of a motion that comes to rest is recomputed."""
 
 
 def _at_finer(
     trains: Sequence[Train], judged: tuple[int, int], effort: Effort
 ) -> list[tuple[tuple[float, str], ...]]:
-    """Return tolerances and periods of trains at a tenth and a hundredth of the tolerance.
+    """Compute tolerances and periods of trains at a tenth and a hundredth of the tolerance.
 
-    Between two rests small errors grow; where they grow to the size of the motion its period is that of the
-    rounding.
+    Between two rests small errors grow; if they reach the size of the motion, rounding decides its period.
     """
     firings = np.arange(judged[0], judged[1] + 1)
     rows: list[tuple[tuple[float, str], ...]] = [() for _ in trains]
@@ -270,7 +269,7 @@ def _at_finer(
 def _ensemble(
     trains: Sequence[Train], ends: Sequence[float], tolerance: float, states: FloatArray | None = None
 ) -> Ensemble:
-    """Return the runs of trains up to times, s, from states at time 0, by default their own."""
+    """Run trains to given times, s, from states at time 0, by default their own."""
     begun = [train.state for train in trains if train.state is not None]
     own = np.array(begun) if len(begun) == len(trains) else None
     return Ensemble(
@@ -285,9 +284,9 @@ def _ensemble(
 def _in_stretches(
     trains: Sequence[Train], every: Sequence[FloatArray], effort: Effort
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, list[str], FloatArray]:
-    """Return states of trains at times, s, a row each, how the runs ended, and up to when they got.
+    """Compute states of trains at times, s, a row each, statuses, and the times reached.
 
-    A few periods at a time, so that time is small and its rounding stays so.
+    The runs are a few periods long, so that time and its rounding stay small.
     """
     shape = len(trains), max(len(times) for times in every)
     x, v, memory = (np.full(shape, np.nan) for _ in range(3))
@@ -334,18 +333,18 @@ def _in_stretches(
 def exponents_onward(
     begun: Sequence[tuple[Regime, tuple[float, ...]]], points: int, effort: Effort
 ) -> list[Exponent]:
-    """Return the largest exponents of trains that go on from states at a firing.
+    """Compute the largest exponents of trains that continue from states at a firing.
 
-    Over so many points, after a hundred firings.
+    The exponents are averaged over `points` firings, after a hundred firings.
     """
     window = _BEFORE + 1, _BEFORE + points
-    # What is left of the pulses before is left out: it is the same for all neighbouring motions.
+    # The remainder of earlier pulses is left out: it is the same for all neighbouring motions.
     trains = [Train(regime, regime.pulses(window[1] + 2), state) for regime, state in begun]
     return exponents_of(trains, window, effort)
 
 
 def exponents_of(trains: Sequence[Train], firings: tuple[int, int], effort: Effort) -> list[Exponent]:
-    """Return the largest exponents of trains, from the first to the last of some firings, on all cores."""
+    """Compute the largest exponents of trains over a range of firings, in parallel."""
     from printhammer.derivatives.states import strobe_exponent
 
     return effort.mapped(

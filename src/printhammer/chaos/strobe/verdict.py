@@ -1,11 +1,11 @@
-"""Is a train periodic or strange? A verdict on strobe points, with its evidence.
+"""Verdict on strobe points, periodic or strange, with its evidence.
 
 A train of period T has the period q if its states q firings apart agree, and q is the smallest such number;
-where they do but still move, Newton's method has to confirm it, see `printhammer.chaos.orbits.settled`.
-It is strange if there is no such q and neighbouring motions part: the largest exponent of the strobe map is
-positive by three standard errors. It is superstable if there is no such q and the armature comes to rest on
-its backstop again and again: whatever it did before is forgotten there, and it repeats a cycle longer than 64
-firings. Everything else is undecided, with the reason.
+if they agree but still move, Newton's method has to confirm the period, see
+`printhammer.chaos.orbits.settled`. The train is strange if there is no such q and neighbouring motions
+separate: the largest exponent of the strobe map is positive by three standard errors. It is superstable if
+there is no such q and the armature comes to rest on its backstop repeatedly: each rest erases the past, and
+the motion repeats a cycle longer than 64 firings. All other trains are undecided, with the reason.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.settled import Settled
 
 LARGEST_PERIOD: Final = 64
-"""Largest period that is looked for, in firings."""
+"""Largest period to search for, in firings."""
 
 AGREEMENT: Final = 1e-6
-"""Distance, in half-widths of the window, up to which states agree."""
+"""Distance, in half-widths of the window, within which states agree."""
 
 SIGNIFICANT: Final = 3.0
-"""Number of standard errors by which the exponent of a strange train is positive."""
+"""Number of standard errors by which the exponent of a strange train has to be positive."""
 
 SUPERSTABLE: Final = "superstable"
-"""Verdict on a motion that comes to rest on its backstop again and again, without a period up to 64."""
+"""Verdict on a motion that repeatedly comes to rest on its backstop, without a period up to 64."""
 
 FORGETS: Final = "no exponent: the motion comes to rest on the backstop and forgets its past"
 
 FIRST: Final = 1001
-"""First firing that is judged unless told otherwise; the very first one is number 1."""
+"""Default of the first judged firing; the very first firing is number 1."""
 
 LAST: Final = 2000
-"""Last firing that is judged unless told otherwise."""
+"""Default of the last judged firing."""
 
 _STOPPED: Final = "the run ended before firing"
 
 
 class Verdict(Declared):
-    """What kind of motion a train leads to, and the evidence."""
+    """Kind of motion that a train leads to, with the evidence."""
 
     name: str = part('"period-1", "period-2", ..., "strange", "superstable" or "undecided"')
     period: int | None = part("number of firings after which the states repeat")
@@ -55,11 +55,11 @@ class Verdict(Declared):
         more="NaN where the run ended before",
     )
     nearest: int | None = part(
-        "number of firings after which the states come closest to repeating, at most 64",
+        "number of firings, at most 64, after which the states come closest to repeating",
         more="the period where there is one",
     )
     exponent: float = part("largest exponent of the strobe map, per firing; NaN where it was not computed")
-    standard_error: float = part("of the exponent")
+    standard_error: float = part("standard error of the exponent")
     first: int = part("first firing that was judged; the very first one is number 1")
     last: int = part("last firing that was judged")
     tolerance: float = part("tolerance of the integration")
@@ -81,7 +81,7 @@ class Verdict(Declared):
 
     @property
     def stopped(self) -> bool:
-        """Whether the run ended before the last firing that was to be judged."""
+        """Whether the run ended before the last firing to be judged."""
         return self.reason.startswith(_STOPPED)
 
     @property
@@ -91,7 +91,7 @@ class Verdict(Declared):
 
     @property
     def hangs_on_rounding(self) -> bool:
-        """Whether the period differs at finer tolerances: it hangs on the last bits of a long cycle."""
+        """Whether the period differs at finer tolerances: rounding decides the length of the cycle."""
         return any(name != self.name for _tolerance, name in self.elsewhere)
 
     @property
@@ -101,7 +101,7 @@ class Verdict(Declared):
 
     @property
     def phrases(self) -> list[str]:
-        """The evidence, a phrase each."""
+        """Evidence as a list of phrases."""
         phrases = []
         if self.period is not None:
             phrases.append(f"states {_firings(self.period)} apart agree to {self.distance:.1e} of the window")
@@ -131,11 +131,11 @@ class Verdict(Declared):
 
     @property
     def evidence(self) -> str:
-        """The evidence in one line."""
+        """Evidence in one line."""
         return "; ".join(self.phrases)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return verdict and evidence by name; None for what is not known, so that JSON can hold it."""
+        """Return verdict and evidence by name, for JSON; None for unknown values."""
         return {
             "verdict": self.name,
             "nearest_period": self.nearest,
@@ -165,13 +165,12 @@ def _finite(number: float) -> float | None:
 def repeats(
     states: FloatArray, branches: IntArray, scales: FloatArray, longest: int = LARGEST_PERIOD
 ) -> FloatArray:
-    """Return how far states q apart are from each other at most, for q from 1 on, shape (longest,).
+    """Compute the largest distance of states q apart, for q from 1 on, shape (longest,).
 
     States, shape (n, 3), are displacement, velocity and memory of the pack at successive firings; their
     branches, shape (n,), those of the force law inside the pack, 0 outside. A distance is the largest
-    absolute difference of a component, in units of its scale: infinite where states q apart lie on different
-    branches, where one is not known, and where q is more than half of n, so that every state is compared at
-    least once.
+    absolute difference of a component, in units of its scale: infinite if states q apart lie on different
+    branches, if a state is unknown, or if q exceeds half of n, so that every state is compared at least once.
     """
     scaled = states / scales
     count = len(scaled)
@@ -185,7 +184,7 @@ def repeats(
 
 
 def period_of(distances: FloatArray) -> int | None:
-    """Return the smallest q whose states agree, given the distances from `repeats`; None if there is none."""
+    """Return the smallest q whose states agree, from the distances of `repeats`; None without such q."""
     agree = np.flatnonzero(distances <= AGREEMENT)
     return int(agree[0]) + 1 if agree.size else None
 
@@ -199,12 +198,12 @@ def verdict(
     settled: Settled | None = None,
     resting: tuple[int, int] | None = None,
 ) -> Verdict:
-    """Judge a train by the distances from `repeats` between the first and the last of some firings.
+    """Judge a train by the distances from `repeats` over a range of firings.
 
-    `exponent` is the largest one over these firings, None where it was not computed; `stopped` says how the
-    run ended if that was before the last of them. `settled` is what became of the number after which the
-    states agree; without it that is the period. `resting` are the firings after which a motion that comes to
-    rest repeats, 0 if unknown, and the number of rests seen.
+    `exponent` is the largest exponent over these firings, None if it was not computed; `stopped` is the
+    status of a run that ended before the last of them. `settled` is the result of confirming the number of
+    firings after which the states agree; without it that number is the period. `resting` are the period of a
+    motion that comes to rest, in firings, 0 if unknown, and the number of rests.
     """
     period = None if stopped else period_of(distances)
     closest = period
@@ -248,12 +247,12 @@ def verdict(
 
 
 def is_positive(exponent: Exponent) -> bool:
-    """Tell whether an exponent is known, and positive by `SIGNIFICANT` standard errors."""
+    """Whether an exponent is known, and positive by `SIGNIFICANT` standard errors."""
     return bool(exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error)
 
 
 def _without_period(exponent: Exponent | None) -> tuple[str, str]:
-    """Return the verdict on a train without a period up to 64, and the reason of an undecided one."""
+    """Return the verdict on an aperiodic train, with the reason if it is undecided."""
     name = "undecided"
     if exponent is None:
         return name, "no period, and the exponent was not computed"

@@ -38,7 +38,8 @@ _bench = partial(opt.text, panel="Bench")
         "offset": _sensor("AMOUNT", "Zero offset of readings, in the form of --noise.", many=True),
         "sampling_rate": _sensor("RATE", "Sampling rate of records of motion or current (default: 1 MHz)."),
         "bandwidth": _sensor(
-            "RATE", "Bandwidth of their sensors, a first-order low-pass (default: 200 kHz), or none."
+            "RATE",
+            "Bandwidth of motion and current sensors, a first-order low-pass (default: 200 kHz), or none.",
         ),
         "outliers": _sensor("SHARE", "Fraction of readings that are outliers, e.g. '2 %' (default: 0)."),
         "displacements": _bench("LIST", "Displacements at which the armature is held, e.g. '60 um, 100 um'."),

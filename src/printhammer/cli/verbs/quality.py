@@ -282,7 +282,7 @@ def print_(
     ),
     pitch: float | None = _length("Distance between slots (default: 1/60 in for 9 wires)."),
     wire_pitch: float | None = _length(
-        "Distance between neighbouring wires (default: such that all are as high as 9, 1/72 in apart)."
+        "Distance between neighbouring wires (default: equal print height for any number; 1/72 in for 9)."
     ),
     wire_diameter: float | None = _length(
         "Diameter of a wire (default: 0.35 mm for 9 wires).", flag="--wire"

@@ -239,7 +239,7 @@ def learn(
     offset_spread: float | None = opt.quantity(
         "s",
         "TIME",
-        "Standard deviation of that error over units (default: unknown; the learner expects 25 us).",
+        "Standard deviation of the constant time error over units (default: unknown, with a prior of 25 us).",
         panel=_PANEL,
     ),
     missed: float | None = opt.number(

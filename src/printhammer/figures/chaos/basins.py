@@ -198,12 +198,12 @@ def plot_quench(quenches: QuenchMap) -> Figure:
         low, high = np.quantile(known, [_FEW_QUENCH, 1.0 - _FEW_QUENCH])
         mesh = ax.pcolormesh(x, y, printed, cmap=PRINTED, vmin=low, vmax=high, rasterized=True)
         bar = figure.colorbar(mesh, ax=ax, pad=0.02, fraction=0.05, extend="both")
-        bar.set_label("Printed: force over that of the first alone", fontsize=SMALL)
+        bar.set_label("Printed: force relative to the first dot", fontsize=SMALL)
     if quenches.lost.any():
         mesh = ax.pcolormesh(x, y, lost, cmap=LOST, vmin=0.0, vmax=1.0, rasterized=True)
         # The ratio exceeds 1 if the second firing falls into the contact of the first dot.
         bar = figure.colorbar(mesh, ax=ax, pad=0.02, fraction=0.05, extend="max")
-        bar.set_label("Lost: second peak, parts of the way to the pack", fontsize=SMALL)
+        bar.set_label("Lost: second peak, fraction of the way to the pack", fontsize=SMALL)
     width = getattr(quenches.waveform, "width", None)
     if width is not None and y[0] < up.shown(width) < y[-1]:
         dashed(

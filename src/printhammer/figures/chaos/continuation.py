@@ -187,7 +187,7 @@ def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
 def _remarks(branches: Sequence[Branch]) -> list[str]:
     """Return remarks on branches that end before the bounds."""
     reasons = {
-        "length": "where the number of steps was used up",
+        "length": "at the maximum number of steps",
         "lost": "where Newton's method does not converge",
         "no value": "where there is no strobe map",
         "grazing": "in a grazing of the rigid backstop",

@@ -217,7 +217,9 @@ def plot_train(train: ImpactTrain) -> Figure:
     room = 0.06 * (high - low)
     ends = (low - room, high + room)
     returns.plot(ends, ends, color=FAINT, lw=HAIR, zorder=1.0)
-    returns.set(xlabel=f"Interval  [{time.sign}]", ylabel=f"Next one  [{time.sign}]", xlim=ends, ylim=ends)
+    returns.set(
+        xlabel=f"Interval  [{time.sign}]", ylabel=f"Next interval  [{time.sign}]", xlim=ends, ylim=ends
+    )
     _lags(lags, train)
     for ax in (bars, returns, lags):
         ax.tick_params(axis="both", top=True, right=True)

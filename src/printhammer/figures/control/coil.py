@@ -51,7 +51,7 @@ def plot_dead_time(table: DeadTime) -> Figure:
     widths.set_ylabel("Width  [ms]")
     widths.set_xlabel("Rail  [V]")
     times.legend(fontsize=style.SMALL, loc="best", frameon=False)
-    heading(times, f"Same blow, {table.blow:.3g} m/s; dashed: own pulse")
+    heading(times, f"Equal impact speed, {table.blow:.3g} m/s; dashed: own pulse")
     widths.set_xlim(*times.get_xlim())
     sign(figure, table.hammer)
     return figure
@@ -69,7 +69,7 @@ def plot_duty(duty: ThermalDuty) -> Figure:
     ax.plot(
         reach, (duty.limit - reach) / (duty.limit_heat * duty.coil.whole), color=style.BLUE, lw=style.THIN
     )
-    heading(ax, f"{1e3 * duty.limit_heat:.3g} mJ a dot at {duty.limit:g} °C, {duty.coil.whole:g} K/W")
+    heading(ax, f"{1e3 * duty.limit_heat:.3g} mJ per dot at {duty.limit:g} °C, {duty.coil.whole:g} K/W")
     _axes(ax)
     return figure
 
@@ -87,7 +87,7 @@ def plot_limit(limit: ThermalLimit) -> Figure:
         rate = (limit.limit - start) / float(limit.warming[rows][0])
         ax.plot([start, limit.limit], [rate, 0.0], color=colour, lw=style.THIN)
     ax.legend(fontsize=style.SMALL, loc="upper right", frameon=False)
-    heading(ax, f"One limit of the winding, {limit.limit:.1f} °C")
+    heading(ax, f"Common temperature limit of the winding, {limit.limit:.1f} °C")
     _axes(ax)
     return figure
 
@@ -95,7 +95,7 @@ def plot_limit(limit: ThermalLimit) -> Figure:
 def _axes(ax: Axes) -> None:
     ax.set_ylim(bottom=0.0)
     ax.set_xlabel("Ambient temperature  [°C]")
-    ax.set_ylabel("Dots a second, for ever  [Hz]")
+    ax.set_ylabel("Highest continuous rate  [Hz]")
     ax.margins(x=0.03)
 
 
@@ -125,12 +125,12 @@ def plot_impact_time(study: ImpactTime) -> Figure:
         below.plot(noise, _MICRO * np.abs(study.bias[cell]), "o", color=style.ORANGE, **look, ms=3.0)
         below.plot(noise, _MICRO * np.abs(study.unit_bias[cell]), "s", color=style.BLUE, **look, ms=3.0)
     above.set_ylabel("Standard deviation  [µs]")
-    below.set_ylabel("Size of the bias  [µs]")
+    below.set_ylabel("Magnitude of the bias  [µs]")
     below.set_xlabel(f"Noise of a sample of the {study.signal}  [m{study.unit}]")
     above.tick_params(axis="x", labelbottom=False)
     for ax in (above, below):
         ax.set_ylim(bottom=0.0)
     above.legend(fontsize=style.SMALL, loc="best", frameon=False)
-    heading(above, "Error of the time of impact; orange: nominal hammer, blue: units")
+    heading(above, "Error of the impact time; orange: nominal hammer, blue: units")
     sign(figure, study.hammer)
     return figure

@@ -44,7 +44,7 @@ def plot(feedback: Feedback) -> Figure:
     grid = figure.add_gridspec(2, 2)
     above = [figure.add_subplot(grid[0, column]) for column in range(2)]
     below = [figure.add_subplot(grid[1, column]) for column in range(2)]
-    units = (("Force off  [%]", 100.0), ("Arrival off  [µs]", from_si(1.0, "s", "us")))
+    units = (("Force deviation  [%]", 100.0), ("Arrival deviation  [µs]", from_si(1.0, "s", "us")))
     limits = (feedback.limits.force, feedback.limits.arrival)
     for column, ((name, factor), limit) in enumerate(zip(units, limits, strict=True)):
         values = (feedback.force, feedback.arrival)[column] * factor
@@ -54,9 +54,9 @@ def plot(feedback: Feedback) -> Figure:
         _by_gap(below[column], feedback, pairs, limit * factor)
         below[column].set_ylabel(name)
         below[column].set_xlabel("Time between two slots  [ms]")
-    above[0].set_ylabel("Share of the dots")
+    above[0].set_ylabel("Fraction of the dots")
     heading(above[0], f"All dots of the patterns of eight slots at {feedback.rate:.6g} Hz")
-    heading(above[1], "what is farther off: at the ends", loc="right")
+    heading(above[1], "larger deviations: in the end bins", loc="right")
     heading(below[0], "The second of two dots")
     # Leave room for the legend above the bars.
     room = 1.1 + 0.14 * len(feedback.strategies)
@@ -132,10 +132,10 @@ def plot_run(feedback: Feedback) -> Figure:
     assert hammer.front is not None
     ms, um = scale("time").factor, scale("displacement").factor
     room = between_surfaces(panel, hammer, run.motion, 2.0)
-    samples = {"marker": ".", "mew": None, "label": "what the sensor showed", "gid": "samples"}
+    samples = {"marker": ".", "mew": None, "label": "sensor samples", "gid": "samples"}
     dots(panel, ms * run.times, um * run.shown, 2.0, style.ORANGE, **samples)
     front = um * hammer.front
-    due: dict[str, Any] = {"color": style.BLUE, "lw": style.LINE, "label": "touch wanted", "gid": "due"}
+    due: dict[str, Any] = {"color": style.BLUE, "lw": style.LINE, "label": "target touch", "gid": "due"}
     panel.vlines(ms * run.due, front - 0.6 * room, front + 0.6 * room, **due)
     heading(panel, f"Slots {run.pattern} at {feedback.rate:.6g} Hz with feedback")
     panel.legend(fontsize=style.SMALL, frameon=False, loc="upper right", ncols=2)
@@ -182,12 +182,12 @@ def plot_burst(burst: LeastWork) -> Figure:
         0.0,
         color=style.ORANGE,
         lw=0.0,
-        label="the coil gives",
+        label="supplied by the coil",
         gid="given",
     )
     power.fill_between(
         ms * run.t, np.minimum(watts, 0.0), 0.0, color=style.GREEN, lw=0.0, gid="taken back"
-    ).set_label("the coil takes back")
+    ).set_label("recovered by the coil")
     legend_above(power, power.get_legend_handles_labels()[0])
     power.set_ylabel("Coil power  [W]")
     power.set_xlabel("Time  [ms]")
@@ -224,7 +224,7 @@ def _ledger(ax: Axes, burst: LeastWork) -> None:
     ax.plot([burst.bound_ratio] * 2, ends, color=style.INK, lw=style.LINE, gid="least positive work")
     ax.set_yticks(rows, [name for name, *_ in bars], fontsize=style.SMALL)
     ax.set_xlim(0.0, 1.1 * longest)
-    ax.set_xlabel("Energy over what the pack absorbs (line: least W+ of any current)")
+    ax.set_xlabel("Energy relative to that absorbed by the pack (line: lower bound of W+)")
 
 
 @styled
@@ -238,14 +238,14 @@ def plot_rates(bursts: LeastWorkRates) -> Figure:
     rates = across.shown(bursts.rates)
     thick: dict[str, Any] = {"lw": style.LINE, "ms": 4.0}
     ax.plot(rates, bursts.positive_ratio, "o-", color=style.ORANGE, label="positive work W+", **thick)
-    least = "least W+ of any current"
+    least = "lower bound of W+"
     ax.plot(rates, bursts.bound_ratio, color=style.INK, lw=style.THIN, ls=(0, (4, 3)), label=least)
     ax.plot(rates, bursts.net_ratio, "s-", color=style.BLUE, label="net work W", **thick)
     missing = bursts.status != "ok"
     if missing.any():
         ax.plot(rates[missing], [0.04] * int(missing.sum()), "x", color=style.MUTED, label="no current found")
     ax.set_ylim(bottom=0.0)
-    ax.set_ylabel("Work over what the pack absorbs")
+    ax.set_ylabel("Work relative to the energy absorbed by the pack")
     label(ax, "x", across)
     ax.legend(fontsize=style.SMALL, loc="lower right", frameon=False)
     heading(ax, f"Bursts of {bursts.count} dots")

@@ -48,7 +48,7 @@ def _few_rates(table: CompensationTable) -> Figure:
     every = {number_of(row, table.reach): row for row in histories(table.gaps, table.reach)}
     for row, rate in enumerate(table.rates.tolist()):
         for ax, name, word in zip(
-            axes[row], ("advance", "width"), ("Fired before its slot", "Width of the pulse"), strict=True
+            axes[row], ("advance", "width"), ("Advance of the firing", "Width of the pulse"), strict=True
         ):
             values = np.full((side, across), np.nan)
             for number in every:
@@ -82,7 +82,7 @@ def _many_rates(table: CompensationTable) -> Figure:
     for gap in range(1, table.reach + 1):
         column = number_of((gap, *[REST] * (table.gaps - 1)), table.reach)
         colour = _LINES[(gap - 1) % len(_LINES)]
-        word = "one slot after another" if gap == 1 else f"{gap} slots after another"
+        word = "gap of one slot" if gap == 1 else f"gap of {gap} slots"
         for ax, name in ((upper, "advance"), (lower, "width")):
             values = _MICROSECONDS.shown(getattr(table, name)[shown, column])
             ax.plot(rates, values, color=colour, lw=style.THIN, label=word, gid=f"{name} {gap}")
@@ -91,11 +91,11 @@ def _many_rates(table: CompensationTable) -> Figure:
             names = {"gid": f"braked {name} {gap}", "label": "with a brake pulse before" if first else None}
             ax.plot(rates[braked], values[braked], ls="none", marker="o", ms=2.5, color=colour, **names)
     upper.axhline(0.0, color=style.MUTED, lw=style.HAIR)
-    upper.set_ylabel("Fired before its slot  [µs]")
+    upper.set_ylabel("Advance of the firing  [µs]")
     lower.set_ylabel("Width of the pulse  [µs]")
     lower.set_xlabel("Slots per second  [kHz]")
     lower.legend(frameon=False, fontsize=style.SMALL)
-    heading(upper, "Dots after a dot from rest")
+    heading(upper, "Second dot after a rest")
     return figure
 
 
@@ -126,10 +126,10 @@ def plot_report(report: TableReport) -> Figure:
     span = f"{rates[0]:g} Hz" if rates.size == 1 else f"{rates.min():g} Hz to {rates.max():g} Hz"
     heading(bars, f"Hammers driven, {span}")
     off, limit = 100.0 * report.force_deviation, 100.0 * report.limits.force
-    _histogram(figure.add_subplot(grid[1, 0]), off, limit, "Force off by  [%]")
+    _histogram(figure.add_subplot(grid[1, 0]), off, limit, "Force deviation  [%]")
     late = _MICROSECONDS.shown(report.arrival_deviation)
     limit = float(_MICROSECONDS.shown(report.limits.arrival))
-    _histogram(figure.add_subplot(grid[1, 1]), late, limit, "Arrival off by  [µs]")
+    _histogram(figure.add_subplot(grid[1, 1]), late, limit, "Arrival deviation  [µs]")
     sign(figure, report.hammer)
     return figure
 
@@ -141,7 +141,7 @@ def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
     for row, colour, look in zip(values, (style.ORANGE, style.BLUE), ("--", "-"), strict=True):
         known = np.clip(row[~np.isnan(row)], edges[0], edges[-1])
         ax.hist(known, bins=edges.tolist(), histtype="step", color=colour, ls=look, lw=style.THIN)
-    heading(ax, "what is farther off: at the ends", loc="right", fontsize=style.TINY)
+    heading(ax, "larger deviations: in the end bins", loc="right", fontsize=style.TINY)
     ax.set_yscale("log")
     ax.set_xlabel(name)
     ax.set_ylabel("Dots of the cycle")
@@ -186,7 +186,7 @@ def plot_learning(learning: Learning) -> Figure:
     right = ax.secondary_yaxis("right")
     right.set_yticks(range(stages), [f"{share:.0f} %" for share in shares])
     ax.set_xlabel("Place on the paper  [mm]")
-    heading(ax, f"What is printed after so many test dots, at {learning.rate:.6g} Hz")
+    heading(ax, f"Dots after a number of test dots, at {learning.rate:.6g} Hz")
     heading(ax, "within limits", loc="right")
     sign(figure, learning.hammer)
     return figure

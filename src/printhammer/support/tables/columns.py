@@ -1,9 +1,9 @@
 """Declarations of the columns of a table, in a text or in a file beside the table.
 
 ``time=1, current=2*-10 A/V, displacement=3*50 um/V+120 um, delay(current)=2 us``: columns are counted from 1.
-The factor leads from the number in the table to the quantity; where the table says a unit of its own, the
-factor is per such a unit. What is added to it comes after the factor. A delay is how much later than the time
-beside it a column shows what happened. Times of even samples are ``time=-1 ms + 20 us``: first time and step.
+The factor converts the number in the table to the quantity; if the table states a unit for the column, the
+factor is per that unit. An offset is added after multiplication. A delay is the time by which a column lags
+behind the time column. Times of even samples are ``time=-1 ms + 20 us``: first time and step.
 
 The file beside ``trace.csv`` is ``trace.csv.toml``::
 
@@ -57,12 +57,12 @@ class Source:
     """Quantity that is added, with its unit; empty for nothing."""
 
     def scale(self, own: str, si: str) -> float:
-        """Return the factor from a number in the table, whose unit there is `own` or empty, to SI.
+        """Compute the factor from a number in the table, whose unit there is `own` or empty, to SI.
 
         Raises
         ------
         InputError
-            The unit of the factor does not lead from that of the table to the quantity.
+            The unit of the factor does not convert that of the table to the quantity.
         """
         if not self.unit and not own:
             raise InputError(
@@ -88,7 +88,7 @@ class Columns:
 
     sources: dict[str, Source]
     clock: Clock | None = None
-    """Times of the rows, where they are in no column."""
+    """Times of the rows, if no column holds them."""
     delays: dict[str, float] = field(default_factory=dict)
     """Delay of a quantity, s."""
     where: str = "--columns"
@@ -101,7 +101,7 @@ def read_columns(text: str, where: str = "--columns") -> Columns:
     Raises
     ------
     InputError
-        An entry is none, or a quantity is given twice.
+        An entry is invalid, or a quantity is repeated.
     """
     sources: dict[str, Source] = {}
     delays: dict[str, float] = {}
@@ -147,7 +147,7 @@ def columns_beside(path: Path) -> Columns | None:
     Raises
     ------
     InputError
-        The file cannot be read, or holds something else than a table [columns] and perhaps [delay].
+        The file cannot be read, or contains more than a table [columns] and optionally [delay].
     """
     beside = path.with_name(f"{path.name}.toml")
     try:

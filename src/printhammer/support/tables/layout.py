@@ -1,8 +1,8 @@
 """Layout of a table of numbers: separator, heading, units, facts around the numbers, times of even samples.
 
-Understood are the exports of oscilloscopes (Rigol, Tektronix, Keysight, PicoScope, LeCroy, Siglent, Rohde &
-Schwarz, GW Instek), of logic analysers (Saleae, sigrok), of LTspice, and of spreadsheets. No number is passed
-over: a row of numbers that does not belong to the table is refused with its line.
+Supported are the exports of oscilloscopes (Rigol, Tektronix, Keysight, PicoScope, LeCroy, Siglent, Rohde &
+Schwarz, GW Instek), of logic analysers (Saleae, sigrok), of LTspice, and of spreadsheets. No number is
+skipped: a row of numbers outside the table is an error that names its line.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Row = tuple[int, list[str]]
 
 _SEPARATORS: Final = "\t;|, "
 _LINES: Final = 2000
-"""Lines from which the separator is found."""
+"""Number of leading lines that determine the separator."""
 _START: Final = ("xorg", "xorigin", "t0", "x0", "tstart", "xzero", "hoffset", "start", "begin")
 _STEP: Final = (
     *("increment", "incr", "inc", "step", "delta", "tinc", "dt", "deltax", "timeincrement", "hresolution"),
@@ -59,25 +59,25 @@ class Clock(NamedTuple):
 
 @dataclass(frozen=True)
 class Table:
-    """A table of numbers whose columns need not have a meaning yet."""
+    """A table of numbers before its columns are assigned to quantities."""
 
     where: str
     """Name of the file, for messages."""
     head: int
-    """Line of the heading; 0 where there is none."""
+    """Line of the heading; 0 without a heading."""
     columns: list[Heading]
-    """Name and unit of each column, as its heading says."""
+    """Name and unit of each column, from its heading."""
     lines: list[int]
     """Line of the file of each row, counted from 1."""
     rows: list[list[str]]
-    """Cells; their numbers have a decimal point."""
+    """Cells; numbers have a decimal point."""
     comments: dict[str, str]
     """Comments of the form ``# key: value``."""
     clock: Clock | None
-    """Times of the rows where facts in the file say them."""
+    """Times of the rows, if facts in the file state them."""
 
     def cells(self, place: int) -> list[str]:
-        """Return the cells of a column, without spaces around them."""
+        """Return the stripped cells of a column."""
         return [row[place].strip() if place < len(row) else "" for row in self.rows]
 
 
@@ -87,13 +87,13 @@ def read_layout(path: Path, what: str, words: Collection[str] = ()) -> Table:
 
 
 def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
-    """Find the layout of a table in a text; arguments as for `read_layout`.
+    """Determine the layout of a table in a text; arguments and errors as for `read_layout`.
 
     Raises
     ------
     InputError
-        There is no heading, a row has too few or too many cells, a row of numbers stands outside the table,
-        or it is not clear whether numbers have a decimal comma or a decimal point.
+        There is no heading, a row has too few or too many cells, a row of numbers is outside the table, or
+        the decimal mark is ambiguous.
     """
     separator = _separator(text)
     split = split_cells(text, where, delimiter=separator)
@@ -108,7 +108,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
         )
     rows, beside = _without_facts_beside(rows)
     facts = {_key(key): [value] for key, value in split.comments.items()} | beside
-    # Where no row is one of numbers, each cell says its own fault.
+    # If no row is numeric, each cell reports its own fault.
     begin = next((k for k, (_line, row) in enumerate(rows) if _is_data(row, words)), 1)
     above, data = rows[:begin], rows[begin:]
     if len(above) > 1 and is_unit_row(above[-1][1]):
@@ -148,7 +148,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
 
 
 def _separator(text: str) -> str:
-    """Return the separator with which most lines are rows of numbers; if none are, that of most lines."""
+    """Determine the separator that makes most lines rows of numbers, or else splits most lines."""
     lines = [line for line in text.split("\n", _LINES)[:_LINES] if line.strip() and line.strip()[0] != "#"]
     best, chosen = 0, ""
     for sign in _SEPARATORS:
@@ -171,13 +171,13 @@ def _bare(row: list[str]) -> list[str]:
 
 
 def _is_data(row: list[str], words: Collection[str]) -> bool:
-    """Whether a row is one of numbers: no cell is anything else but a gap or one of the words."""
+    """Whether a row is numeric: every cell is a reading, a gap or one of the words."""
     cells = [cell.strip() for cell in row]
     return any(map(is_number, cells)) and all(is_reading(cell) or cell.lower() in words for cell in cells)
 
 
 def _width(data: list[Row], above: list[Row]) -> int:
-    """Return the number of columns: that of the heading, or else that of the longest row."""
+    """Return the number of columns: that of the heading, or else of the longest row."""
     last = above[-1][1] if above else []
     if any(map(_is_named, last)) or is_unit_row(last):
         facts = (k for k, cell in enumerate(last) if _key(cell) in _CLOCK or _ASSIGNED.fullmatch(cell))
@@ -187,7 +187,7 @@ def _width(data: list[Row], above: list[Row]) -> int:
 
 
 def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: int) -> list[Row]:
-    """Return the heading that stands in the last comment above the numbers, as NumPy writes it."""
+    """Return the heading in the last comment above the numbers, as written by NumPy."""
     above = [
         (line, spaced(note).split() if separator == " " else note.split(separator))
         for line, note in notes
@@ -197,7 +197,7 @@ def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: 
 
 
 def _heading_rows(where: str, above: list[Row], width: int) -> list[Row]:
-    """Return the rows of names and units, of none to two, from the rows above the numbers."""
+    """Return the rows of names and units, up to two, from the rows above the numbers."""
     if not above or len(above[-1][1]) < width:
         return []
     line, last = above[-1]
@@ -219,7 +219,7 @@ def _is_named(cell: str) -> bool:
 
 
 def _without_facts_beside(rows: list[Row]) -> tuple[list[Row], dict[str, list[str]]]:
-    """Cut columns of facts off the left of the numbers, as older Tektronix oscilloscopes write them."""
+    """Remove columns of facts to the left of the numbers, as written by older Tektronix oscilloscopes."""
     first = rows[0][1]
     if not first[0].strip() or is_reading(first[0].strip()):
         return rows, {}
@@ -236,12 +236,12 @@ def _without_facts_beside(rows: list[Row]) -> tuple[list[Row], dict[str, list[st
 
 
 def _key(text: str) -> str:
-    """Return a name of a fact in lower case, letters and digits only."""
+    """Normalise the name of a fact: lower case, letters and digits only."""
     return "".join(letter for letter in text.lower() if letter.isalnum())
 
 
 def _facts_of(row: list[str]) -> dict[str, list[str]]:
-    """Return the facts of a row: "key,value,...", or cells such as "t0 = -1 ms"."""
+    """Parse the facts of a row: "key,value,...", or cells such as "t0 = -1 ms"."""
     facts = {_key(match[1]): [match[2]] for cell in row if (match := _ASSIGNED.fullmatch(cell))}
     if len(row) > 1 and row[0].strip():
         facts[_key(row[0])] = [cell.strip() for cell in row[1:]]
@@ -249,7 +249,7 @@ def _facts_of(row: list[str]) -> dict[str, list[str]]:
 
 
 def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list[Row]) -> list[Heading]:
-    """Return headings with units that stand in facts, of the columns without one."""
+    """Add units from facts to the headings of columns without a unit."""
     lecroy = bool(above) and above[0][1][0].upper().startswith("LECROY")
     time = _fact(facts, _TIME_UNIT, ["s"] if lecroy else [""])[0]
     values = _fact(facts, _VALUE_UNIT, ["V"] if lecroy else [""])
@@ -269,7 +269,7 @@ def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list
 
 
 def _beside_names(columns: list[Heading], facts: dict[str, list[str]]) -> list[Heading]:
-    """Return the headings of an older Tektronix: time, and the source that its facts name."""
+    """Return the headings of an older Tektronix oscilloscope: time, and the source named in its facts."""
     source = _fact(facts, ("source",), [""])[0]
     unit = split_heading(f"x [{facts[_TIME_UNIT[0]][0]}]").unit
     return [Heading("time", unit), *(column._replace(name=source) for column in columns[1:])]
@@ -284,7 +284,7 @@ def _clock(
 ) -> Clock | None:
     """Derive the sample times from facts: start and step, or step and the index of time zero."""
     written = _fact(facts, _START, [""])[0]
-    # Above the numbers, a start without a unit may be the number of a sample.
+    # Above the numbers, a start without a unit may be a sample index.
     plain = not numbered and is_number(written) and not any(key in facts for key in _START[:-2])
     start = None if plain else _seconds(where, "start", written)
     step = _seconds(where, "step", _fact(facts, _STEP, [""])[0])
@@ -304,7 +304,7 @@ def _clock(
 
 
 def _seconds(where: str, name: str, text: str) -> float | None:
-    """Read a time in seconds, or with its unit; None for an empty text."""
+    """Parse a time, in seconds or with its unit; None for an empty text."""
     if not text:
         return None
     with located(f"{where}: {name}", file=where, key=name):

@@ -1,4 +1,4 @@
-"""Numbers as tables write them: decimal comma or point, group marks, gaps, readings out of range."""
+"""Numbers as written in tables: decimal comma or point, group marks, gaps, readings out of range."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ _GROUPED: Final = {
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell without spaces around it writes a finite number, with whatever marks."""
+    """Whether a stripped cell is a finite number, with any decimal and group marks."""
     return _NUMBER.fullmatch(cell) is not None
 
 
 def is_reading(cell: str) -> bool:
-    """Whether a cell without spaces around it is a number, a gap, or a reading out of range."""
+    """Whether a stripped cell is a number, a gap, or a reading out of range."""
     return is_number(cell) or cell.lower() in GAPS or cell.lower() in OVER
 
 
 def with_points(
     where: str, text: str, separator: str, lines: Sequence[int], rows: list[list[str]]
 ) -> list[list[str]]:
-    """Return rows whose numbers have a decimal point and no group marks.
+    """Convert rows to numbers with a decimal point and without group marks.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def with_points(
     Raises
     ------
     InputError
-        Decimal comma and decimal point both occur, or a number such as 1,234 may be either.
+        Decimal comma and decimal point both occur, or a number such as 1,234 is ambiguous.
     """
     dropped: dict[int, str | None] = dict.fromkeys(ord(mark) for mark in _SPACES if mark in text)
     if "," in (text if separator != "," else "".join(cell for row in rows for cell in row)):
@@ -75,7 +75,7 @@ def with_points(
 
 
 def _check_groups(where: str, lines: Sequence[int], rows: list[list[str]]) -> None:
-    """Refuse a column such as 999, 1.000, 1.001, whose points divide thousands in some programs."""
+    """Raise InputError for a column such as 999, 1.000, 1.001, whose points may separate thousands."""
     for place in range(max(map(len, rows), default=0)):
         column = [
             (line, row[place].strip()) for line, row in zip(lines, rows, strict=True) if place < len(row)

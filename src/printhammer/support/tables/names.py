@@ -1,4 +1,4 @@
-"""Headings of columns: the name, the unit, and what quantity a name stands for."""
+"""Headings of columns: the name, the unit, and the quantity that a name denotes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ALIASES: Final = {
     "force": ("force", "f", "kraft"),
     "voltage": ("voltage", "u", "spannung", "tension"),
 }
-"""Names of columns that stand for a quantity, in lower case."""
+"""Names of columns that denote a quantity, in lower case."""
 
 _MEASURED: Final = ("s", "V", "A", "m", "N", "Hz", "m/s", "ohm", "Wb", "H")
 _COUNTS: Final = frozenset({"number", "sequence", "samples", "sample", "#", "pts", "points"})
@@ -27,7 +27,7 @@ _VOLTAGES: Final = re.compile(r"V\(.+\)")
 
 
 class Heading(NamedTuple):
-    """Name and unit of a column; empty where the heading does not say them."""
+    """Name and unit of a column; empty if the heading lacks them."""
 
     name: str
     unit: str = ""
@@ -39,7 +39,7 @@ class Heading(NamedTuple):
 
     @property
     def quantity(self) -> str:
-        """Quantity that the name stands for; empty where it stands for none."""
+        """Quantity that the name denotes; empty if it is unknown."""
         name = self.name.lower()
         return next((what for what, names in ALIASES.items() if name in names), "")
 
@@ -47,8 +47,8 @@ class Heading(NamedTuple):
 def split_heading(cell: str) -> Heading:
     """Split a heading such as "time [us]", "time (us)", "time in us" or "t/us" into name and unit.
 
-    What stands in square brackets is the unit whatever it is; what stands otherwise beside the name only if
-    such a unit is known, so that "i(t)" is a name.
+    A text in square brackets is always the unit; in any other notation only if the unit is known, so that
+    "i(t)" is a name.
     """
     cell = " ".join(cell.split())
     match = _BRACKETS.fullmatch(cell)
@@ -66,7 +66,7 @@ def split_heading(cell: str) -> Heading:
 
 
 def unit_of(text: str) -> str:
-    """Return the unit that a cell such as "(us)", "Volts" or "V DC" writes; empty where it writes none."""
+    """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; empty if it is no unit."""
     bare = re.sub(r"\s*(DC|AC|dc|ac)$", "", text.strip().strip("()[]{}").strip()) or text.strip()
     for word in (bare, bare.lower()):
         for si in _MEASURED:
@@ -76,13 +76,13 @@ def unit_of(text: str) -> str:
 
 
 def is_unit_row(cells: list[str]) -> bool:
-    """Whether cells are units, counts, or empty, and one at least is a unit."""
+    """Whether cells are units, counts, or empty, with at least one unit."""
     units = [unit_of(cell) or cell.strip().strip("()").lower() in _COUNTS for cell in cells if cell.strip()]
     return all(units) and any(isinstance(unit, str) for unit in units)
 
 
 def headings(rows: list[list[str]], width: int, separator: str) -> list[Heading]:
-    """Return the headings of columns from a row of names, a row of units, or both."""
+    """Build the headings of columns from a row of names, a row of units, or both."""
     units = [""] * width
     names = rows[-1][:width] if rows else [""] * width
     if rows and is_unit_row(names):
@@ -96,7 +96,7 @@ def headings(rows: list[list[str]], width: int, separator: str) -> list[Heading]
 
 
 def _of_ltspice(columns: list[Heading]) -> list[Heading]:
-    """Return headings with the units of LTspice, which writes none: "time", "V(out)", "I(L1)"."""
+    """Add the units that LTspice omits to its headings: "time", "V(out)", "I(L1)"."""
     kinds = [
         "A" if _CURRENTS.fullmatch(name) else "V" if _VOLTAGES.fullmatch(name) else "" for name, _ in columns
     ]

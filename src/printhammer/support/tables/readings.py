@@ -1,9 +1,9 @@
-"""Tables of measurements as quantities in SI: which column is which, units, gaps, delays.
+"""Tables of measurements as quantities in SI: assignment of columns, units, gaps, delays.
 
-A heading gives every column its unit: ``displacement [um],current [A],force [N]``, in any order and any unit
-of the dimension; every line after it is one row. A text of columns, or a file beside the table, says what
-columns hold where the heading does not; see `printhammer.support.tables.columns`. What a column holds is
-never guessed from its numbers. Times are those of the table: a record keeps what it has before its time 0.
+A heading states the unit of every column: ``displacement [um],current [A],force [N]``, in any order and any
+unit of the dimension; every line after it is one row. A declaration of columns, or a file beside the table,
+assigns the columns that the heading does not identify; see `printhammer.support.tables.columns`. The quantity
+of a column is never guessed from its numbers. Times are those of the table: rows before time 0 are kept.
 """
 
 from __future__ import annotations
@@ -29,8 +29,7 @@ _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
 LARGEST: Final = 1e9
-"""Largest magnitude of a measured value in SI. Beyond it is what instruments write without a reading, such as
-9.9e37."""
+"""Largest magnitude of a measured value in SI; instruments write numbers such as 9.9e37 for no reading."""
 
 BEFORE: Final = 0.1
 """Largest value of a drive before time 0, as a fraction of its peak, that counts as noise; arbitrary."""
@@ -42,7 +41,7 @@ _BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Columns of a table in the order of its rows."""
+    """Columns of a table, in the order of its rows."""
 
     path: Path
     """The file."""
@@ -51,15 +50,15 @@ class Readings:
     words: dict[str, list[str]]
     """Columns of words by name, in lower case."""
     lines: IntArray
-    """Line of the file in which each row stands, counted from 1; shape (rows,)."""
+    """Line of the file of each row, counted from 1; shape (rows,)."""
     comments: dict[str, str]
-    """Comments of the form ``# key: value``; of a key given twice, the last."""
+    """Comments of the form ``# key: value``; for a repeated key, the last."""
 
     def __len__(self) -> int:
         return len(self.lines)
 
     def check_times(self, *, least: int = 2) -> None:
-        """Check that there are enough rows and that times ascend; InputError with the line."""
+        """Check the number of rows and that times ascend; InputError with the line."""
         times, where = self.values["time"], str(self.path)
         if len(times) < least:
             raise InputError(
@@ -82,7 +81,7 @@ class Readings:
         Raises
         ------
         InputError
-            More than `BEFORE` of its peak stands before time 0, or there is no time after it.
+            More than `BEFORE` of its peak is before time 0, or no row is after it.
         """
         values, where = np.abs(self.values[name]), str(self.path)
         early = times < 0.0
@@ -107,20 +106,20 @@ def read_table(
     columns: str | None = None,
     what: str = "the table",
 ) -> Readings:
-    """Read a table, numbers in SI; a column that was left out is not in it.
+    """Read a table, numbers in SI; optional columns may be missing from the result.
 
     Parameters
     ----------
     path : path
         The file.
     required : mapping of str to str
-        Columns that must be there: name, in lower case, to SI unit.
+        Required columns: name, in lower case, to SI unit.
     optional : mapping of str to str, optional
-        Columns of numbers that may be left out.
+        Optional columns of numbers.
     text : mapping of str to tuple of str, optional
-        Columns of words, which may be left out: name to the words allowed, in lower case. They have no unit.
+        Optional columns of words: name to the allowed words, in lower case. They have no unit.
     gaps : collection of str, optional
-        Columns that may have empty cells, which become NaN.
+        Columns whose empty cells become NaN.
     columns : str, optional
         Declaration of the columns; by default the file beside the table, or else its heading.
     what : str, optional
@@ -129,9 +128,9 @@ def read_table(
     Raises
     ------
     InputError
-        The file cannot be read, has no rows, a column is missing, not known or given twice, lacks its unit
-        or has one of another dimension, a cell is no finite number or no word allowed, or a number is
-        too large or too small to be a measured one, or a row has too many or too few cells.
+        The file cannot be read or has no rows; a column is missing, unknown or repeated, or lacks a unit of
+        its dimension; a cell is not a finite number or an allowed word; a number is too large or too small
+        for a measurement; or a row has too few or too many cells.
     """
     source = Path(path)
     content = read_any(source, what)
@@ -155,7 +154,7 @@ def readings_of(
     gaps: Collection[str] = (),
     columns: Columns | None = None,
 ) -> Readings:
-    """Return the quantities of a table; arguments and errors as for `read_table`."""
+    """Convert a table to quantities; arguments and errors as for `read_table`."""
     numbers = {**required, **optional}
     wanted = _wanted(required, optional, text)
     sources, words = assigned(table, numbers, text, wanted, columns)
@@ -194,7 +193,7 @@ def assigned(
     wanted: str,
     columns: Columns | None,
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Return the columns of numbers and of words, by declaration if there is one, else by heading."""
+    """Assign columns to numbers and words, by declaration if there is one, else by heading."""
     if columns is None:
         return _by_heading(table, numbers, text, wanted)
     for name, source in columns.sources.items():
@@ -222,10 +221,10 @@ def assigned(
 
 
 def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
-    """Return the quantity of each column as its heading says: by name, or by the only such unit; or nothing.
+    """Identify the quantity of each column by its heading: by name, or by a unit that occurs once.
 
-    A column that numbers the samples is none. Only time, current and force are known by their unit, and only
-    in a record over time: a voltage or a length may stand for anything.
+    Sample indices are no quantity. Only time, current and force are identified by unit, and only in a record
+    over time: a voltage or a length may be any quantity.
     """
     known = []
     for place, heading in enumerate(table.columns):
@@ -242,7 +241,7 @@ def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
 def _by_heading(
     table: Table, numbers: Mapping[str, str], text: Mapping[str, tuple[str, ...]], wanted: str
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Return the columns of numbers and of words that the heading names, or the only ones of their unit."""
+    """Assign columns by the names in the heading, or by a unit that occurs once."""
     where = f"{table.where}: {_line(table)}".rstrip(": ")
     sources: dict[str, Source] = {}
     words: dict[str, int] = {}
@@ -264,7 +263,7 @@ def _by_heading(
         elif name in numbers:
             sources[name] = Source(place + 1)
         elif name and "time" in numbers:
-            # Another quantity of the same record.
+            # Another quantity of the same record is ignored.
             continue
         elif (table.clock is None or place != table.clock.numbers) and (
             heading.shown or not any(each.name for each in table.columns)
@@ -302,14 +301,14 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
     place = heading.name or name
     with located(f"{table.where}: {place}", file=table.where, key=place):
         if heading.unit and (source.factor, source.unit) == (1.0, ""):
-            # The unit itself is checked apart from numbers too large for a float.
+            # The unit is checked separately from the range of the number.
             to_si(1.0, heading.unit, si)
             array = _converted(numbers, heading.unit, si)
         else:
             array = np.array(numbers, dtype=np.float64) * source.scale(heading.unit, si)
-    # Squares and powers of what no sensor reads are no numbers.
+    # Squares and powers of implausible readings would overflow.
     size, cell = np.abs(array), np.abs(numbers)
-    # 32 degF are 0 degC: only a number below 1 can vanish by its size.
+    # 32 degF are 0 degC: only a number below 1 can underflow.
     bad = np.flatnonzero((size > LARGEST) | ((size < _TINY) & (cell > 0.0) & (cell < 1.0)))
     if len(bad):
         row = int(bad[0])
@@ -327,7 +326,7 @@ def _values(table: Table, name: str, source: Source, si: str, gaps: bool) -> Flo
 
 
 def _converted(numbers: list[float], unit: str, si: str) -> FloatArray:
-    """Return numbers in SI; infinite where one of them is too large to convert."""
+    """Convert numbers to SI; infinite if a number overflows."""
     try:
         return np.array(all_to_si(numbers, unit, si), dtype=np.float64)
     except InputError:
@@ -335,7 +334,7 @@ def _converted(numbers: list[float], unit: str, si: str) -> FloatArray:
 
 
 def _floats(table: Table, name: str, cells: list[str], unit: str, si: str, gaps: bool) -> list[float]:
-    """Return the numbers of a column in the unit of the table; a gap is NaN where it is allowed."""
+    """Parse the numbers of a column in the unit of the table; an allowed gap is NaN."""
     numbers = []
     for row, cell in enumerate(cells):
         try:
@@ -377,9 +376,9 @@ def _words(table: Table, name: str, place: int, allowed: tuple[str, ...]) -> lis
 def _in_time(
     values: dict[str, FloatArray], lines: IntArray, columns: Columns, where: str
 ) -> tuple[dict[str, FloatArray], IntArray]:
-    """Return the columns without their delays, over the times of the first; rows that not all have are cut.
+    """Remove delays: interpolate all columns at the times of the first, and drop incomplete rows.
 
-    The times of the first column are moved; the others are brought to them by straight lines between samples.
+    The times of the first column are shifted; the others are interpolated linearly.
     """
     times = values["time"]
     names = [name for name in values if name != "time"]
@@ -413,7 +412,7 @@ def _line(table: Table) -> str:
 
 
 def _listed(table: Table) -> str:
-    """Return the columns of a table for messages, such as "1 'TIME [s]', 2 'CH1 [V]'"."""
+    """Format the columns of a table for messages, such as "1 'TIME [s]', 2 'CH1 [V]'"."""
     listed = [f"{k} {heading.shown[:40]!r}" for k, heading in enumerate(table.columns[:8], 1)]
     return ", ".join(listed) + (", ..." if len(table.columns) > len(listed) else "")
 

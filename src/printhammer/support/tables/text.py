@@ -1,7 +1,7 @@
 """Text of table files: encodings, line ends, comments, cells.
 
-Blank lines are passed over. Lines that begin with #, and those of sigrok and Matlab that begin with ; or %,
-are comments; one such as ``# sampling rate: 1 MHz`` is kept as a key and its text.
+Blank lines are skipped. Lines that begin with #, and those of sigrok and Matlab that begin with ; or %, are
+comments; a comment such as ``# sampling rate: 1 MHz`` is stored as key and text.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _COMMENT: Final = re.compile(r"\s*(#|//|[%;]\s*[^\W\d_][^;]*$)")
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of a table with the lines of the file in which they stand."""
+    """Cells of a table, with the line of the file of each row."""
 
     where: str
     """Name of the file, for messages."""
     rows: list[tuple[int, list[str]]]
     """Line of the file, counted from 1, and cells."""
     comments: dict[str, str]
-    """Comments of the form ``# key: value``; of a key given twice, the last."""
+    """Comments of the form ``# key: value``; for a repeated key, the last."""
     notes: list[tuple[int, str]]
     """Line and text of every comment."""
 
@@ -37,18 +37,18 @@ class Cells:
 def read_cells(path: Path, what: str, *, gaps: bool = False) -> Cells:
     """Read comma-separated values; `what` names the file in messages, such as "the force table".
 
-    With `gaps`, a row of nothing but empty cells is a row.
+    With `gaps`, a row of only empty cells is kept.
 
     Raises
     ------
     InputError
-        The file cannot be read, or holds no comma-separated values.
+        The file cannot be read, or does not contain comma-separated values.
     """
     return split_cells(read_any(path, what), str(path), gaps=gaps)
 
 
 def read_any(path: Path, what: str) -> str:
-    """Read a text file in UTF-8 or UTF-16, else in Latin-1 of Windows; line feeds end its lines."""
+    """Read a text file in UTF-8, UTF-16 or Windows-1252, with line feeds as line ends."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
@@ -78,7 +78,7 @@ def decoded(content: bytes, where: str) -> str:
 
 
 def with_line_ends(text: str) -> str:
-    """Return a text whose lines end with a line feed, whatever they ended with: CR LF, LF CR or CR."""
+    """Convert all line ends, CR LF, LF CR or CR, to line feeds."""
     if "\r" not in text:
         return text
     text = text.replace("\r\r\n", "\n")
@@ -90,7 +90,7 @@ def with_line_ends(text: str) -> str:
 
 
 def split_cells(text: str, where: str, *, gaps: bool = False, delimiter: str = ",") -> Cells:
-    """Split the text of a table into cells; `where` stands in messages. A space is any white space."""
+    """Split the text of a table into cells; `where` prefixes messages. A space is any white space."""
     comments: dict[str, str] = {}
     notes: list[tuple[int, str]] = []
     lines = _uncommented(text, comments, notes)
@@ -112,12 +112,12 @@ def split_cells(text: str, where: str, *, gaps: bool = False, delimiter: str = "
 
 
 def spaced(line: str) -> str:
-    """Return a line with single spaces, none of them between a name and its unit in brackets."""
+    """Collapse white space in a line, and remove it between a name and its unit in brackets."""
     return " ".join(re.sub(r"\s+(?=[\[(])", "", line).split())
 
 
 def _uncommented(text: str, comments: dict[str, str], notes: list[tuple[int, str]]) -> Iterator[str]:
-    """Yield the lines, empty ones in place of comments; keep the comments that have a key."""
+    """Yield the lines, with empty lines in place of comments; store the comments that have a key."""
     for number, line in enumerate(io.StringIO(text), 1):
         if not _COMMENT.match(line):
             yield line
