@@ -107,7 +107,7 @@ def test_ends_before_the_bounds_are_told(branch: Branch) -> None:
     short = ph.continuation(branch.orbit(len(branch) // 2), branch.parameter, branch.bounds, most=3)
     assert "number of steps" in short.message
     figure = short.plot()
-    assert "2 where the number of steps was used up" in figure.get_suptitle()
+    assert "2 at the maximum number of steps" in figure.get_suptitle()
     assert branch.plot().get_suptitle() == ""
 
 
