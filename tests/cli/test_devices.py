@@ -18,6 +18,7 @@ from printhammer.drive.waveforms.drivers import Rail
 from printhammer.maps.frequency import HIGHEST, LOWEST, default_rates
 from printhammer.printing.dots.judging import Limits, judge
 from printhammer.printing.dots.nominal import SinglePulse
+from printhammer.printing.dots.settling import undisturbed_rate
 from printhammer.printing.rates.safe_rate import FIRST, LAST, STEP, grid_of
 from printhammer.run import window
 
@@ -106,6 +107,31 @@ def test_the_noun_for_a_strike_is_no_physics() -> None:
     assert other.fingerprint == relay.fingerprint
     with refused("strike"):
         relay.replace("strike", "Two words")
+
+
+def test_pulses_that_do_not_interact_need_no_table() -> None:
+    """The relay is at rest to the last bit 34 ms after a pulse."""
+    relay = ph.load("relay-5v")
+    slowest = undisturbed_rate(relay)
+    assert 25.0 < slowest < 30.0
+    dots = ph.simulate(relay, ph.PulseTrain(relay.waveform, rate=slowest, pulses=3)).dots
+    flights = [dot.flight_time for dot in dots]
+    # Sums of times differ in the last bits.
+    np.testing.assert_allclose(flights, flights[0], rtol=1e-9)
+    assert undisturbed_rate(hammers.crude()) == 0.0
+    with refused("rate", value=20.0):
+        ph.tune(relay, rate="20 Hz")
+
+
+@pytest.mark.slow
+def test_the_safe_rate_of_a_device_begins_where_pulses_interact() -> None:
+    peen = ph.load("dot-peen")
+    found = ph.safe_rate(peen, long=False)
+    assert found.rates[0] <= undisturbed_rate(peen) < found.rates[1]
+    first, last = float(found.rates[0]) - 0.5, float(found.rates[-1])
+    whole = ph.safe_rate(peen, first=first, last=last, step=0.5, long=False)
+    assert whole.rate == found.rate
+    assert whole.failure == found.failure
 
 
 def test_a_burst_needs_a_current() -> None:

@@ -131,7 +131,7 @@ def judge_table(
     table: CompensationTable,
     *,
     rates: Sequence[float | str] | None = None,
-    perturbations: Sequence[Perturbation] = PERTURBATIONS,
+    perturbations: Sequence[Perturbation] | None = None,
     limits: Limits | None = None,
     seed: int = 1983,
     effort: Effort = DISPLAY,
@@ -152,7 +152,7 @@ def judge_table(
         Slot rates, Hz, or text with a unit; by default those of the table or, if the table is long, five
         rates halfway between its rates.
     perturbations : sequence of Perturbation, optional
-        Deviations of the driven hammers; by default `PERTURBATIONS`.
+        Deviations of the driven hammers; by default those of `PERTURBATIONS` that the hammer's laws have.
     limits
         As for `printhammer.safe_rate`.
     seed : int, optional
@@ -173,6 +173,8 @@ def judge_table(
     asked = np.array(
         [read_positive(rate, "Hz", "rate") for rate in rates] if rates is not None else between(table)
     )
+    if perturbations is None:
+        perturbations = [by for by in PERTURBATIONS if _applies(hammer, by)]
     if not asked.size or not perturbations:
         raise InputError("rates, perturbations: expected at least one of each", key="rates")
     bounds = Limits() if limits is None else limits
@@ -229,6 +231,15 @@ def judge_table(
         seed=seed,
         tolerance=effort.tolerance,
     )
+
+
+def _applies(hammer: Hammer, by: Perturbation) -> bool:
+    """Whether a hammer has the laws that a perturbation changes."""
+    try:
+        perturbed(hammer, by)
+    except InputError:
+        return False
+    return True
 
 
 def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: Effort) -> FloatArray:

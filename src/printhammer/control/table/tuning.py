@@ -205,7 +205,17 @@ def tune(
     asked = [rate] if rate is not None else rates
     scale = search_scale(driven, pulse)
     grid = _all_rates(single, scale) if asked is None else _given_rates(asked)
-    nodes = len(spaced(_periods(grid, far, single), SPACING * scale))
+    periods = _periods(grid, far, single)
+    if not periods.size:
+        raise InputError(
+            f"{hammer.path}: the armature is at rest {1e3 * single.settled:.3g} ms after a pulse, so that"
+            f" pulses at {grid[-1]:.4g} Hz do not interact and need no table",
+            file=hammer.path,
+            key="rate",
+            value=float(grid[-1]),
+            expected=f"a rate above {1.0 / single.settled:.4g} Hz",
+        )
+    nodes = len(spaced(periods, SPACING * scale))
     # One report per searched period, one per Newton step, with and without dense patterns.
     steps = nodes + 3 + 2 * (ROUNDS + 1) * gaps
     if variability is not None:

@@ -31,6 +31,8 @@ CYCLE: Final = 20e-3  # Shortest duration of the simulation, s
 _WINDOWS: Final = 2.0  # Shortest duration of the simulation, in windows (`printhammer.run.window`)
 _SPACING: Final = 1e-6
 _BISECTIONS: Final = 40
+_SAMPLES: Final = 4001  # Number of samples of a pulse, from which the time of exact rest is read; arbitrary
+_MARGIN: Final = 0.99  # Reduction of that rate, since the errors of integration shift the rest; arbitrary
 
 
 class Wear(Declared):
@@ -106,6 +108,21 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
         coil_work=motion.energy.coil_work,
         status=motion.status,
     )
+
+
+def undisturbed_rate(hammer: Hammer) -> float:
+    """Return a rate, Hz, up to which each pulse of a hammer finds it exactly at rest; 0 if there is none.
+
+    A device with a rigid backstop and a driver that ends its current is at rest to the last bit some time
+    after a pulse. A pattern of pulses further apart is a sequence of equal dots.
+    """
+    pulse = pulse_of(hammer, None)
+    motion = simulate(hammer, PulseTrain(pulse), duration=2.0 * wait_of(hammer, pulse), points=_SAMPLES)
+    x, _v, *_others = rest = motion.state_at(motion.start)
+    place = settled_from((motion.x != x) | (motion.v != 0.0) | (motion.current != 0.0))
+    if place == motion.t.size or motion.state_at(float(motion.t[place])) != rest:
+        return 0.0
+    return _MARGIN / float(motion.t[place])
 
 
 def touches(motion: Motion | PiecewiseMotion) -> list[Contact]:

@@ -7,7 +7,8 @@ after a lead-in of 64 slots; rows of 200 slots; and a line of text.
 
 By default the grid of the paper's hammer begins at 100 Hz: 10 ms is several times the settle-out time of such
 a hammer, so below 100 Hz every dot is a single pulse from rest. The grid of a slower device is scaled down,
-see `printhammer.run.window.time_scale`.
+see `printhammer.run.window.time_scale`. In open loop the grid of a device that returns exactly to rest begins
+with the last rate at which each pulse finds it there.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from printhammer.printing.dots.judging import FAULTS, Limits
 from printhammer.printing.dots.long_patterns import Kind, long_patterns
 from printhammer.printing.dots.nominal import SinglePulse
 from printhammer.printing.dots.nominal import nominal as single_pulse
+from printhammer.printing.dots.settling import undisturbed_rate
 from printhammer.printing.dots.strategy import (
     SLOTS,
     Strategy,
@@ -54,7 +56,9 @@ STEP: Final = 5.0  # Step of that grid, Hz
 
 MOST_RATES: Final = 10_000  # Largest number of rates in a grid
 
-_AT_ONCE: Final = 16  # Number of rates per ensemble
+_AT_FIRST: Final = 2  # Number of rates in the first ensemble, doubled from one to the next; arbitrary
+_FEW: Final = 3  # Number of slots of the patterns that are simulated first
+_AT_ONCE: Final = 16  # Largest number of rates per ensemble
 _HAMMERS_AT_ONCE: Final = 32
 
 
@@ -212,7 +216,8 @@ def safe_rate(
         from the design of a drive, pass the dot of the design.
     first, last, step : float or str, optional
         The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, and as much lower
-        as a device is slower than the paper's hammer.
+        as a device is slower than the paper's hammer. In open loop the default grid leaves out lower rates at
+        which each pulse finds the device exactly at rest.
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise all rates of the grid are simulated,
         for a chart.
@@ -229,6 +234,9 @@ def safe_rate(
     grid, apart = grid_of(hammer, first, last, step)
     bounds = Limits() if limits is None else limits
     single = single_pulse(hammer, tolerance=effort.tolerance) if nominal is None else nominal
+    if first is None and nominal is None and strategy is open_loop:
+        below = int(np.searchsorted(grid, undisturbed_rate(hammer), side="right"))
+        grid = grid[max(below - 1, 0) :]
     patterns = from_rest(every=strategy is not open_loop)
     options: dict[str, Any] = {"limits": bounds, "effort": effort}
     rows: list[dict[str, Any]] = []
@@ -236,8 +244,14 @@ def safe_rate(
     failure: Failure | None = None
     safe = math.nan
     best: list[tuple[Trial, int]] = []
-    for begin in range(0, len(grid), _AT_ONCE):
-        cases = [Case(hammer, single, rate) for rate in grid[begin : begin + _AT_ONCE].tolist()]
+    size = _AT_FIRST
+    while len(rows) < len(grid):
+        cases = [Case(hammer, single, rate) for rate in grid[len(rows) :][:size].tolist()]
+        size = min(2 * size, _AT_ONCE)
+        if stop:
+            # Most devices fail in the second or third slot: what follows such a rate is not simulated.
+            quick = attempt(cases, [each for each in patterns if each[-1] < _FEW], strategy, **options).passed
+            cases = cases[: int(np.argmin(quick)) + 1] if not quick.all() else cases
         trial = attempt(cases, patterns, strategy, **options)
         rates = [case.rate for case in cases]
         growth.append(multipliers([hammer] * len(cases), rates, strategy, effort.quiet))
