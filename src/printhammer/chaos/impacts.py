@@ -43,7 +43,7 @@ SURFACES: Final = get_args(Surface)
 TOUCHES: Final = 1000
 """Default number of touches."""
 
-_FIRINGS_A_TOUCH: Final = 10
+_FIRINGS_A_TOUCH: Final = 10  # Default maximum number of firings per requested touch
 
 
 class Section(Result):
@@ -246,7 +246,7 @@ BINS: Final = 60
 LAGS: Final = 40
 """Default largest lag of the autocorrelation; at most a quarter of the intervals."""
 
-_FEWEST: Final = 8
+_FEWEST: Final = 8  # Smallest number of intervals of a train
 _SAME: Final = 1e-9
 """Relative difference below which two intervals are equal."""
 

@@ -38,7 +38,7 @@ from printhammer.support import c_code
 from printhammer.support.arrays import FloatArray, TextArray
 from printhammer.support.files import write_file
 
-_NANOSECOND: Final = 1e-9
+_NANOSECOND: Final = 1e-9  # Unit of the times in a C header, s
 
 
 def header_text(
@@ -116,7 +116,7 @@ LONGEST: Final = 8.0
 SHORTEST: Final = 1.0 / 64.0
 """Width of the shortest pulse, as a fraction of the flight time with the longest."""
 
-_DOUBLINGS: Final = 6
+_DOUBLINGS: Final = 6  # Iteration limit of the doublings that bracket the width
 _WIDTH_ERROR: Final = 1e-9  # Tolerance of the width, in flight times
 _SAME: Final = 1e-9  # Relative tolerance of the blow
 

@@ -106,7 +106,7 @@ def _share(feed: str, temperature: float) -> float:
 HOTTEST: Final = 1500.0
 """Upper bound of a steady temperature, degC, above the melting point of copper."""
 
-_TOLERANCE: Final = 1e-9
+_TOLERANCE: Final = 1e-9  # Relative and absolute tolerance of the temperatures
 
 
 @dataclass(frozen=True)
@@ -339,7 +339,7 @@ TEMPERATURES: Final = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 140.0)
 """Winding temperatures at which a hammer with a driver is simulated, degC."""
 
 _LEFT: Final = 1e-3  # Residual current at which a pulse counts as ended, as a fraction of its largest
-_DOUBLINGS: Final = 8
+_DOUBLINGS: Final = 8  # Iteration limit of the doublings of the simulated time
 
 
 def heat_of(hammer: Hammer) -> DotHeat:

@@ -331,7 +331,7 @@ def _vertex(score: FloatArray, place: int) -> float:
 Signal = Literal["current", "voltage"]
 SIGNALS: Final = get_args(Signal)
 UNITS: Final = {"current": "A", "voltage": "V"}
-_MOST_BITS: Final = 24
+_MOST_BITS: Final = 24  # Largest resolution of a converter
 
 
 class Sampling(Declared):

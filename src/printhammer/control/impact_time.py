@@ -38,7 +38,7 @@ MOST: Final = 2000
 """Largest number of sampling settings in a study."""
 
 _MOST_MISSED: Final = 0.99  # Largest fraction of missed impacts of a sensor
-_MOST_DOTS: Final = 10_000
+_MOST_DOTS: Final = 10_000  # Largest number of dots; arbitrary, to refuse typing errors
 _CELLS: Final = "noise sampling_rate bits"
 
 

@@ -26,9 +26,9 @@ LARGEST_CURRENT: Final = 2.0  # Default current limit of a print hammer, A
 WIDEST: Final = 2.0  # Largest width of a pulse, as a multiple of the hammer's own
 # Fraction of the current limit reserved for the tail of a brake pulse
 MARGIN: Final = 1e-3
-_SAMPLES: Final = 4001
+_SAMPLES: Final = 4001  # Number of samples of a simulated current
 _SPAN: Final = 2.0  # Length of the first simulation, in pulse widths
-_DOUBLINGS: Final = 6
+_DOUBLINGS: Final = 6  # Iteration limit of the doublings of the simulated time
 
 
 def current_bound(hammer: Hammer, largest: float | str | None = None, key: str = "largest_current") -> float:

@@ -34,7 +34,7 @@ MORE: Final = 4
 DOTS: Final = FIRING + MORE
 """Number of dots of a sufficiently long row."""
 
-_SPACING: Final = 1e-5
+_SPACING: Final = 1e-5  # Finite-difference step of the state, in its scales
 _CLOSED: Final = 1e-6  # Distance from state to image below which an orbit is closed, in scales of the state
 _LONGEST_STEP: Final = 0.1  # Longest Newton step, in scales of the state
 _ITERATIONS: Final = 12  # Iteration limit

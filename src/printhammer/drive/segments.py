@@ -41,7 +41,7 @@ SWITCHED: Final = 4
 DECAY: Final = 5
 RESERVOIR: Final = 6
 """Kinds of the segments of a driver, whose value is the supply voltage p0, and 0 while the supply is off."""
-COLUMNS: Final = 6
+COLUMNS: Final = 6  # Number of columns of a table
 
 _CHUNK: Final = 1024  # Intervals evaluated at once, which bounds the memory; arbitrary
 _REFINED: Final = 16  # Intervals with the largest samples that are refined; arbitrary

@@ -23,7 +23,7 @@ from printhammer.support.roots import Root, bisect, roots
 
 # Smallest distance from an anchor in the search, m: far below any compression; arbitrary
 _NEAREST: Final = 1e-18
-_PLACES: Final = 401
+_PLACES: Final = 401  # Number of grid points of the search for sign changes of the pull
 _LARGEST_CURRENT: Final = 1e6  # Range of currents of a law that states none, A; arbitrary
 FARTHER: Final = (10.0, 100.0, 1000.0)
 """Search radii about the origin, m, if nothing limits the search and no equilibrium is nearer; arbitrary."""

@@ -29,7 +29,7 @@ _FALSE_OUTLIERS: Final = 0.01
 _EXACT: Final = 1e-11
 """Residual, as a fraction of the data, below which it is rounding, not noise."""
 
-_ROUNDS: Final = 30
+_ROUNDS: Final = 30  # Iteration limit of the fit
 
 _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""

@@ -10,10 +10,10 @@ from printhammer.support.arrays import BoolArray, FloatArray
 
 _MAD: Final = 1.482602218505602
 """Standard deviation of a normal distribution over its median absolute deviation."""
-_SPIKE: Final = 10.0
+_SPIKE: Final = 10.0  # Factor on the noise above which a reading is a spike
 _FAR: Final = 4.5
 """Threshold of outliers, in standard deviations: exceeded by less than one of 100 000 normal residuals."""
-_LONGEST_MEMORY: Final = 8
+_LONGEST_MEMORY: Final = 8  # Largest lag of the autocorrelation of the noise
 
 _CLIP: Final = 2.5
 """Clipping level of residuals, in standard deviations, while the outliers are unknown."""

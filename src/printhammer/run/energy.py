@@ -23,9 +23,9 @@ from printhammer.run.supply import linkage, winding_of
 from printhammer.support.arrays import FloatArray
 
 _SAMPLES: Final = np.array([*np.linspace(0.0, 1.0, 9)[:-1], 1.0 - 1e-9])
-_BISECTIONS: Final = 52
-_HALVINGS: Final = 12
-_HEAT_ERROR: Final = 1e-13
+_BISECTIONS: Final = 52  # Bisections that exhaust the bits of a float
+_HALVINGS: Final = 12  # Iteration limit of the step halving
+_HEAT_ERROR: Final = 1e-13  # Relative error at which the heat integral has converged
 
 
 class CoilWork(Declared):

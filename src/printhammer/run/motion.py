@@ -51,7 +51,7 @@ PATHS: Final = ("supply", "chopped", "blocked", "backward")
 """Paths of the current of a coil: through the supply, through the diode of a chopper, none, and decay of a
 negative current."""
 
-_BISECTIONS: Final = 52
+_BISECTIONS: Final = 52  # Bisections that exhaust the bits of a float
 
 
 MOST_DOTS: Final = 40

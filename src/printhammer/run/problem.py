@@ -32,18 +32,18 @@ T = TypeVar("T")
 TOLERANCE: Final = 2e-11
 """Default tolerance: error of one step, in units of the stroke and of a typical speed."""
 
-LEAST_TOLERANCE: Final = 1e-15
+LEAST_TOLERANCE: Final = 1e-15  # Smallest tolerance, near the rounding of the arithmetic
 LARGEST_TOLERANCE: Final = 1e-5
 """Largest tolerance; with larger ones the curves between the ends of steps would be inaccurate."""
 
-MAX_STEPS: Final = 50_000_000
+MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
 FAR: Final = 1e4
 """Distance from the origin, in strokes, beyond which the armature counts as runaway; arbitrary."""
 
 _NODES: Final = 2048
 _CONTACTS: Final = 256
-_NODES_A_FLIGHT: Final = 40
-_MOST_FLIGHTS: Final = 1e6
+_NODES_A_FLIGHT: Final = 40  # Rows of nodes per flight in the initial guess of the memory
+_MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess
 
 
 def live_size(firings: int) -> int:

@@ -43,11 +43,11 @@ PAPER_X: Final = (38.1e-6, 88.9e-6)
 PAPER_V: Final = (-0.635, 0.635)
 """Velocities of the window of Fig. 11, m/s: -25 to +25 in/s."""
 
-PAPER_BACKSTOP: Final = 50.8e-6
-PAPER_FRONT: Final = 203.2e-6
+PAPER_BACKSTOP: Final = 50.8e-6  # Position of the paper's backstop, m: 0.002 in
+PAPER_FRONT: Final = 203.2e-6  # Front of the paper's pack, m: 0.008 in
 
-_SAME: Final = 1e-3
-_PART: Final = 1.0 / 6.0
+_SAME: Final = 1e-3  # Relative difference within which positions are those of the paper
+_PART: Final = 1.0 / 6.0  # Half-width of the paper's window relative to the way from backstop to pack
 
 
 class Window(Declared):

@@ -28,6 +28,7 @@ Scheme = Literal["default", "trapezoid", "runge-kutta-4"]
 SCHEMES: Final = get_args(Scheme)
 """Integrators: the default, with located contacts and high order; and the two of the paper."""
 
+# Limits of the number of output points, and points per time scale
 _FEWEST, _MOST, _PER_SCALE = 1001, 400_001, 100
 
 
@@ -168,7 +169,7 @@ def _grid(problem: Problem, end: float, points: int | None, times: npt.ArrayLike
 Surface = Literal["pack", "backstop"]
 CODES: Final = {"pack": PACK_SURFACE, "backstop": BACKSTOP_SURFACE}
 
-_STRETCH: Final = 4096
+_STRETCH: Final = 4096  # Nodes of a record in one stretch, which bounds the memory
 _SURFACE, _IN, _OUT, _INITIAL = 0, 1, 3, 6
 """Columns of a contact."""
 

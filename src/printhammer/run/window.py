@@ -33,8 +33,8 @@ _PATIENCE: Final = 16.0  # Largest window of a device that does not settle, in f
 _LONGEST: Final = 64.0  # As `_PATIENCE`, for a device that makes no dot, in times of its scales
 _LAST: Final = 1.0  # Upper limit of a window, s
 TOLERANCE: Final = 5e-7  # The result depends on thresholds only
-MOST_STEPS: Final = 500_000
-_MOST_KEPT: Final = 512
+MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse
+_MOST_KEPT: Final = 512  # Number of cached windows at which the cache is emptied
 
 _FLIGHT: Final = 0.28e-3  # Flight time of the paper's hammer, for which default rates and times are stated, s
 # Pulses that cover more than this fraction of a period at the default rates would run into each other.

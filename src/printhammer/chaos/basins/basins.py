@@ -147,7 +147,7 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
     return float(np.polyfit(far, differing, 1)[0])
 
 
-_FEWEST_DISTANCES: Final = 3
+_FEWEST_DISTANCES: Final = 3  # Smallest number of distances for a fit of the exponent
 
 SAMPLE: Final = 256
 """Maximum number of cells integrated again at a tenth of the tolerance, up to an eighth of all; arbitrary."""
@@ -171,9 +171,9 @@ NO_STATE: Final = -2
 
 NO_STATE_STATUS: Final = "no state"
 
-_PIECE: Final = 4096
-_GOLDEN: Final = 0.618033988749895
-_FEWEST: Final = 4
+_PIECE: Final = 4096  # Number of trains integrated in one batch, which bounds the memory
+_GOLDEN: Final = 0.618033988749895  # Inverse golden ratio, whose multiples modulo 1 spread evenly
+_FEWEST: Final = 4  # Smallest number of firings of a round
 
 Range = tuple[float | str, float | str, SupportsIndex]
 

@@ -46,13 +46,13 @@ from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 TAIL: Final = 1e-3
 """Default time after the second firing within which a second dot counts, s."""
 
-_PIECE: Final = 8192
-_SPACING: Final = 5e-6
+_PIECE: Final = 8192  # Number of cells integrated in one batch, which bounds the memory
+_SPACING: Final = 5e-6  # Spacing of the samples of the first run at the default tail, s
 _FINE: Final = 8
 """Number of samples of the refined run on either side of the highest sample of the first run."""
 _PEAK_TOLERANCE: Final = 1e-8
 """Largest tolerance of the refined run: with that of a display, 5e-7, peaks err by 1e-4 of the way."""
-_FIRST, _SECOND = 2, 3
+_FIRST, _SECOND = 2, 3  # Indices of the firings of the first and the second pulse
 
 
 class QuenchMap(Result):

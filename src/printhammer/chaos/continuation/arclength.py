@@ -30,7 +30,7 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
-_GROWTH: Final = 1.5
+_GROWTH: Final = 1.5  # Factor on the step after a step that was accepted
 _LEAST_COSINE: Final = 0.97
 """Cosine of the angle between successive tangents below which a step is repeated with half its length."""
 _FARTHEST: Final = 0.4

@@ -39,10 +39,10 @@ Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change
 BIRTH: Final = "period doubling"
 """Reason for stopping of an orbit of even period at the period doubling that it is born from."""
 
-_ROUNDS: Final = 60
+_ROUNDS: Final = 60  # Iteration limit of bisections and root searches
 _SHARE: Final = 1e-13
 """Fraction of a step to which a point is located."""
-_REAL: Final = 1e-9
+_REAL: Final = 1e-9  # Imaginary part above which a multiplier is complex
 _ROUNDING: Final = 1e-8
 """Rounding level of the imaginary part of a real multiplier and of a test function."""
 _SHARE_OF_CHANGE: Final = 1e-10
@@ -53,7 +53,7 @@ _NEAR: Final = 1e-4
 """Fraction of a step within which a fold and a branching are the same point."""
 _BRACKET: Final = 1e-5
 """Fraction of a step to which a branching is bracketed."""
-_AMPLITUDE: Final = 1e-2
+_AMPLITUDE: Final = 1e-2  # First scaled distance from a doubling at which its orbit is sought
 _LEAST_AMPLITUDE: Final = 1e-6
 _CLOSER: Final = 4.0
 """Smallest scaled distance from a doubling at which its orbit is sought; factor between attempts."""

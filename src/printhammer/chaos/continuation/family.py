@@ -28,11 +28,11 @@ _SPACING: Final = 1e-6
 """Relative parameter step of the slope's finite difference; the slope only steers the corrector."""
 _MUCH: Final = 1e3
 """Multiplier above which that step is reduced."""
-_BESIDE: Final = 1e-7
+_BESIDE: Final = 1e-7  # Finite-difference step of the state at gentle touches, in scales of the run
 _GENTLE: Final = 3e-4
 """Finite-difference step of a state, and speed of a gentle pack touch, in scales of the run."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
-_MOST_TOUCHES: Final = 100
+_MOST_TOUCHES: Final = 100  # Number of contacts in a period above which the map has no value
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
 
 Surface = Literal["pack", "backstop"]

@@ -17,7 +17,7 @@ from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
-_MOST_CORRECTIONS: Final = 12
+_MOST_CORRECTIONS: Final = 12  # Iteration limit of Newton's method
 _STAGNANT: Final = 1e3
 """Corrections that no longer shrink are noise of the map if they are below this multiple of the precision."""
 

@@ -41,7 +41,7 @@ _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no 
 _SHORTER: Final = 1e-6
 """Scaled closing error after a fraction of the firings, below which an orbit has that shorter period."""
 _DIGITS: Final = ".9g"
-_MOST_SECTIONS: Final = 8
+_MOST_SECTIONS: Final = 8  # Maximum number of pieces of a branch at different sections
 _SAME_PHASE: Final = 1e-3
 """Phases of sections, as fractions of the period, within this distance are the same."""
 _CLEAR: Final = 1e-3

@@ -224,8 +224,8 @@ class BifurcationCurve(Result, rows="point"):
 GRID_TOLERANCE: Final = 1e-9
 """Tolerance of the trains from rest."""
 
-_FIRINGS: Final = 300
-_JUDGED: Final = 64
+_FIRINGS: Final = 300  # Number of firings of a train from rest
+_JUDGED: Final = 64  # Number of last firings that are judged
 
 
 def settled_plane(

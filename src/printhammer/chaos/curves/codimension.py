@@ -44,10 +44,10 @@ _LEVEL: Final = 1e-3
 """Component of a unit tangent below which a curve is stationary in a constant."""
 _VANISHES: Final = 0.1
 """Component of a tangent at a cusp, relative to that beside it, below which it vanishes."""
-_ROUNDS: Final = 20
-_MOVE: Final = 1e-6
-_PRECISION: Final = 1e-11
-_NOISE: Final = 1e-8
+_ROUNDS: Final = 20  # Iteration limit of Newton's method
+_MOVE: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
+_PRECISION: Final = 1e-11  # Scaled residual below which Newton's method has converged
+_NOISE: Final = 1e-8  # Magnitude below which a test function or a tangent component is noise
 
 
 class CodimensionTwo(Declared):

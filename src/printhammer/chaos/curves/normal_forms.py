@@ -33,12 +33,12 @@ if TYPE_CHECKING:
 MOST_PERIODS: Final = 4
 """Largest number of passages of a grazing for which an orbit with one touch is tested."""
 
-_SPACINGS: Final = (2e-3, 2e-4, 5e-5)
+_SPACINGS: Final = (2e-3, 2e-4, 5e-5)  # Finite-difference steps tried, the largest first, in half-widths
 _AGREE: Final = 0.05
 """Relative difference of coefficients from a spacing and from half of it, within which they are accepted."""
 _DOUBLES: Final = 1e-4
 """Distance of a multiplier from -1 within which the doubling is accurate enough."""
-_FEW: Final = 1e-9
+_FEW: Final = 1e-9  # Relative magnitude below which a denominator is singular
 
 
 def doubling_coefficient(plane: Plane, place: Place) -> float:

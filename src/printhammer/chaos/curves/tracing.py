@@ -45,7 +45,7 @@ PRECISION: Final = 1e-12
 
 _NOISY: Final = 1e-9
 """Scaled closing error above which an orbit that Newton's method accepts is rejected."""
-_GENTLE: Final = 1e-6
+_GENTLE: Final = 1e-6  # Impact speed, in scales, at which a curve ends in a grazing
 _SLOW: Final = 0.05
 """Impact speeds, in half-widths of the window: at which a curve ends, and below which it may."""
 _FAR: Final = 0.02

@@ -204,7 +204,7 @@ LENGTHS: Final = (1, 2, 5, 10, 20, 50)
 """Default numbers of firings of a stretch."""
 FEWEST: Final = 10
 """Smallest number of stretches that define a distribution."""
-LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
+LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)  # Quantile levels of the distribution
 
 
 class FiniteTime(Result, rows="length"):

@@ -31,19 +31,19 @@ MOST: Final = 50_000
 """Largest number of states."""
 FEWEST: Final = 200
 """Smallest number of states."""
-THEILER: Final = 10
+THEILER: Final = 10  # Default of the Theiler window, in steps
 FLAT: Final = 0.1
 """Default range of local slopes on a plateau."""
 
-_PER_OCTAVE: Final = 2
+_PER_OCTAVE: Final = 2  # Number of radii per factor of 2
 _PIECE: Final = 4
 """Number of radii over which a local slope is fitted."""
 _SHORTEST: Final = 3 * _PER_OCTAVE
 """Number of radii of the shortest plateau: a factor of 8."""
-_FEW_PAIRS: Final = 200
+_FEW_PAIRS: Final = 200  # Number of pairs below which a correlation sum is discarded
 _LARGEST: Final = 0.25
 """Fraction of pairs above which the shape of the attractor matters."""
-_PARTS: Final = 5
+_PARTS: Final = 5  # Number of sections of the series whose scatter gives the error
 
 
 class CorrelationDimension(Result, rows="radius"):

@@ -55,7 +55,7 @@ EXPONENT: Final = (
 
 _GROWTH: Final = ("firing", "exponent")
 _RUNNING: Final = ("count", "exponent")
-_COUNTS: Final = 100
+_COUNTS: Final = 100  # Default number of running estimates
 _CYCLES: Final = 8
 """Smallest number of cycles whose scatter gives a standard error."""
 

@@ -31,7 +31,7 @@ RATE: Final = 0.05
 SHORTEST: Final = 2
 """Default length, in points, of the shortest line."""
 
-_ROWS: Final = 256
+_ROWS: Final = 256  # Rows of the distance matrix computed at once, which bounds the memory
 
 
 class Recurrence(Result):

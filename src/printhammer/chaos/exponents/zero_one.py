@@ -61,8 +61,8 @@ CYCLES: Final = 5
 FOLLOWS: Final = 0.7
 """A series is deterministic if images of neighbours are closer than this fraction of any two images."""
 
-_CUT: Final = 10
-_PASSES: Final = 4
+_CUT: Final = 10  # The displacement is computed up to the length divided by this (Gottwald and Melbourne)
+_PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered
 _TOGETHER: Final = 1 << 20
 """Number of complex numbers processed in one batch."""
 

@@ -36,7 +36,8 @@ _EARLY: Final = 2
 """Number of firings of a record that count as its beginning."""
 _LEAST: Final = 16
 """Smallest number of firings for which a motion is followed."""
-_ROOM: Final = 1.2
+_ROOM: Final = 1.2  # Extent of the spread beyond the window, in its half-widths
+# Extent of the spread of an unbounded motion: a ball that bounces once a period rises 5 scales
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
 """The real root of x^3 = x + 1, whose powers spread points evenly over a square."""

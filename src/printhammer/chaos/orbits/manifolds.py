@@ -49,9 +49,9 @@ _TIGHT: Final = 1e-12
 """Distance of points of a fundamental segment below which a gap of their images is a jump."""
 _SETTLED: Final = 0.1
 """Extent of the image of a fundamental segment, as a fraction of the spacing, at which a sink is tested."""
-_CLOSE: Final = 1e-10
-_NEWTON: Final = 8
-_FEW: Final = 4
+_CLOSE: Final = 1e-10  # Relative residual at which Newton's method has converged
+_NEWTON: Final = 8  # Iteration limit of Newton's method
+_FEW: Final = 4  # Number of points from which the prediction is a cubic
 
 
 class Manifolds(Result, rows="point"):

@@ -56,7 +56,7 @@ _SECTION: Final = (
     ("section_x", "m", "displacement at the section"),
     ("section_v", "m/s", "velocity at the section"),
 )
-_POINTS: Final = 2001
+_POINTS: Final = 2001  # Number of points of the motion's time grid
 
 
 class Orbit(Result):

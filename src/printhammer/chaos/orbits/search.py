@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LONGEST: Final = 8
 """Default of the largest orbit period to search for, in firings."""
 
-MOST_FIRINGS: Final = 64
+MOST_FIRINGS: Final = 64  # Largest orbit period that can be searched for, in firings
 STARTS: Final = 1024
 GUESSES: Final = 48
 FOLLOW: Final = 2

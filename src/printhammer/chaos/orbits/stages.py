@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 SHARE: Final = 0.05
 """Change of the period on either side over which a branch is followed, as a fraction of the period."""
 
-_PARTS: Final = 5.0
+_PARTS: Final = 5.0  # As in `printhammer.chaos.continuation.tracer`
 _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
@@ -77,7 +77,7 @@ def crossings(orbit: Orbit) -> list[FloatArray]:
 
 _LONG: Final = 400
 """Number of firings of the train from rest in which close returns are sought."""
-_BLOCKS: Final = (128, 1024)
+_BLOCKS: Final = (128, 1024)  # Numbers of starts to which more are rounded up; the last is doubled repeatedly
 _BATCHES: Final = (8, 48)
 """Numbers of starts and of guesses to which more are rounded up; the last is doubled repeatedly."""
 _EVEN: Final = 8

@@ -56,7 +56,7 @@ _OK: Final = "ok"
 RANGE_LEFT: Final = "range left"
 """Status of a displacement that no motion can have."""
 
-_TURN_STEPS: Final = 60
+_TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum
 _STILL: Final = 1e-9
 """Relative speed at which an extremum counts as located: the error of its place is quadratic."""
 STILL_COIL: Final = 1e-9
@@ -225,7 +225,8 @@ def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, Flo
     return time, table[:, 0], sign
 
 
-_BEYOND: Final = 0.01
+_BEYOND: Final = 0.01  # Time beyond the end that a run covers, as a fraction of the period
+# Distance of an impact from the section that counts as on it, fraction of the period
 _ON_IMPACT: Final = 1e-3
 
 

@@ -44,7 +44,7 @@ begin before it."""
 WINDOW: Final = 120e-6  # Length of the time window of samples, s
 # Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s
 _PLACE_ERROR: Final = 0.03
-_SPEED_ERROR: Final = 0.03
+_SPEED_ERROR: Final = 0.03  # Initial standard deviation of the speed, m/s
 # The same after the first launch, in addition to the effect of the current scale
 _LAUNCH_ERRORS: Final = (0.005, 0.003)
 # Distance before the touch at which the simulation of a contact begins, as a fraction of the stroke

@@ -29,7 +29,7 @@ PRINTING_SHARES, LANDING_SHARES = 5, 4  # Number of shares of a profile
 _SPREAD: Final = 512  # Number of Sobol profiles
 _KEPT: Final = 16  # Number of profiles refined
 _CLOUD: Final = 32  # Number of points in a cloud
-_MOVES: Final = 8
+_MOVES: Final = 8  # Number of times the cloud is moved
 _REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and its reduction factor per move
 
 

@@ -67,7 +67,7 @@ _LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of 
 # Penalty for a change of branch between neighbouring periods, where the table is not interpolated
 _SWITCH: Final = 0.15
 _SAME: Final = 1e-6  # Firing-time difference below which two candidates are duplicates, s
-_ROUNDING: Final = 1e-12
+_ROUNDING: Final = 1e-12  # Tolerance that includes the end of a range of delays, s
 
 
 def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:

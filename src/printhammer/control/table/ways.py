@@ -126,7 +126,7 @@ STABLE: Final = 0.97
 for interpolation and timer ticks."""
 
 _FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off
-_ROUNDING: Final = 1e-12
+_ROUNDING: Final = 1e-12  # Tolerance that includes the ends of a range of firing times, s
 
 
 class Ways(NamedTuple):

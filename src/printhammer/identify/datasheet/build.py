@@ -228,7 +228,7 @@ RESTITUTION: Final = 0.3
 INDENTATION: Final = 0.25
 """Fraction of the remaining gap by which the work of the magnet indents the target; assumed."""
 
-_GRID: Final = 200
+_GRID: Final = 200  # Number of displacements sampled up to the front of the pack
 
 
 def hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:

@@ -66,8 +66,8 @@ TABLES: Final = {
 
 _ZERO: Final = ("end_gap", "spring.preload", "spring.stiffness", "stop.restitution", "stop.damping")
 _OTHERS: Final = ("force", "inductance", "driver", "assumed", "why")
-_PAIR: Final = 2
-_WHOLE: Final = 1e6
+_PAIR: Final = 2  # Length of a pair of gap and force
+_WHOLE: Final = 1e6  # Magnitude below which whole numbers are written without a decimal point
 
 
 @dataclass(frozen=True)

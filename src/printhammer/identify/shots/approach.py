@@ -20,10 +20,10 @@ _WIDE: Final = 10.0
 """Initial scale of the gap penalty, in largest gaps: a gap of this size costs as much as all data."""
 _NARROW: Final = 0.001
 """Gap, in strokes and typical speeds, below which the gaps can be closed at once."""
-_RISE: Final = 0.3
+_RISE: Final = 0.3  # Factor on the width of the penalty after a successful step
 _LONGEST: Final = 0.3
 """Largest change per step: relative for a constant, in strokes and typical speeds for a state."""
-_HALVINGS: Final = 6
+_HALVINGS: Final = 6  # Iteration limit of the step halving
 _TRIES: Final = 2
 """Number of steps per value of the penalty."""
 

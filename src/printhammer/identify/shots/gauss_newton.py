@@ -125,10 +125,10 @@ def would_be_found(
     return further
 
 
-_MOST_STEPS: Final = 40
+_MOST_STEPS: Final = 40  # Iteration limit of the Gauss-Newton method
 _FULL: Final = 0.4
 """Largest relative change of a constant in one step."""
-_SHORTEST: Final = 1e-3
+_SHORTEST: Final = 1e-3  # Smallest step fraction of the damping
 _EXACT: Final = 1e-11
 """Relative change of all constants below which exact data are fitted."""
 _NEAR, _DONE = 1.0, 1e-3

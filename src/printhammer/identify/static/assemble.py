@@ -167,7 +167,7 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
 _WEAK: Final = 0.1
 """Relative standard error above which a constant gets a profile."""
 
-_GRID: Final = 25
+_GRID: Final = 25  # Number of values of a profile likelihood
 
 _COARSE: Final = 1e-8
 """Relative tolerance of the iterations of a profile."""

@@ -94,7 +94,7 @@ class RestitutionLaw:
 RATIO: Final = "backstop.damping / backstop.stiffness"
 """Key of l/k, whose unit is s/m."""
 
-_ROWS: Final = 6
+_ROWS: Final = 6  # Smallest number of rebounds for a fit with an error
 _SPAN: Final = 1.5
 """Smallest ratio of largest to smallest impact speed at which the law can be tested."""
 

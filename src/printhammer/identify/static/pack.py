@@ -129,8 +129,8 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
 LOADING, UNLOADING = 2.7, 11.0
 """Exponents of equation (5)."""
 
-_SPARE: Final = 4
-_LOADING_ROWS: Final = 4
+_SPARE: Final = 4  # Smallest number of rows beyond the number of unknowns
+_LOADING_ROWS: Final = 4  # Smallest number of rows of a loading branch
 _MEETS: Final = 0.02
 """Offset of a turning point, as a fraction of the largest indentation, below which no remark is made."""
 

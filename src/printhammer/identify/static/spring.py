@@ -17,7 +17,7 @@ from printhammer.identify.static.assemble import Data, assemble, enough, judge, 
 from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
 
-_ROWS = 5
+_ROWS = 5  # Smallest number of rows for two constants and their errors
 
 
 class SpringLaw:

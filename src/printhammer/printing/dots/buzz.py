@@ -36,8 +36,8 @@ FORCES: Final = (0.3, 0.95)  # Range of peak forces that count, as fractions of 
 
 FEWEST: Final = 6  # Consecutive dots without a backstop touch that count as buzz printing
 
-_PULSES: Final = 9
-_PERIODS: Final = 96
+_PULSES: Final = 9  # Number of pulses of a train, as in the paper
+_PERIODS: Final = 96  # Number of even intervals tried
 _DELAY_STEP: Final = 2e-6
 """Spacing of the delays searched, s."""
 
@@ -46,7 +46,7 @@ _DELAYS: Final = 400  # Maximum number of delays searched; a slow hammer gets a 
 PATIENCE: Final = 3.0
 """Time to wait for a dot after its firing, in times from firing to departure of the single pulse."""
 
-_ZOOMS, _PER_ZOOM = 2, 4
+_ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of each
 
 
 class Run(Declared):

@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from PIL.ImageFont import FreeTypeFont
 
 NAME: Final = "nine-wire"
-WIRES: Final = 9
+WIRES: Final = 9  # Number of wires of the built-in font
 ADVANCE: Final = 6
 """Columns from the start of one character to the start of the next."""
 
-_COLUMNS: Final = 5
-_STEP: Final = 7
+_COLUMNS: Final = 5  # Number of columns of a character
+_STEP: Final = 7  # Columns from character to character in the font file
 _DOT: Final = "#"
 
 
@@ -139,7 +139,7 @@ def _characters(path: Path) -> frozenset[int]:
 
 COLUMNS: Final = 40  # Default number of characters in a print line
 
-_NAMED: Final = 8
+_NAMED: Final = 8  # Largest number of missing characters named in a message
 
 
 def broken(text: str, columns: int = COLUMNS) -> list[str]:

@@ -46,7 +46,7 @@ SUFFIXES: Final = (".toml", *BITMAPS)
 
 _KEYS: Final = ("format", "name", "wires", "rows")
 _DOT, _EMPTY = "#", "."
-_MOST_PIXELS: Final = 50_000_000
+_MOST_PIXELS: Final = 50_000_000  # Largest number of pixels of a bitmap; arbitrary, bounds the memory
 
 
 def read_pattern(path: str | Path, wires: int | None = None) -> tuple[str, BoolArray]:
@@ -184,7 +184,7 @@ MOST_WIRES: Final = 1000
 MOST_CELLS: Final = 50_000_000
 """Largest number of wires of a head, and of cells of a pattern."""
 
-_TITLE: Final = 60
+_TITLE: Final = 60  # Largest length of a title in a picture
 
 
 class Pattern(Declared):

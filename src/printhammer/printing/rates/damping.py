@@ -132,9 +132,9 @@ LEAST: Final = 0.6
 MOST: Final = 1.6
 """Range of the amplitude factors searched for the nominal print force."""
 
-_COARSE: Final = 41
-_FINE: Final = 9
-_ROUNDS: Final = 5
+_COARSE: Final = 41  # Number of amplitude factors of the first grid
+_FINE: Final = 9  # Number of amplitude factors of each refinement
+_ROUNDS: Final = 5  # Number of refinements
 
 
 class DampingStudy(Result):
