@@ -70,10 +70,10 @@ def test_decimal_factors_give_the_nearest_float(text: str) -> None:
 
 
 REFUSED = [
-    ("60 lbf", "m", "'lbf' is a force, expected a length (m)"),
-    ("60", "m", "'60' has no unit, expected a length (m)"),
-    ("1,2kHz", "Hz", "'1,2kHz' has a comma, expected a number with a decimal point, such as '1.2 kHz'"),
-    ("1, 2", "1", "'1, 2' has a comma, expected a number with a decimal point, such as '1.2 kHz'"),
+    ("60 lbf", "m", "'lbf' is a force: expected a length (m)"),
+    ("60", "m", "'60' has no unit: expected a length (m)"),
+    ("1,2kHz", "Hz", "'1,2kHz' has a comma: expected a number with a decimal point, such as '1.2 kHz'"),
+    ("1, 2", "1", "'1, 2' has a comma: expected a number with a decimal point, such as '1.2 kHz'"),
     ("", "m", "is not a finite number"),
     ("in", "m", "is not a finite number"),
     ("nan m", "m", "is not a finite number"),
@@ -81,9 +81,9 @@ REFUSED = [
     ("-inf m", "m", "is not a finite number"),
     ("1e999 m", "m", "is not a finite number"),
     ("1e308 km", "m", "is not a finite number"),
-    ("20 degC", "m", "'degC' is a temperature, expected a length (m)"),
-    ("293 K", "degC", "'K' is a difference of temperatures, expected a temperature (degC)"),
-    ("68 degF", "K", "'degF' is a temperature, expected a difference of temperatures (K)"),
+    ("20 degC", "m", "'degC' is a temperature: expected a length (m)"),
+    ("293 K", "degC", "'K' is a difference of temperatures: expected a temperature (degC)"),
+    ("68 degF", "K", "'degF' is a temperature: expected a difference of temperatures (K)"),
     ("3 furlong", "m", "'furlong' is not known"),
     ("3 nan", "m", "'nan' is not known"),
     ("3 2 m", "m", "is not known"),
@@ -95,8 +95,8 @@ REFUSED = [
     ("3 m^(1/0)", "m", "is not known"),
     ("3 9**9**9**9", "m", "is not known"),
     ("3 mkg", "kg", "is not known"),
-    ("3 m^0.3", "m", "is of another dimension, expected a length (m)"),
-    ("3 1", "m", "is a pure number, expected a length (m)"),
+    ("3 m^0.3", "m", "is of another dimension: expected a length (m)"),
+    ("3 1", "m", "is a pure number: expected a length (m)"),
 ]
 
 

@@ -71,7 +71,7 @@ def load_peers(folder: Path) -> Peers:
     spec = importlib.util.spec_from_file_location(name, start, submodule_search_locations=[str(folder)])
     if not start.is_file() or spec is None or spec.loader is None:
         raise InputError(
-            f"peers = {folder}, expected a folder of solvers with __init__.py", key="peers", value=folder
+            f"peers = {folder}: expected a folder of solvers with __init__.py", key="peers", value=folder
         )
     for old in [key for key in sys.modules if key.partition(".")[0] == name]:
         del sys.modules[old]
@@ -81,5 +81,5 @@ def load_peers(folder: Path) -> Peers:
         return Peers(package.SINGLE, package.ENSEMBLES, package.USED)
     except (ImportError, AttributeError, SyntaxError) as error:
         raise InputError(
-            f"peers = {folder}, expected a folder of solvers: {error}", key="peers", value=folder
+            f"peers = {folder}: expected a folder of solvers: {error}", key="peers", value=folder
         ) from error

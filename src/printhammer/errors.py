@@ -14,7 +14,7 @@ class PrinthammerError(Exception):
 class InputError(PrinthammerError, ValueError):
     """Invalid input from outside.
 
-    The message is one sentence that names the file, the key, the value and what was expected. The command
+    The message is one sentence, `<file>: <key> = <value>: expected <what>`. The command
     line prints it and ends with status 2. The attributes hold the same for programs; None where the message
     has no such part.
 
@@ -48,7 +48,7 @@ class InputError(PrinthammerError, ValueError):
         value: object = None,
         expected: object = None,
     ) -> None:
-        super().__init__(message if expected is None else f"{message}, expected {expected}")
+        super().__init__(message if expected is None else f"{message}: expected {expected}")
         self.file = None if file is None else str(file)
         self.key, self.value = key, value
         self.expected = None if expected is None else str(expected)
@@ -63,7 +63,6 @@ class InputError(PrinthammerError, ValueError):
         file: object = None,
         written: str | None = None,
         unit: str = "",
-        said: str = ", expected",
     ) -> Self:
         """Compose the message of an invalid value.
 
@@ -75,15 +74,11 @@ class InputError(PrinthammerError, ValueError):
             Text of the value in the message, by default its `repr`.
         unit : str
             Unit of the value in the message.
-        said : str
-            Words between the value and what was expected.
         """
         where = "" if file is None else f"{file}: "
         text = repr(value) if written is None else written
         text += unit and f" {unit}"
-        error = cls(f"{where}{key} = {text}{said} {expected}", file=file, key=key, value=value)
-        error.expected = str(expected)
-        return error
+        return cls(f"{where}{key} = {text}", file=file, key=key, value=value, expected=expected)
 
     def within(self, where: object, *, file: object = None, key: str | None = None) -> InputError:
         """Return the error with a prefix to its message, and its place in its fields.

@@ -61,7 +61,7 @@ DIMENSIONS: dict[str, str] = {
 _ZEROS = {"degF": 32, "fahrenheit": 32}
 """Numbers of a unit at which the quantity in SI is 0; 0 for all others."""
 
-_UNKNOWN = "the unit {!r} is not known, expected one such as 'us', 'lbf' or 'N s/m^2.5'"
+_UNKNOWN = "the unit {!r} is not known: expected one such as 'us', 'lbf' or 'N s/m^2.5'"
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
 _FACTOR = re.compile(
     r"\s*(?P<name>[^\W\d_]+|%|1(?![\d.]))"

@@ -171,7 +171,7 @@ def test_markdown_has_all_rows(report: Report) -> None:
     ("arguments", "word"),
     [
         (["--threads", "0"], "threads = 0"),
-        (["--peers", "nowhere"], "peers = nowhere, expected a folder"),
+        (["--peers", "nowhere"], "peers = nowhere: expected a folder"),
         (["--threads", "many"], "whole number"),
         (["--out", "nowhere/at/all.json"], "folder that exists"),
         (["--out", "x.json", "--out", "x.json"], "written twice"),

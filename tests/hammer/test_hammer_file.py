@@ -46,7 +46,7 @@ BAD = {
     ),
     "unknown table": (
         changed(r"^\[spring\]", "[feather]"),
-        ["the key feather is not known, expected one of"],
+        ["the key feather is not known: expected one of"],
     ),
     "key that is not printable": (changed("^mass", '"a\\\\nb" = 1\nmass'), [r"the key 'a\nb' is not known"]),
     "no unit": (changed(', unit = "g"', ""), ["mass = 0.397975875", "has no unit", "a mass (kg)"]),
@@ -109,7 +109,7 @@ BAD = {
     ),
     "unknown option": (changed('"loading-branch"', '"x"'), ["pack.reloading = 'x'", "'unloading-curve'"]),
     "missing constant": (changed("^Bm.*", ""), ["magnet.Bm is missing", "N^0.5 m^0.25/A"]),
-    "missing mass": (changed("^mass.*", ""), ["mass is missing, expected mass of the armature (kg)"]),
+    "missing mass": (changed("^mass.*", ""), ["mass is missing: expected mass of the armature (kg)"]),
     "no thickness": (constant("thickness", "0 in"), ["pack.thickness = 0 in", "expected more than 0 m"]),
     "negative thickness": (
         constant("thickness", "-1 in"),
@@ -140,7 +140,7 @@ BAD = {
         changed(r"^\[coil\]|^mass", "coil = 1\nmass"),
         ["coil = 1", "a table [coil]"],
     ),
-    "missing format": (changed("^format.*", ""), ["format is missing, expected format = 1"]),
+    "missing format": (changed("^format.*", ""), ["format is missing: expected format = 1"]),
     "other format": (changed("^format.*", "format = 2"), ["format = 2: expected 1"]),
     "format of another kind": (changed("^format.*", "format = 1.0"), ["format = 1.0: expected 1"]),
     "no name": (changed("^name.*", ""), ["name is missing"]),

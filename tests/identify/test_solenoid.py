@@ -92,20 +92,20 @@ def test_forces_in_a_wrong_unit_are_named_by_their_factor(tmp_path: Path) -> Non
         (
             "gap [mm],force [N],inductance [H]\n1,2,1\n",
             {},
-            "the column 'current' is missing, expected it or one",
+            "the column 'current' is missing: expected it or one",
         ),
         (
             "gap [mm],force [N],inductance [H]\n1,-2,1\n",
             {"current": 1.0},
-            "line 2: the force is -2, expected",
+            "line 2: the force is -2: expected",
         ),
         (
             "gap [mm],force [N],inductance [H]\n-1,2,1\n",
             {"current": 1.0},
-            "line 2: gap -0.001 m, expected 0 or",
+            "line 2: gap -0.001 m: expected 0 or",
         ),
         ("gap [mm],force [N],inductance [H]\n1,2,1\n", {"current": 1.0}, "too few for the constants of the"),
-        ("gap [mm],force [N],inductance [H]\n1,2,1\n", {"turns": 0.0}, "turns = 0, expected more than 0"),
+        ("gap [mm],force [N],inductance [H]\n1,2,1\n", {"turns": 0.0}, "turns = 0: expected more than 0"),
     ],
 )
 def test_a_table_that_tells_too_little_is_refused(

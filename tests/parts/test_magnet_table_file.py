@@ -136,17 +136,17 @@ def test_linkages_are_read(tmp_path: Path) -> None:
     [
         (
             LINKAGES.replace("0.1,2,30", "0.1,2,20"),
-            "at 0.0001 m the linkage goes from 0.02 to 0.02 Wb between 1 and 2 A, expected one that rises",
+            "at 0.0001 m the linkage goes from 0.02 to 0.02 Wb between 1 and 2 A: expected one that rises",
         ),
         (
             LINKAGES.replace("0.2,2,50", "0.2,2,31"),
-            "the spline through the linkages falls about 2 A, expected one that rises with the current",
+            "the spline through the linkages falls about 2 A: expected one that rises with the current",
         ),
         (
             LINKAGES.replace("linkage [mWb]", "force [N]"),
             "the column 'force [N]' is not known",
         ),
-        (LINKAGES.replace("mWb", "N"), "the unit 'N' is a force, expected"),
+        (LINKAGES.replace("mWb", "N"), "the unit 'N' is a force: expected"),
         ("", "no heading"),
     ],
 )

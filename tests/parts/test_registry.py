@@ -195,11 +195,11 @@ def test_machine_code_agrees_with_python(part: Part) -> None:
     ("kind", "fields", "sentence"),
     [
         (LinearSpring, {"Bs": -1.0, "As": 1.0}, "spring.Bs = -1.0: expected more than 0 N"),
-        (LinearSpring, {"Bs": 1.0}, "spring.As is missing, expected travel from the backstop"),
+        (LinearSpring, {"Bs": 1.0}, "spring.As is missing: expected travel from the backstop"),
         (
             LinearSpring,
             {"Bs": 1.0, "As": 1.0, "Cs": 1.0},
-            "spring.Cs = 1.0 is not known, expected one of Bs, As",
+            "spring.Cs = 1.0 is not known: expected one of Bs, As",
         ),
         (LinearSpring, {"Bs": float("nan"), "As": 1.0}, "spring.Bs = nan: expected"),
         (

@@ -84,7 +84,7 @@ def test_dots_and_contacts_are_tuples_and_tables(motion: ph.Motion) -> None:
     np.testing.assert_array_equal(times, expected)
     np.testing.assert_array_equal(motion.dots.to_dataframe()["flight_time [s]"], expected)
     assert motion.contacts["surface"].tolist() == [contact.surface for contact in motion.contacts]
-    with pytest.raises(KeyError, match="'speed', expected one of index, fired_at"):
+    with pytest.raises(KeyError, match="'speed': expected one of index, fired_at"):
         motion.dots["speed"]
 
 

@@ -15,11 +15,11 @@ from printhammer.run.window import CYCLE
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"points": 1}, "points = 1, expected at least 2"),
-        ({"tolerance": 0.0}, "tolerance = 0.0, expected a number from 1e-15 to 1e-05"),
-        ({"tolerance": 1.0}, "tolerance = 1.0, expected a number from 1e-15 to 1e-05"),
-        ({"tolerance": float("nan")}, "tolerance = nan, expected a number"),
-        ({"scheme": "euler"}, "scheme = 'euler', expected one of default, trapezoid, runge-kutta-4"),
+        ({"points": 1}, "points = 1: expected at least 2"),
+        ({"tolerance": 0.0}, "tolerance = 0.0: expected a number from 1e-15 to 1e-05"),
+        ({"tolerance": 1.0}, "tolerance = 1.0: expected a number from 1e-15 to 1e-05"),
+        ({"tolerance": float("nan")}, "tolerance = nan: expected a number"),
+        ({"scheme": "euler"}, "scheme = 'euler': expected one of default, trapezoid, runge-kutta-4"),
         ({"duration": 0.0}, "expected a positive number"),
         ({"duration": -1.0}, "expected a positive number"),
         ({"duration": float("inf")}, "expected a positive number"),

@@ -47,7 +47,7 @@ def test_an_entry_that_cannot_be_taken_is_told_and_the_others_are(key: str, valu
 
 def test_an_unknown_hammer_is_told() -> None:
     table, (note,) = taken({"hammer": "no-such"}, SHELF)
-    assert note.startswith("hammer = 'no-such', expected one of hendriks-1983")
+    assert note.startswith("hammer = 'no-such': expected one of hendriks-1983")
     assert note.endswith("hendriks-1983 is shown instead")
     assert table["hammer"] == NAME
     table, (note,) = taken({"text": "x = ["}, SHELF)

@@ -122,7 +122,7 @@ def test_what_describes_no_hammer_is_told_and_the_next_state_is_served() -> None
     with opened() as (made, page):
         made.receive(state(1, constants={"mass": 1.0}))
         (told,) = page.until("refusal", serial=1)
-        assert "mass = 1 kg, expected" in told["reason"]
+        assert "mass = 1 kg: expected" in told["reason"]
         made.receive(state(2, views=["motion"]))
         page.until("dots", serial=2)
 

@@ -45,7 +45,7 @@ def test_quantities_and_options_are_told_apart() -> None:
 
 
 def test_sentences_name_key_value_and_expectation() -> None:
-    assert told() == "sample.length is missing, expected length of the sample (m)"
+    assert told() == "sample.length is missing: expected length of the sample (m)"
     assert told(length=-3.0) == "sample.length = 3 in: expected more than 0 m"
     assert told(length=float("inf")) == "sample.length = inf: expected more than 0 m"
     assert told(length="x").startswith("sample.length = 'x': expected more than 0 m")
@@ -53,7 +53,7 @@ def test_sentences_name_key_value_and_expectation() -> None:
     assert told(length=1.0, load=None) == "sample.load = None: expected a finite number in A"
     assert told(length=1.0, way="left") == "sample.way = 'left': expected 'up' or 'down'"
     assert told(length=1.0, wet=1) == "sample.wet = 1: expected true or false"
-    assert told(length=1.0, dry=1).startswith("sample.dry = 1 is not known, expected one of length, share")
+    assert told(length=1.0, dry=1).startswith("sample.dry = 1 is not known: expected one of length, share")
     assert told(length=8.0) == "sample: expected something else than eight"
 
 

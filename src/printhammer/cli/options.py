@@ -220,7 +220,7 @@ def read_whole(written: str, name: str) -> int:
     try:
         return int(written)
     except ValueError:
-        raise InputError.of(name, written, "a whole number", said=": expected") from None
+        raise InputError.of(name, written, "a whole number") from None
 
 
 def read_plain(written: str, name: str) -> float:
@@ -229,7 +229,7 @@ def read_plain(written: str, name: str) -> float:
         return float(written)
     except ValueError:
         point = " with a decimal point" if "," in written else ""
-        raise InputError.of(name, written, f"a number{point}", said=": expected") from None
+        raise InputError.of(name, written, f"a number{point}") from None
 
 
 def read_share(written: str, name: str) -> float:

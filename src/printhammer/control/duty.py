@@ -93,7 +93,7 @@ def read_temperature(value: float | str, name: str) -> float:
     """
     temperature = read_number(value, "degC", name)
     if not temperature > COLDEST:
-        raise InputError.of(name, value, f"more than {COLDEST:.4g} degC", said=" is expected to be")
+        raise InputError.of(name, value, f"more than {COLDEST:.4g} degC")
     return temperature
 
 
@@ -328,7 +328,7 @@ def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate
 def _rate(value: float | str, heat: DotHeat) -> float:
     rate = read_number(value, "Hz", "burst")
     if rate <= 0.0:
-        raise InputError.of("burst", value, "greater than 0 Hz", said=" is expected to be")
+        raise InputError.of("burst", value, "greater than 0 Hz")
     if rate > heat.most:
         expected = f"at most {heat.most:.6g} Hz, since the driver is on for {1e3 * heat.on_time:.4g} ms a dot"
         raise InputError.of("burst", value, expected)

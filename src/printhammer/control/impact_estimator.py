@@ -352,21 +352,19 @@ class Sampling(Declared):
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.delay < math.inf:
-            raise InputError.of("delay", self.delay, "a number not below 0", said=" is expected to be")
+            raise InputError.of("delay", self.delay, "a number not below 0")
         if self.bandwidth is not None and not 0.0 < self.bandwidth < math.inf:
-            raise InputError.of("bandwidth", self.bandwidth, "a number above 0", said=" is expected to be")
+            raise InputError.of("bandwidth", self.bandwidth, "a number above 0")
         if self.signal not in SIGNALS:
             raise InputError.of("signal", self.signal, " or ".join(SIGNALS))
         if not 0.0 <= self.noise < math.inf:
-            raise InputError.of("noise", self.noise, "a number not below 0", said=" is expected to be")
+            raise InputError.of("noise", self.noise, "a number not below 0")
         if not 0.0 < self.sampling_rate < math.inf:
-            raise InputError.of(
-                "sampling_rate", self.sampling_rate, "a number above 0", said=" is expected to be"
-            )
+            raise InputError.of("sampling_rate", self.sampling_rate, "a number above 0")
         if type(self.bits) is not int or not 1 <= self.bits <= _MOST_BITS:
             raise InputError.of("bits", self.bits, f"a whole number from 1 to {_MOST_BITS}")
         if self.full_scale is not None and not 0.0 < self.full_scale < math.inf:
-            raise InputError.of("full_scale", self.full_scale, "a number above 0", said=" is expected to be")
+            raise InputError.of("full_scale", self.full_scale, "a number above 0")
 
     @property
     def unit(self) -> str:

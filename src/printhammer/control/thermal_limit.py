@@ -114,7 +114,9 @@ def thermal_limit(
     hottest = float(cold.max())
     low, high = hottest + 1e-6 * (hottest - COLDEST), hottest + _HIGHEST
     if not slope(low) > 0.0 > slope(high):
-        raise InputError("the rates are expected to fall as the ambient temperature rises", key="rates")
+        raise InputError(
+            "the rates", key="rates", expected="rates that fall as the ambient temperature rises"
+        )
     limit = bisect(slope, low, high)
     residuals = off(limit)
     spare = cold.size - np.unique(group).size - 1

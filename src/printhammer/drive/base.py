@@ -34,11 +34,9 @@ class Drive:
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap = "add", period: float | None = None
     ) -> None:
         if not isinstance(waveform, Waveform):
-            raise InputError.of(
-                "waveform", waveform, "a waveform, the drive has none", said=" is expected to be"
-            )
+            raise InputError.of("waveform", waveform, "a waveform, the drive has none")
         if overlap not in OVERLAPS:
-            raise InputError.of("overlap", overlap, "'add' or 'replace'", said=" is expected to be")
+            raise InputError.of("overlap", overlap, "'add' or 'replace'")
         self._waveform = waveform
         self._overlap: Overlap = "replace" if waveform.replaces else overlap
         self._period = period

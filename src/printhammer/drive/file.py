@@ -120,9 +120,7 @@ def save_drive(drive: Drive, path: str | Path) -> None:
 def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Drive:
     _known(data, {"format", "overlap", "waveform", "waveforms", *_KEYS}, "")
     if data.get("format") != FORMAT or isinstance(data["format"], (bool, float)):
-        raise InputError.of(
-            "format", data.get("format"), FORMAT, written=shown(data.get("format")), said=" is expected to be"
-        )
+        raise InputError.of("format", data.get("format"), FORMAT, written=shown(data.get("format")))
     kinds = [kind for kind in _KEYS if kind in data]
     if len(kinds) != 1:
         several = " and ".join(f"[{kind}]" for kind in kinds) or "none"
@@ -135,17 +133,15 @@ def _drive(data: dict[str, Any], standard: Waveform | None, folder: Path) -> Dri
     arguments = _arguments(_table(data[kind], kind), kind)
     for key, others in (("waveform", ("sine", "sequence")), ("waveforms", set(_KEYS) - {"sequence"})):
         if key in data and kind in others:
-            raise InputError(f"{key} is expected to be left out beside [{kind}]", key=key)
+            raise InputError(f"{key} beside [{kind}]", expected="no such key", key=key)
     if kind == "sine":
         if data.get("overlap", "add") != "add":
-            raise InputError("overlap is expected to be left out beside [sine]", key="overlap")
+            raise InputError("overlap beside [sine]", expected="no such key", key="overlap")
         _required(arguments, ("amplitude", "frequency"), kind)
         return _named(kind, SineForce, arguments)
     overlap = data.get("overlap", "add")
     if overlap not in ("add", "replace"):
-        raise InputError.of(
-            "overlap", overlap, "'add' or 'replace'", written=shown(overlap), said=" is expected to be"
-        )
+        raise InputError.of("overlap", overlap, "'add' or 'replace'", written=shown(overlap))
     if kind == "sequence":
         _required(arguments, ("at", "waveforms"), kind)
         waveforms = _waveforms(arguments.pop("waveforms"), data, folder)
@@ -172,7 +168,7 @@ def _named(kind: str, maker: Callable[..., Drive], arguments: Mapping[str, Any])
 
 def _table(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise InputError.of(name, value, "a table", written=shown(value), said=" is expected to be")
+        raise InputError.of(name, value, "a table", written=shown(value))
     return value
 
 
@@ -228,7 +224,6 @@ def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, st
                 unit,
                 f"a unit, such as {units[0]!r}",
                 written=shown(unit),
-                said=" is expected to be",
             )
     else:
         raise InputError(
@@ -249,16 +244,12 @@ def _column(value: Any, si: str, where: str) -> list[float]:
     if isinstance(value, list):
         return [_quantity(entry, (si,), where)[0] for entry in value]
     if not isinstance(value, dict):
-        raise InputError.of(
-            where, value, "a list, or values with a unit", written=shown(value), said=" is expected to be"
-        )
+        raise InputError.of(where, value, "a list, or values with a unit", written=shown(value))
     _known(value, {"values", "unit"}, where)
     _required(value, ("values", "unit"), where)
     values, unit = value["values"], value["unit"]
     if not isinstance(values, list):
-        raise InputError.of(
-            f"{where}.values", values, "a list of numbers", written=shown(values), said=" is expected to be"
-        )
+        raise InputError.of(f"{where}.values", values, "a list of numbers", written=shown(values))
     return [_quantity({"value": entry, "unit": unit}, (si,), where)[0] for entry in values]
 
 
@@ -266,9 +257,7 @@ def _waveforms(names: Any, data: dict[str, Any], folder: Path) -> list[Waveform]
     """Return the waveforms of a sequence, in the order of the names."""
     tables = _table(data.get("waveforms", {}), "waveforms")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise InputError.of(
-            "sequence.waveforms", names, "a list of names", written=shown(names), said=" is expected to be"
-        )
+        raise InputError.of("sequence.waveforms", names, "a list of names", written=shown(names))
     made = {
         name: _waveform(_table(table, f"waveforms.{name}"), folder, f"waveforms.{name}")
         for name, table in tables.items()
@@ -296,7 +285,6 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
             shape,
             f"one of {', '.join(known)}",
             written=shown(shape),
-            said=" is expected to be",
         )
     model = known[shape]
     data = {key: value for key, value in table.items() if key != "shape"}
@@ -332,7 +320,6 @@ def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
             data["parts"],
             "a list of waveforms",
             written=shown(data["parts"]),
-            said=" is expected to be",
         )
     parts = []
     for number, entry in enumerate(data["parts"]):
@@ -385,9 +372,7 @@ def _samples(data: dict[str, Any], where: str) -> Waveform:
     _known(data, {"interpolation", "time", *si}, where)
     driven = [name for name in si if name in data]
     if "time" not in data or len(driven) != 1:
-        raise InputError(
-            f"{where} is expected to have a file, or time and either current or force", key=where
-        )
+        raise InputError(where, key=where, expected="a file, or time and either current or force")
     interpolation = data.get("interpolation", "pchip")
     if interpolation not in ("pchip", "linear"):
         raise InputError.of(
@@ -395,7 +380,6 @@ def _samples(data: dict[str, Any], where: str) -> Waveform:
             interpolation,
             "'pchip' or 'linear'",
             written=shown(interpolation),
-            said=" is expected to be",
         )
     name = driven[0]
     times = _column(data["time"], "s", f"{where}.time")

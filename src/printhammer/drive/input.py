@@ -36,7 +36,7 @@ def read_number(value: float | str, si: str, name: str) -> float:
         number = math.nan
     if not math.isfinite(number):
         what = "a finite number" if si == "1" else f"a finite number in {si} or a string with a unit"
-        raise InputError.of(name, value, what, said=" is expected to be")
+        raise InputError.of(name, value, what)
     return number
 
 
@@ -45,7 +45,7 @@ def read_positive(value: float | str, si: str, name: str) -> float:
     number = read_number(value, si, name)
     if number <= 0.0 or not math.isfinite(1.0 / number):
         unit = "" if si == "1" else f" {si}"
-        raise InputError.of(name, value, f"greater than 0{unit}", said=" is expected to be")
+        raise InputError.of(name, value, f"greater than 0{unit}")
     return number
 
 
@@ -61,7 +61,7 @@ def read_start(value: float | str) -> float:
     """Parse the time of a first firing, s, which is not negative; errors as for `read_number`."""
     number = read_number(value, "s", "start")
     if number < 0.0:
-        raise InputError.of("start", value, "0 s or later", said=" is expected to be")
+        raise InputError.of("start", value, "0 s or later")
     return number
 
 
@@ -72,9 +72,7 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
     except TypeError:
         count = least - 1
     if not least <= count <= MOST_PULSES:
-        raise InputError.of(
-            name, value, f"a whole number from {least} to {MOST_PULSES}", said=" is expected to be"
-        )
+        raise InputError.of(name, value, f"a whole number from {least} to {MOST_PULSES}")
     return count
 
 
@@ -106,7 +104,7 @@ def even_times(
         spacing = period_of_rate(often)
         return steps * spacing, ("rate", often), spacing
     if period is None:
-        raise InputError("a train of pulses is expected to have a rate or a period", key="rate")
+        raise InputError("a train of pulses", key="rate", expected="a rate or a period")
     spacing = read_positive(period, "s", "period")
     return steps * spacing, ("period", spacing), spacing
 
@@ -120,7 +118,7 @@ def read_times(at: Iterable[float | str]) -> FloatArray:
     except TypeError:
         entries = []
     if not entries:
-        raise InputError.of("at", at, "a list of firing times", said=" is expected to be")
+        raise InputError.of("at", at, "a list of firing times")
     return np.array([read_number(entry, "s", "firing time") for entry in entries], dtype=np.float64)
 
 
@@ -129,16 +127,16 @@ def checked_times(times: npt.ArrayLike) -> FloatArray:
     result = np.array(times, dtype=np.float64)
     if result.ndim != 1 or not 1 <= result.size <= MOST_PULSES:
         raise InputError(
-            f"{result.size} firing times are expected to be a list of 1 to {MOST_PULSES}", key="firing times"
+            f"{result.size} firing times", expected=f"a list of 1 to {MOST_PULSES}", key="firing times"
         )
     if not np.isfinite(result).all():
-        raise InputError(f"firing time {result[~np.isfinite(result)][0]} is expected to be finite", key="at")
+        raise InputError(f"firing time {result[~np.isfinite(result)][0]}", expected="finite", key="at")
     if result[0] < 0.0:
-        raise InputError(f"firing time {result[0]:.9g} s is expected to be 0 s or later", key="at")
+        raise InputError(f"firing time {result[0]:.9g} s", expected="0 s or later", key="at")
     bad = np.flatnonzero(np.diff(result) <= 0.0)
     if len(bad):
         k = int(bad[0]) + 1
         order = f"{result[k]:.9g} s (firing {k + 1}) follows {result[k - 1]:.9g} s"
-        raise InputError(f"firing times are expected to increase strictly, but {order}", key="firing times")
+        raise InputError(order, key="firing times", expected="strictly increasing firing times")
     result.flags.writeable = False
     return result

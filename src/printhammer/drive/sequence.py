@@ -59,7 +59,8 @@ class PulseSequence(Drive):
         times = read_times(at) + read_start(start)
         if times.size != len(fired):
             raise InputError(
-                f"{times.size} firing times are expected to be as many as the waveforms, {len(fired)}",
+                f"{times.size} firing times",
+                expected=f"as many as the waveforms, {len(fired)}",
                 key="firing times",
             )
         super().__init__(fired[0], times, overlap, None)
@@ -206,16 +207,14 @@ def _checked(waveforms: Any) -> list[Waveform]:
     except TypeError:
         fired = []
     if not fired:
-        raise InputError.of(
-            "waveforms", waveforms, "a list of waveforms, one a firing", said=" is expected to be"
-        )
+        raise InputError.of("waveforms", waveforms, "a list of waveforms, one a firing")
     seen: set[int] = set()
     for number, waveform in enumerate(fired):
         if id(waveform) in seen:
             continue
         seen.add(id(waveform))
         if not isinstance(waveform, Waveform):
-            raise InputError.of(f"waveforms[{number}]", waveform, "a waveform", said=" is expected to be")
+            raise InputError.of(f"waveforms[{number}]", waveform, "a waveform")
         if not math.isfinite(waveform.support):
             raise InputError(
                 f"waveforms[{number}] is a {waveform.shape}",

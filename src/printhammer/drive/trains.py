@@ -48,13 +48,13 @@ class _Pulsed(Drive):
     def _refuse_endless(waveform: Waveform) -> None:
         if not math.isfinite(waveform.support):
             raise InputError(
-                f"a {waveform.shape} waveform is expected to end in a train of pulses", key="waveform"
+                f"a {waveform.shape} waveform in a train of pulses", key="waveform", expected="one that ends"
             )
 
     def with_waveform(self, waveform: Waveform) -> Self:
         """Return a drive that fires another waveform at the same times."""
         if not isinstance(waveform, Waveform):
-            raise InputError.of("waveform", waveform, "a waveform", said=" is expected to be")
+            raise InputError.of("waveform", waveform, "a waveform")
         self._refuse_endless(waveform)
         return self._with_waveform(waveform)
 
@@ -108,17 +108,16 @@ class PulseTrain(_Pulsed):
         self._spacing: tuple[str, float] | None = None
         if at is not None:
             if pulses is not None:
-                raise InputError.of(
-                    "pulses", pulses, "left out where the firing times are given", said=" is expected to be"
-                )
+                raise InputError.of("pulses", pulses, "left out where the firing times are given")
             super().__init__(waveform, read_times(at) + first, overlap, None)
             return
         count = read_count((PULSES if ways else 1) if pulses is None else pulses, "pulses")
         if not ways and count > 1:
             raise InputError(
-                f"pulses = {count} is expected to come with a rate, a period or firing times",
+                f"pulses = {count}",
                 key="pulses",
                 value=count,
+                expected="a rate, a period or firing times beside it",
             )
         steps, self._spacing, spacing = even_times(rate, period, count) if ways else (np.zeros(1), None, None)
         super().__init__(waveform, first + steps, overlap, spacing)
@@ -174,17 +173,18 @@ class Burst(_Pulsed):
         start: float | str = 0.0,
     ) -> None:
         if (rate is None) == (period is None):
-            raise InputError("a burst is expected to have either a rate or a period", key="rate")
+            raise InputError("a burst", key="rate", expected="either a rate or a period")
         count, repeats = read_count(pulses, "pulses"), read_count(bursts, "bursts")
         if count * repeats > MOST_PULSES:
             raise InputError(
-                f"{repeats} bursts of {count} pulses are expected to be at most {MOST_PULSES} firings",
+                f"{repeats} bursts of {count} pulses",
+                expected=f"at most {MOST_PULSES} firings",
                 key="pulses",
             )
         steps, self._spacing, spacing = even_times(rate, period, count)
         if gap is None and repeats > 1:
             raise InputError(
-                f"bursts = {repeats} is expected to come with a gap between them", key="bursts", value=repeats
+                f"bursts = {repeats}", key="bursts", value=repeats, expected="a gap between them"
             )
         self._gap = None if gap is None else read_positive(gap, "s", "gap")
         self._counts = (count, repeats)

@@ -50,9 +50,7 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
         if kind not in kinds_of(section):
             raise InputError(f"the key {shown(key)} is not known, the hammer has no [{section}]", key=key)
         if name == selector:
-            raise InputError.of(
-                key, value, f"a whole table for {section!r} instead", written=shown(value), said=": expected"
-            )
+            raise InputError.of(key, value, f"a whole table for {section!r} instead", written=shown(value))
         model = model_of(section, kind)
     else:
         model = None
@@ -88,9 +86,7 @@ def _constant(key: str, si_unit: str, value: Any, status: str, source: str) -> d
         try:
             number, unit = float(value), si_unit
         except (TypeError, ValueError, OverflowError):
-            raise InputError.of(
-                key, value, f"a number in {si_unit} or text", written=shown(value), said=": expected"
-            ) from None
+            raise InputError.of(key, value, f"a number in {si_unit} or text", written=shown(value)) from None
     return {"value": number, "unit": unit, "status": status, "source": source}
 
 
@@ -105,7 +101,6 @@ def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]
             content.get(selector),
             f"one of {known}",
             written=shown(content.get(selector)),
-            said=": expected",
         )
     result: dict[str, Any] = {}
     if selector in content:
@@ -122,9 +117,7 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
     selector = SELECTORS[section]
     kind = getattr(type(value), selector, None)
     if kind not in kinds_of(section) or type(value) is not model_of(section, kind):
-        raise InputError.of(
-            section, value, "a part, a table, or None", written=shown(value), said=": expected"
-        )
+        raise InputError.of(section, value, "a part, a table, or None", written=shown(value))
     if getattr(value, "content", dict)():
         raise InputError(
             f"{section}: expected a table that names its file, not one read already", key=section

@@ -152,14 +152,12 @@ def _build(
         raise InputError("format is missing", key="format", expected=f"format = {FORMAT}")
     version = document["format"]
     if not isinstance(version, int) or isinstance(version, bool) or version != FORMAT:
-        raise InputError.of("format", version, FORMAT, written=shown(version), said=": expected")
+        raise InputError.of("format", version, FORMAT, written=shown(version))
     texts: dict[str, str] = {}
     for name in TEXTS:
         texts[name] = document.get(name, "")
         if not isinstance(texts[name], str):
-            raise InputError.of(
-                name, texts[name], "text in quotes", written=shown(texts[name]), said=": expected"
-            )
+            raise InputError.of(name, texts[name], "text in quotes", written=shown(texts[name]))
     if not texts["name"].strip():
         raise InputError("name is missing", key="name", expected="a short name of the hammer")
     if texts["strike"] and not _NOUN.fullmatch(texts["strike"]):
@@ -178,9 +176,7 @@ def _build(
         if section in document:
             table = document[section]
             if not isinstance(table, Mapping):
-                raise InputError.of(
-                    section, table, f"a table [{section}]", written=shown(table), said=": expected"
-                )
+                raise InputError.of(section, table, f"a table [{section}]", written=shown(table))
             keys = [f"{section}.{name}" for name in table if name != selector]
             # An option may name a file that has changed since, so that it is read again.
             if known is not None and table is before.get(section) and known.constants.keys() >= set(keys):
@@ -220,7 +216,6 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
             kind,
             f"one of {', '.join(known)}",
             written=shown(kind),
-            said=": expected",
         )
     return kind
 
@@ -284,7 +279,6 @@ def _constant(key: str, written: Any, note: Quantity) -> Constant:
             written,
             f'{describe(note.si)} as {{ value = ..., unit = "...", status = "...", source = "..." }}',
             written=shown(written),
-            said=": expected",
         )
     _only(written, CONSTANT_KEYS, f"{key}.")
     value = written.get("value")
@@ -295,18 +289,17 @@ def _constant(key: str, written: Any, note: Quantity) -> Constant:
                 f"{what} has no {name}", key=what, expected=f"{describe(note.si)} with {_WANTED[name]}"
             )
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < math.inf:
-        raise InputError.of(key, value, "a finite number", written=shown(value), said=": expected")
+        raise InputError.of(key, value, "a finite number", written=shown(value))
     texts = {name: written[name] for name in CONSTANT_KEYS[1:]}
     for name, text in texts.items():
         if not isinstance(text, str) or not text.strip():
-            raise InputError.of(f"{key}.{name}", text, _WANTED[name], written=shown(text), said=": expected")
+            raise InputError.of(f"{key}.{name}", text, _WANTED[name], written=shown(text))
     if texts["status"] not in STATUSES:
         raise InputError.of(
             f"{key}.status",
             texts["status"],
             f"one of {', '.join(STATUSES)}",
             written=shown(texts["status"]),
-            said=": expected",
         )
     si_unit = si_unit_of(note, texts["unit"])
     with located(f"{key} = {value!r} {shown(texts['unit'], quotes=False)}", key=key):

@@ -80,9 +80,7 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
         or the correlations are not those of a covariance matrix.
     """
     if not isinstance(table, Mapping):
-        raise InputError.of(
-            UNCERTAINTY, table, f"a table [{UNCERTAINTY}]", written=shown(table), said=": expected"
-        )
+        raise InputError.of(UNCERTAINTY, table, f"a table [{UNCERTAINTY}]", written=shown(table))
     unknown = [name for name in table if name not in ENTRIES]
     if unknown:
         raise InputError(
@@ -112,9 +110,7 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
 def _texts(table: Mapping[str, Any], name: str) -> tuple[str, ...]:
     values = table.get(name, [])
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
-        raise InputError.of(
-            f"{UNCERTAINTY}.{name}", values, "a list of texts", written=shown(values), said=": expected"
-        )
+        raise InputError.of(f"{UNCERTAINTY}.{name}", values, "a list of texts", written=shown(values))
     return tuple(values)
 
 
@@ -151,7 +147,7 @@ def _correlation(table: Mapping[str, Any], count: int) -> FloatArray:
         matrix[number, :number] = matrix[:number, number] = row
     if count and not np.linalg.eigvalsh(matrix)[0] > _NEGATIVE:
         raise InputError(
-            f"{UNCERTAINTY}.correlation is that of no covariance, {wanted}", key=f"{UNCERTAINTY}.correlation"
+            f"{UNCERTAINTY}.correlation is that of no covariance: {wanted}", key=f"{UNCERTAINTY}.correlation"
         )
     return matrix
 

@@ -85,7 +85,8 @@ def checked(
     """
     if not (math.isfinite(rate) and rate > 0.0):
         raise InputError(
-            f"{what}: {places[0]}: rate {rate:.9g} Hz is expected to be greater than 0 Hz",
+            f"{what}: {places[0]}: rate {rate:.9g} Hz",
+            expected="greater than 0 Hz",
             file=what,
             key="rate",
             value=rate,
@@ -299,7 +300,8 @@ def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
     unit = stored[name].attrs.get("units")
     if not isinstance(unit, str):
         raise InputError(
-            f"{what}: {name} is expected to carry its unit in the attribute units, such as {_SI[name]!r}",
+            f"{what}: {name} has no unit",
+            expected=f"the attribute units, such as {_SI[name]!r}",
             file=what,
             key=name,
         )
@@ -310,10 +312,8 @@ def _variable(stored: xr.Dataset, what: str, name: str) -> FloatArray:
         raise error.within(f"{what}: {name}", file=what, key=name) from None
     except (OSError, TypeError, ValueError):
         raise InputError(
-            f"{what}: {name} is expected to hold numbers that can be read", file=what, key=name
+            f"{what}: {name}", file=what, key=name, expected="numbers that can be read"
         ) from None
     if np.isinf(values).any():
-        raise InputError(
-            f"{what}: {name} is expected to hold finite numbers, or nan for a gap", file=what, key=name
-        )
+        raise InputError(f"{what}: {name}", file=what, key=name, expected="finite numbers, or nan for a gap")
     return values

@@ -140,7 +140,7 @@ def register(part: _P) -> _P:
     """
     if part.role not in ROLES:
         known = ", ".join(ROLES)
-        raise ValueError(f"part {part.__name__} has the role {part.role!r}, expected one of {known}")
+        raise ValueError(f"part {part.__name__} has the role {part.role!r}: expected one of {known}")
     key = (part.role, part.law)
     taken = PARTS.get(key)
     if taken is not None and (taken.__module__, taken.__qualname__) != (part.__module__, part.__qualname__):

@@ -57,7 +57,7 @@ class Winding(CoilPart):
             there, missing = "turn_resistance", "leakage"
             if self.turn_resistance is None:
                 there, missing = missing, there
-            raise ValueError(f"{there} is given without {missing}, expected both or none")
+            raise ValueError(f"{there} is given without {missing}: expected both or none")
         return self
 
     @property

@@ -53,7 +53,7 @@ class Rows(tuple[_T, ...]):
         """
         if isinstance(index, str):
             if index not in self._heads:
-                raise KeyError(f"{index!r}, expected one of {', '.join(self._heads)}")
+                raise KeyError(f"{index!r}: expected one of {', '.join(self._heads)}")
             values = [getattr(row, index) for row in self]
             return np.array(values, dtype=None if None not in values else np.float64)
         if isinstance(index, slice):

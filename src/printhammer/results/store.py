@@ -264,7 +264,7 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def _root(path: Path) -> dict[str, Any]:
     """Return the metadata of the group of a store."""
-    other = f"{path}: the folder is no store of printhammer, expected one, or a name that is not taken"
+    other = f"{path}: the folder is no store of printhammer: expected one, or a name that is not taken"
     try:
         root: dict[str, Any] = json.loads((path / _ROOT).read_bytes())
         _ = root["attributes"][_ARRAYS]

@@ -133,7 +133,6 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
                 ),
                 written=f"{hold:g}",
                 unit="A",
-                said=": expected",
             )
         upper = getattr(waveform, "upper", None)
         largest = max(largest, current if upper is None else min(upper, current))
@@ -185,5 +184,4 @@ def check_linkage(hammer: Hammer, current: float) -> None:
                     file=hammer.path,
                     written=f"{coil.inductance:g}",
                     unit="H",
-                    said=": expected",
                 )

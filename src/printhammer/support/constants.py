@@ -178,11 +178,11 @@ def invalid(
     if kind == "bool_type":
         wanted = "true or false"
     if kind == "missing":
-        ending = f", expected {note.meaning} ({note.si})" if note else ""
+        ending = f": expected {note.meaning} ({note.si})" if note else ""
         return InputError(f"{prefix}{name} is missing{ending}", file=file or None, key=key)
     value = fault["input"]
     text = (written or {}).get(name) or shown(value)
     if kind == "extra_forbidden":
-        message = f"{prefix}{name} = {text} is not known, expected one of {', '.join(model.model_fields)}"
+        message = f"{prefix}{name} = {text} is not known: expected one of {', '.join(model.model_fields)}"
         return InputError(message, file=file or None, key=key, value=value)
-    return InputError.of(key, value, wanted, file=file or None, written=text, said=": expected")
+    return InputError.of(key, value, wanted, file=file or None, written=text)

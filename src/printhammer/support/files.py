@@ -91,7 +91,7 @@ def read_text(path: Path, what: str, *, wanted: str = "", encoding: str = "utf-8
     try:
         return path.read_text(encoding)
     except UnicodeDecodeError:
-        raise InputError(f"{path}: {wanted or f'{what} is expected to be UTF-8 text'}", file=path) from None
+        raise InputError(str(path), file=path, expected=wanted or f"{what} in UTF-8") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: {what} cannot be read ({reason})", file=path) from None

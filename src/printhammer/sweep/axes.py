@@ -157,9 +157,7 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
     ends = (table.low, table.high)
     if table.values is not None:
         if not grid:
-            raise InputError(
-                f"{here}: values are given, a Latin hypercube is expected to have low and high", key=here
-            )
+            raise InputError(f"{here}: values of a Latin hypercube", key=here, expected="low and high")
         if any(value is not None for value in (*ends, table.count)) or geometric:
             raise InputError(f"{here}: values are given", key=here, expected="no range beside them")
         values = read_quantities(table.values, si, f"{here}.values")
@@ -173,8 +171,7 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
             )
     if not grid and table.count is not None:
         raise InputError(
-            f"{here}.count is given, a Latin hypercube is expected to have members instead",
-            key=f"{here}.count",
+            f"{here}.count of a Latin hypercube", key=f"{here}.count", expected="members instead"
         )
     low, high = (
         read_quantity(end, si, f"{here}.{name}") for end, name in zip(ends, ("low", "high"), strict=True)
@@ -184,18 +181,18 @@ def _values(table: AxisTable, here: str, si: str, grid: bool, geometric: bool) -
             f"{here}: the range from {low!r} to {high!r} {si} is empty", key=here, expected="two ends"
         )
     if geometric and not (low > 0.0 and high > 0.0):
-        raise InputError(f"{here}: a geometric range is expected to lie above 0 {si}", key=here)
+        raise InputError(f"{here}: a geometric range", key=here, expected=f"ends above 0 {si}")
     if not grid:
         return [low, high]
     count = table.count or 1
     if count < 2:
-        raise InputError.of(
-            f"{here}.count", count, "at least 2 values of a range", written=str(count), said=": expected"
-        )
+        raise InputError.of(f"{here}.count", count, "at least 2 values of a range", written=str(count))
     divide = np.geomspace if geometric else np.linspace
     grid_values = [float(value) for value in divide(low, high, count)]
     if len(set(grid_values)) < count:
-        raise InputError(f"{here}: the range is too narrow for {count} different values", key=here)
+        raise InputError(
+            f"{here}: {low!r} to {high!r}", key=here, expected=f"a range of {count} different values"
+        )
     return grid_values
 
 

@@ -196,7 +196,7 @@ def _task(base: Base, outputs: Outputs, rows: FloatArray, wanted: dict[str, str]
     """Compute a block on a worker with the same versions; return the results, or an error sentence."""
     for name, version in versions().items():
         if version != wanted[name]:
-            return f"a worker of the cluster has {name} {version}, expected {wanted[name]}"
+            return f"a worker of the cluster has {name} {version}: expected {wanted[name]}"
     try:
         return run_chunk(base, outputs, rows)
     except PrinthammerError as error:

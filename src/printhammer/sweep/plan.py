@@ -276,7 +276,8 @@ def make_plan(spec: Spec) -> Plan:
     members = math.prod(shape)
     if members > _MOST_MEMBERS:
         raise InputError(
-            f"{spec.where}: {members} members are expected to be at most {_MOST_MEMBERS}",
+            f"{spec.where}: {members} members",
+            expected=f"at most {_MOST_MEMBERS}",
             file=spec.where,
             key="members",
         )

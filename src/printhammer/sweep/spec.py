@@ -86,7 +86,7 @@ def read_spec(source: str | Path | Mapping[str, Any]) -> Spec:
     else:
         path = Path(source)
         where, folder = str(path), path.parent
-        text = read_text(path, "the spec", wanted="expected a TOML file in UTF-8")
+        text = read_text(path, "the spec", wanted="a TOML file in UTF-8")
     try:
         return _spec(tomllib.loads(text), text, where, folder)
     except InputError as error:
@@ -100,10 +100,8 @@ def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
     grid = table.design == "grid"
     for name, value in (("members", table.members), ("seed", table.seed)):
         if grid != (value is None):
-            wanted = (
-                "is given, a grid is expected to have none" if grid else "is missing, expected a whole number"
-            )
-            raise InputError(f"{name} {wanted}", key=name)
+            fault = f"{name} of a grid" if grid else f"{name} is missing"
+            raise InputError(fault, key=name, expected="no such key" if grid else "a whole number")
     hammer = load(table.hammer if table.hammer in shipped() else folder / table.hammer)
     hammer = _replaced(hammer, table.constants)
     drive, place = _drive_tables(table.drive, folder)
@@ -116,9 +114,7 @@ def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
     )
     for i, axis in enumerate(axes):
         if any(axis.name == other.name for other in axes[:i]):
-            raise InputError.of(
-                f"axis[{i}].key", axis.key, "another key, this one has an axis", said=": expected"
-            )
+            raise InputError.of(f"axis[{i}].key", axis.key, "another key, this one has an axis")
         if axis.key in table.constants:
             raise InputError(
                 f"constants: {axis.key!r} is replaced by an axis",
@@ -128,7 +124,7 @@ def _spec(content: dict[str, Any], text: str, where: str, folder: Path) -> Spec:
     x, v = table.state.x, table.state.v
     duration = None if table.duration is None else read_quantity(table.duration, "s", "duration")
     if duration is not None and not duration > 0.0:
-        raise InputError.of("duration", duration, "more than 0 s", unit="s", said=": expected")
+        raise InputError.of("duration", duration, "more than 0 s", unit="s")
     base = Base(
         hammer=hammer,
         drive=drive,

@@ -76,20 +76,18 @@ def read_quantities(written: Any, si: str, where: str) -> list[float]:
         values = [{"value": value, "unit": unit} for value in column] if isinstance(column, list) else ()
     numbers = [read_quantity(value, si, f"{where}[{i}]") for i, value in enumerate(values)]
     if not numbers:
-        raise InputError.of(
-            where, written, "a list of quantities, at least one", written=shown(written), said=": expected"
-        )
+        raise InputError.of(where, written, "a list of quantities, at least one", written=shown(written))
     return numbers
 
 
 def _columns(table: Mapping[str, Any], names: tuple[str, str]) -> tuple[Any, str]:
     if set(table) != set(names):
         raise InputError(
-            f"{shown(dict(table))} is expected to have {names[0]} and {names[1]}", value=dict(table)
+            shown(dict(table)), value=dict(table), expected=f"the keys {names[0]} and {names[1]}"
         )
     unit = table[names[1]]
     if not isinstance(unit, str):
-        raise InputError(f"the unit {shown(unit)} is expected to be text", key="unit", value=unit)
+        raise InputError(f"the unit {shown(unit)}", expected="text", key="unit", value=unit)
     return table[names[0]], unit
 
 
@@ -198,7 +196,7 @@ def _fault(error: ValidationError) -> InputError:
     wanted = fault["msg"].removeprefix("Input should be ")
     wanted = {"bool_type": "true or false", "string_type": "text in quotes"}.get(fault["type"], wanted)
     value = fault["input"]
-    return InputError.of(key, value, wanted, written=shown(value), said=": expected")
+    return InputError.of(key, value, wanted, written=shown(value))
 
 
 def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:

@@ -79,7 +79,7 @@ def test_bad_input_is_one_sentence(refused: Callable, tmp_path: Path, ball: tupl
     twice = ("--second", "drive.amplitude", "--second-from", "1 mN", "--second-to", "9 mN")
     refused("curve", *ball, *twice, said="expected another constant than that of the branch")
     outside = ("--second", "backstop.restitution", "--second-from", "0.1", "--second-to", "0.2")
-    refused("curve", *ball, *outside, said="at the start, expected one within the bounds")
+    refused("curve", *ball, *outside, said="at the start: expected one within the bounds")
     refused("curve", *ball, "--second", "mass", said="--second-from")
     refused("curve", *ball[:3], *SECOND, "--start", tmp_path / "none.nc", said="none.nc")
 

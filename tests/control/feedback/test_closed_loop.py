@@ -159,5 +159,5 @@ def test_hammers_that_cannot_be_driven_are_refused() -> None:
         ("backstop", {"spring": hammers.preload(-4.0), "pack": hammers.power()}),
         ("pack", {"spring": hammers.preload(-4.0), "backstop": hammers.hertz()}),
     ):
-        with pytest.raises(ph.InputError, match=f"the hammer has no {missing}, expected one"):
+        with pytest.raises(ph.InputError, match=f"the hammer has no {missing}: expected one"):
             Controller(hammers.made_of(**parts), driver)

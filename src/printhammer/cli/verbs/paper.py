@@ -41,9 +41,7 @@ def figure(
 
     entry = FIGURES.get(opt.read_whole(number, "figure"))
     if entry is None:
-        raise InputError.of(
-            "figure", number, f"one of {', '.join(map(str, FIGURES))}", written=str(number), said=": expected"
-        )
+        raise InputError.of("figure", number, f"one of {', '.join(map(str, FIGURES))}", written=str(number))
     if scheme == "exact" and reading != "firings":
         raise InputError.of(
             "--reading", reading, "it with --scheme, since the exact motion has no step", written=str(reading)

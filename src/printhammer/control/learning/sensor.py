@@ -49,21 +49,13 @@ class ImpactSensor(Declared):
             value = getattr(self, name)
             if not 0.0 <= value < most:
                 limit = f" and below {most:g}" if math.isfinite(most) else ""
-                raise InputError.of(
-                    name, value, f"a number not below 0{limit}", file="sensor", said=" is expected to be"
-                )
+                raise InputError.of(name, value, f"a number not below 0{limit}", file="sensor")
         if not math.isfinite(self.delay):
-            raise InputError.of(
-                "delay", self.delay, "a finite number", file="sensor", said=" is expected to be"
-            )
+            raise InputError.of("delay", self.delay, "a finite number", file="sensor")
         if not (math.isfinite(self.gain) and self.gain > -1.0):
-            raise InputError.of(
-                "gain", self.gain, "a number above -1", file="sensor", said=" is expected to be"
-            )
+            raise InputError.of("gain", self.gain, "a number above -1", file="sensor")
         if type(self.seed) is not int or self.seed < 0:
-            raise InputError.of(
-                "seed", self.seed, "a whole number not below 0", file="sensor", said=" is expected to be"
-            )
+            raise InputError.of("seed", self.seed, "a whole number not below 0", file="sensor")
 
     def read(self, flight: FloatArray, force: FloatArray, unit: int, run: int) -> Readings:
         """Simulate readings of dots (N,) from true flight times, s, and forces; NaN for lost dots."""

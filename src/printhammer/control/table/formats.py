@@ -92,7 +92,6 @@ def _of_csv(text: str) -> tuple[Head, Rows]:
                 value.strip(),
                 "a text or a number",
                 written=shown(value.strip()),
-                said=": expected",
             ) from None
     _check_head(head)
     gaps, wanted = head["gaps"], columns(head["gaps"])

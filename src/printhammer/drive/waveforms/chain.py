@@ -42,9 +42,7 @@ class Chain(Waveform):
         parts = _checked(data["parts"])
         driven = parts[0][1].quantity
         if data.get("quantity", driven) != driven:
-            raise InputError.of(
-                "quantity", data["quantity"], f"that of the parts, {driven!r}", said=" is expected to be"
-            )
+            raise InputError.of("quantity", data["quantity"], f"that of the parts, {driven!r}")
         return {**data, "parts": parts, "quantity": driven}
 
     @property
@@ -85,13 +83,11 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
     except TypeError:
         pairs = []
     if not pairs or any(len(pair) != 2 for pair in pairs):
-        raise InputError.of("parts", parts, "pairs of an offset and a waveform", said=" is expected to be")
+        raise InputError.of("parts", parts, "pairs of an offset and a waveform")
     checked: list[tuple[float, Waveform]] = []
     for number, (begin, waveform) in enumerate(pairs):
         if not isinstance(waveform, Waveform):
-            raise InputError(
-                f"parts[{number}]: {waveform!r} is expected to be a waveform", key=f"parts[{number}]"
-            )
+            raise InputError(f"parts[{number}]: {waveform!r}", expected="a waveform", key=f"parts[{number}]")
         if waveform.quantity != pairs[0][1].quantity:
             raise InputError(
                 f"parts[{number}] is a {waveform.quantity}",
@@ -138,7 +134,8 @@ def _offset(written: object, number: int) -> float:
         return read_number(written, "s", f"parts[{number}]")
     if isinstance(written, bool) or not isinstance(written, float | int) or not math.isfinite(written):
         raise InputError(
-            f"parts[{number}]: offset {written!r} is expected to be a finite number in s",
+            f"parts[{number}]: offset {written!r}",
+            expected="a finite number in s",
             key=f"parts[{number}]",
         )
     return float(written)

@@ -57,7 +57,7 @@ class _Driver(Waveform):
     @model_validator(mode="after")
     def _decay_is_known(self) -> Self:
         if self.decay == "zener" and self.decay_voltage is None:
-            raise ValueError('decay = "zener" is given without decay_voltage, expected the zener voltage')
+            raise ValueError('decay = "zener" is given without decay_voltage: expected the zener voltage')
         return self
 
     @property
@@ -121,7 +121,7 @@ class Chopper(_Driver):
         if (self.lower is None) == (self.off_time is None):
             raise ValueError("expected either lower, a second threshold, or off_time")
         if self.lower is not None and not self.lower < self.upper:
-            raise ValueError(f"lower = {self.lower:g} A is expected to be below upper = {self.upper:g} A")
+            raise ValueError(f"lower = {self.lower:g} A: expected less than upper = {self.upper:g} A")
         return self
 
     def segments(self) -> FloatArray:
@@ -142,13 +142,10 @@ class PeakAndHold(_Driver):
     def _thresholds(self) -> Self:
         if not self.hold_lower < self.hold_upper:
             raise ValueError(
-                f"hold_lower = {self.hold_lower:g} A is expected to be below"
-                f" hold_upper = {self.hold_upper:g} A"
+                f"hold_lower = {self.hold_lower:g} A: expected less than hold_upper = {self.hold_upper:g} A"
             )
         if not self.peak_time < self.width:
-            raise ValueError(
-                f"peak_time = {self.peak_time:g} s is expected to be below width = {self.width:g} s"
-            )
+            raise ValueError(f"peak_time = {self.peak_time:g} s: expected less than width = {self.width:g} s")
         return self
 
     def segments(self) -> FloatArray:
@@ -239,20 +236,21 @@ class Switched(Waveform):
         """Check that the switchings ascend and end at zero."""
         if not self.at or len(self.at) != len(self.levels):
             raise InputError(
-                f"levels = {list(self.levels)} is expected to have one value for each of the"
-                f" {len(self.at)} times, at least one",
+                f"levels = {list(self.levels)}",
                 key="levels",
                 value=list(self.levels),
+                expected=f"one value for each of the {len(self.at)} times, at least one",
             )
         if self.at[0] < 0.0 or any(not before < after for before, after in itertools.pairwise(self.at)):
             raise InputError(
-                f"at = {list(self.at)} is expected to ascend from 0 s on", key="at", value=list(self.at)
+                f"at = {list(self.at)}", key="at", value=list(self.at), expected="ascending times from 0 s on"
             )
         if self.levels[-1] != 0.0:
             raise InputError(
-                f"levels = {list(self.levels)} is expected to end with 0",
+                f"levels = {list(self.levels)}",
                 key="levels",
                 value=list(self.levels),
+                expected="0 as the last level",
             )
         return self
 

@@ -47,9 +47,7 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
         t = np.asarray(times, dtype=np.float64)
         y = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(
-            f"{what}: the samples are expected to be numbers", file=what, key="samples"
-        ) from None
+        raise InputError(f"{what}: the samples", expected="numbers", file=what, key="samples") from None
     if t.ndim != 1 or t.shape != y.shape:
         raise InputError(
             f"{what}: {t.size} times and {y.size} values",
@@ -63,13 +61,15 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
         bad = np.flatnonzero(~np.isfinite(column))
         if len(bad):
             raise InputError(
-                f"{what}: {name} {column[bad[0]]} of sample {bad[0] + 1} is expected to be finite",
+                f"{what}: {name} {column[bad[0]]} of sample {bad[0] + 1}",
+                expected="finite",
                 file=what,
                 key=name,
             )
     if t[0] < 0.0:
         raise InputError(
-            f"{what}: first time {t[0]:.9g} s is expected to be 0 or later (the firing is at 0)",
+            f"{what}: first time {t[0]:.9g} s",
+            expected="0 or later (the firing is at 0)",
             file=what,
             key="time",
         )
@@ -77,11 +77,9 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
     if len(bad):
         k = int(bad[0]) + 1
         order = f"{t[k]:.9g} s (sample {k + 1}) follows {t[k - 1]:.9g} s"
-        raise InputError(
-            f"{what}: times are expected to increase strictly, but {order}", file=what, key="times"
-        )
+        raise InputError(f"{what}: {order}", file=what, key="times", expected="strictly increasing times")
     if quantity not in _UNITS:
-        raise InputError.of("quantity", quantity, "current or force", file=what, said=" is expected to be")
+        raise InputError.of("quantity", quantity, "current or force", file=what)
     return Samples(tuple(t.tolist()), tuple(y.tolist()), quantity)
 
 

@@ -160,12 +160,13 @@ def pack(
     deepest = _peaks(hammer) if peaks is None else _array(peaks, "peaks")
     if points < 2 or not (deepest > 0.0).all():
         raise InputError(
-            "peaks and points are expected to be positive indentations and 2 points or more", key="peaks"
+            "peaks and points", expected="positive indentations and 2 points or more", key="peaks"
         )
     room = getattr(hammer.pack, "thickness", math.inf)
     if deepest.max() >= room:
         raise InputError(
-            f"a peak of {deepest.max():.6g} m is expected to be less than the thickness, {room:.6g} m",
+            f"a peak of {deepest.max():.6g} m",
+            expected=f"less than the thickness, {room:.6g} m",
             key="peaks",
         )
     (loading, c), (memory, _), (unloading, _) = (
@@ -200,7 +201,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
         )
     impacts = np.linspace(SPEEDS[0], SPEEDS[1], SPEEDS[2]) if speeds is None else _array(speeds, "speeds")
     if not (impacts > 0.0).all():
-        raise InputError("speeds are expected to be greater than 0 m/s", key="speeds")
+        raise InputError("speeds", expected="greater than 0 m/s", key="speeds")
     bare = hammer.replace({"magnet": None, "spring": None, "pack": None, "waveform": None})
     different, which = np.unique(impacts, return_inverse=True)
     rebound = np.array([_rebound(bare, speed) for speed in different.tolist()])[which]
@@ -292,7 +293,7 @@ def _record(
     length = least if duration is None else read_positive(duration, "s", "duration")
     early = read_number(before, "s", "before")
     if early < 0.0:
-        raise InputError.of("before", before, "0 s or more", said=" is expected to be")
+        raise InputError.of("before", before, "0 s or more")
     first, last = -math.floor(early * rate + 1e-9), math.floor(length * rate + 1e-9)
     if last < 1:
         raise InputError(
@@ -312,7 +313,7 @@ def _array(values: npt.ArrayLike, name: str) -> FloatArray:
     except (TypeError, ValueError):
         numbers = np.empty(0)
     if numbers.ndim != 1 or not numbers.size or not np.isfinite(numbers).all():
-        raise InputError(f"{name} are expected to be a list of finite numbers in SI", key=name)
+        raise InputError(f"{name}", expected="a list of finite numbers in SI", key=name)
     return numbers
 
 

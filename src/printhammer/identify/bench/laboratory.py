@@ -157,7 +157,7 @@ def measure(
     if kind not in BENCHES:
         raise InputError.of("kind", kind, f"one of {', '.join(KINDS)}")
     if seed < 0:
-        raise InputError.of("seed", seed, "a whole number, 0 or more", said=" is expected to be")
+        raise InputError.of("seed", seed, "a whole number, 0 or more")
     used = sensor if isinstance(sensor, Sensor) else adjusted(SENSORS[kind], sensor or {}, SI)
     there = BENCHES[kind](hammer, used, **bench)
     streams = np.random.SeedSequence([seed, KINDS.index(kind)]).spawn(len(UNITS) + 1)

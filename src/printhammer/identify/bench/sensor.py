@@ -53,7 +53,7 @@ class Amount:
         else:
             size = read_number(text, si, name)
         if size < 0.0 and not signed:
-            raise InputError.of(name, text, "0 or more", said=" is expected to be")
+            raise InputError.of(name, text, "0 or more")
         return cls(size, of)
 
     def at(self, true: FloatArray) -> FloatArray:
@@ -135,9 +135,9 @@ class Sensor:
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
         for name, frequency in (("sampling_rate", self.sampling_rate), ("bandwidth", self.bandwidth)):
             if frequency is not None and not (frequency > 0.0 and math.isfinite(frequency)):
-                raise InputError.of(name, frequency, "more than 0 Hz", said=" is expected to be")
+                raise InputError.of(name, frequency, "more than 0 Hz")
         if not 0.0 <= self.outliers <= 0.5:
-            raise InputError.of("outliers", self.outliers, "a share from 0 to 0.5", said=" is expected to be")
+            raise InputError.of("outliers", self.outliers, "a share from 0 to 0.5")
 
     def exact(self) -> Sensor:
         """Return a copy without errors: no noise, resolution, offset, bandwidth limit or outliers."""

@@ -357,7 +357,6 @@ def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, 
             f"less than the {pull:.3g} N of the magnet at full gap and {current:.3g} A",
             written=f"{preload:g}",
             unit="N",
-            said=": expected",
         )
     zero: dict[str, Any] = {"preload": _made(0.0, "N", "assumed", "the sheet does not tell")}
     zero["stiffness"] = _made(0.0, "N/m", "assumed", "the sheet does not tell")
@@ -412,7 +411,6 @@ def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -
             f"a spring that the magnet overcomes on the way at {current:.3g} A",
             written=f"{sheet.si('spring.stiffness', 0.0):g}",
             unit="N/m",
-            said=": expected",
         )
     return work
 
@@ -443,7 +441,6 @@ def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str
             table["shape"],
             f"one of {', '.join(SHAPES)}",
             written=shown(table["shape"]),
-            said=": expected",
         )
     known = quantities(SHAPES[table["shape"]])
     for key, value in sheet.driver.items():

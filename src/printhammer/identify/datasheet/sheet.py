@@ -157,16 +157,14 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
     texts = {key: document[key] for key in TEXTS if key in document}
     for key, text in texts.items():
         if not isinstance(text, str) or not text.strip():
-            raise InputError.of(key, text, "text in quotes", written=shown(text), said=": expected")
+            raise InputError.of(key, text, "text in quotes", written=shown(text))
     entries = {
         key: _entry(key, document[key], si) for key, (si, _needed) in QUANTITIES.items() if key in document
     }
     for name, units in TABLES.items():
         table = document.get(name, {})
         if not isinstance(table, Mapping):
-            raise InputError.of(
-                name, table, f"a table with {' and '.join(units)}", written=shown(table), said=": expected"
-            )
+            raise InputError.of(name, table, f"a table with {' and '.join(units)}", written=shown(table))
         for key, value in table.items():
             if key not in units:
                 raise InputError(
@@ -177,7 +175,7 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
             entries[f"{name}.{key}"] = _entry(f"{name}.{key}", value, units[key])
     force = document["force"]
     if not isinstance(force, list) or not force:
-        raise InputError.of("force", force, _WANTED["force"], written=shown(force), said=": expected")
+        raise InputError.of("force", force, _WANTED["force"], written=shown(force))
     points = [
         _pair(f"force, point {number}", pair, ("m", "N"), _WANTED["force"])
         for number, pair in enumerate(force, 1)
@@ -187,9 +185,7 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
         inductance = _pair("inductance", document["inductance"], ("H", "m"), '["45 mH", "4 mm"]')
     driver = document.get("driver", {})
     if not isinstance(driver, Mapping):
-        raise InputError.of(
-            "driver", driver, "a table with a shape", written=shown(driver), said=": expected"
-        )
+        raise InputError.of("driver", driver, "a table with a shape", written=shown(driver))
     sheet = DataSheet(
         where, texts, entries, points, inductance, dict(driver), _assumed(document), _why(document)
     )
@@ -217,21 +213,20 @@ def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
             written,
             f"{describe(si)} in quotes, with its unit",
             written=shown(written),
-            said=": expected",
         )
     with located(key, key=key):
         value, unit = split(written if isinstance(written, str) else repr(written), si)
         size = to_si(value, unit, si)
     if size < 0.0 or (size == 0.0 and not zero):
         least = "0 or more" if zero else "more than 0"
-        raise InputError.of(key, written, least, written=shown(written), said=": expected")
+        raise InputError.of(key, written, least, written=shown(written))
     return Entry(key, value, unit, size)
 
 
 def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[Entry, Entry]:
     """Parse a pair of quantities, of which a length may be 0."""
     if not isinstance(written, list) or len(written) != _PAIR:
-        raise InputError.of(key, written, wanted, written=shown(written), said=": expected")
+        raise InputError.of(key, written, wanted, written=shown(written))
     first, second = (_entry(key, part, si, zero=si == "m") for part, si in zip(written, units, strict=True))
     return first, second
 
@@ -251,7 +246,6 @@ def _assumed(document: Mapping[str, Any]) -> frozenset[str]:
             assumed,
             'keys of this sheet, such as ["mass"]',
             written=shown(assumed),
-            said=": expected",
         )
     known = _keys(document)
     for key in assumed:
@@ -268,7 +262,7 @@ def _why(document: Mapping[str, Any]) -> dict[str, str]:
     if not isinstance(why, Mapping) or not all(
         isinstance(text, str) and text.strip() for text in why.values()
     ):
-        raise InputError.of("why", why, "a table of keys and texts", written=shown(why), said=": expected")
+        raise InputError.of("why", why, "a table of keys and texts", written=shown(why))
     for key in why:
         if key not in _keys(document):
             raise InputError(f"why.{key} is given", key=f"why.{key}", expected="a key of this sheet")
@@ -282,9 +276,7 @@ def _check(sheet: DataSheet) -> None:
         raise InputError("force: a gap is given twice", key="force", expected="one force at each")
     restitution = sheet.si("stop.restitution", 0.0)
     if restitution > 1.0:
-        raise InputError.of(
-            "stop.restitution", restitution, "1 or less", written=f"{restitution:g}", said=": expected"
-        )
+        raise InputError.of("stop.restitution", restitution, "1 or less", written=f"{restitution:g}")
     if ("stop.stiffness" in sheet.entries) != ("stop.damping" in sheet.entries):
         raise InputError("stop: expected both stiffness and damping, or neither", key="stop")
     if sheet.si("target", 0.0) > sheet.si("stroke"):

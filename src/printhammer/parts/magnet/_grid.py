@@ -49,8 +49,8 @@ def gather(rows: Iterable[tuple[float, float, float]], what: str, quantity: str)
     for x, current, value in rows:
         if not (math.isfinite(x) and math.isfinite(current) and math.isfinite(value)):
             raise InputError(
-                f"{what}: the point {x!r} m, {current!r} A, {value!r} {UNITS[quantity]} is expected to be"
-                " finite",
+                f"{what}: the point {x!r} m, {current!r} A, {value!r} {UNITS[quantity]}",
+                expected="finite numbers",
                 file=what,
                 key="point",
             )

@@ -192,7 +192,7 @@ class LinkageTableMagnet(GridMagnet):
                 if row[k + 1] <= row[k]:
                     raise InputError(
                         f"{where}: at {x:.9g} m the linkage goes from {row[k]:.9g} to {row[k + 1]:.9g} Wb"
-                        f" between {table.current[k]:.9g} and {table.current[k + 1]:.9g} A, {ending}",
+                        f" between {table.current[k]:.9g} and {table.current[k + 1]:.9g} A: {ending}",
                         file=where,
                         key="linkage",
                     )
@@ -210,7 +210,7 @@ class LinkageTableMagnet(GridMagnet):
                 current = table.current[j] + float(np.broadcast_to(at, rise.shape)[i, k, j])
                 raise InputError(
                     f"{where}: at {table.x[i] + places[i, k]:.9g} m the spline through the linkages falls"
-                    f" about {current:.9g} A, {ending}",
+                    f" about {current:.9g} A: {ending}",
                     file=where,
                     key="linkage",
                 )

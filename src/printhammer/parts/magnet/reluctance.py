@@ -157,11 +157,11 @@ class ReluctanceMagnet(MagnetPart):
     @model_validator(mode="after")
     def _constants_belong_together(self) -> ReluctanceMagnet:
         if self.saturation_flux is not None and self.core_reluctance == 0.0:
-            raise ValueError("saturation_flux is given without a core_reluctance, expected both or none")
+            raise ValueError("saturation_flux is given without a core_reluctance: expected both or none")
         if (self.fringe_perimeter == 0.0) != (self.fringe_height == 0.0):
             raise ValueError("expected both fringe_perimeter and fringe_height or none of them")
         if self.leakage_reach is not None and self.leakage == 0.0:
-            raise ValueError("leakage_reach is given without a leakage, expected both or the leakage alone")
+            raise ValueError("leakage_reach is given without a leakage: expected both or the leakage alone")
         return self
 
     @property

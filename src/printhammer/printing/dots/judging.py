@@ -128,7 +128,8 @@ class Limits(Declared):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0.0:
                 raise InputError(
-                    f"limits: {name} = {value!r}{unit} is expected to be a number not below 0",
+                    f"limits: {name} = {value!r}{unit}",
+                    expected="a number not below 0",
                     key=f"limits.{name}",
                     value=value,
                 )

@@ -47,13 +47,9 @@ class Paper(Declared):
             most = 1.0 / _WIDEST if name == "stiffness" else math.inf
             if not (math.isfinite(value) and 0.0 <= value < most):
                 limit = " and below 1/3" if name == "stiffness" else ""
-                raise InputError.of(
-                    name, value, f"a number not below 0{limit}", file="paper", said=" is expected to be"
-                )
+                raise InputError.of(name, value, f"a number not below 0{limit}", file="paper")
         if type(self.seed) is not int or self.seed < 0:
-            raise InputError.of(
-                "seed", self.seed, "a whole number not below 0", file="paper", said=" is expected to be"
-            )
+            raise InputError.of("seed", self.seed, "a whole number not below 0", file="paper")
 
     @classmethod
     def load(cls, path: str | Path) -> Paper:

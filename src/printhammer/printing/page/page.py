@@ -382,7 +382,7 @@ def print_page(
     """
     pattern = Pattern.from_text(what) if isinstance(what, str) else what
     if not isinstance(pattern, Pattern):
-        raise InputError(f"{what!r} is expected to be a pattern or a text", value=what, key="pattern")
+        raise InputError(f"{what!r}", expected="a pattern or a text", value=what, key="pattern")
     slot_rate = read_positive(rate, "Hz", "rate")
     if pattern.wanted > _MOST_DOTS:
         raise InputError(f"{pattern.wanted} dots are wanted", key="pattern", expected=f"{_MOST_DOTS} at most")

@@ -285,7 +285,7 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
         if key not in constants:
             raise unknown(key, constants, f"{hammer.path}: spread")
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1.0:
-            raise InputError.of(f"spread of {key}", value, "from 0 to below 1", said=" is expected to be")
+            raise InputError.of(f"spread of {key}", value, "from 0 to below 1")
     varying = {key: float(value) for key, value in wanted.items() if value > 0.0}
     if not varying:
         raise InputError("spreads: expected at least one constant that varies", key="spreads")

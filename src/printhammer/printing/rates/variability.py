@@ -68,9 +68,7 @@ def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
     changes: dict[str, Any] = {}
     for key, value in asdict(by).items():
         if not math.isfinite(value) or (key != "travel" and value <= -1.0):
-            raise InputError.of(
-                key, value, "finite and above -1", file="perturbation", said=" is expected to be"
-            )
+            raise InputError.of(key, value, "finite and above -1", file="perturbation")
     magnet, pack, backstop = hammer.magnet, hammer.pack, hammer.backstop
     if by.current or by.magnet:
         if not isinstance(magnet, InverseRootMagnet):
@@ -170,9 +168,7 @@ class Variability(Declared):
             most = math.inf if name == "travel" else 1.0 / WIDEST
             if not (math.isfinite(value) and 0.0 <= value < most):
                 limit = "" if name == "travel" else " and below 1/3"
-                raise InputError.of(
-                    name, value, f"a number not below 0{limit}", file="variability", said=" is expected to be"
-                )
+                raise InputError.of(name, value, f"a number not below 0{limit}", file="variability")
 
     @classmethod
     def of(cls, hammer: Hammer) -> Variability:

@@ -274,7 +274,7 @@ def _fault(error: ValidationError, model: type[_Table]) -> InputError:
     if fault["type"] == "missing":
         return InputError(f"{key} is missing", key=key)
     if fault["type"] == "extra_forbidden":
-        place = f", expected one of {', '.join(model.model_fields)}" if len(steps) == 1 else ""
+        place = f": expected one of {', '.join(model.model_fields)}" if len(steps) == 1 else ""
         return InputError(f"the key {shown(key, quotes=False)} is not known{place}", key=key)
     wanted = fault["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     wanted = wanted if wanted.startswith("expected") else f"expected {wanted}"

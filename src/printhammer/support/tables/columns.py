@@ -110,7 +110,7 @@ def read_columns(text: str, where: str = "--columns") -> Columns:
     for entry in text.split(","):
         match = _ENTRY.fullmatch(entry)
         if match is None:
-            raise InputError.of(where, entry.strip(), f"entries such as {EXAMPLE}", said=": expected")
+            raise InputError.of(where, entry.strip(), f"entries such as {EXAMPLE}")
         name, value = " ".join((match["late"] or match["name"]).split()), match["value"]
         # A rate, such as "1.2 kHz", is the name of a column of a measured map.
         name = name if name[0].isdigit() else name.lower()
@@ -136,7 +136,6 @@ def read_columns(text: str, where: str = "--columns") -> Columns:
                 value,
                 "a column, counted from 1, such as '2*-10 A/V + 0.1 A'",
                 file=where,
-                said=": expected",
             )
     return Columns(sources, clock, delays, where)
 

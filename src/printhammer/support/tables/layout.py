@@ -205,7 +205,8 @@ def _heading_rows(where: str, above: list[Row], width: int) -> list[Row]:
     before = above[-2] if len(above) > 1 and len(above[-2][1]) >= width else None
     if numbers and (is_number(last[0].strip()) or (before and any(map(_is_named, before[1])))):
         raise InputError(
-            f"{where}: line {line}: {','.join(last)[:60]!r} is expected to hold numbers only",
+            f"{where}: line {line}: {','.join(last)[:60]!r}",
+            expected="numbers only",
             file=where,
             key=f"line {line}",
             value=",".join(last),

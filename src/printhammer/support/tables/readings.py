@@ -284,7 +284,8 @@ def _by_heading(
         such = f"{name} [{numbers[name]}]"
         if not heading.unit:
             raise InputError(
-                f"{where}: heading {heading.shown!r} is expected to carry its unit, such as {such!r}",
+                f"{where}: heading {heading.shown!r}",
+                expected=f"a heading with a unit, such as {such!r}",
                 file=where,
                 key=heading.shown,
             )

@@ -61,12 +61,10 @@ class PositionSensor(Declared):
             least = "above" if name == "interval" else "not below"
             if not (math.isfinite(value) and value >= 0.0 and (value > 0.0 or name != "interval")):
                 raise InputError(
-                    f"sensor: {name} = {value!r}{unit} is expected to be a number {least} 0", key="sensor"
+                    f"sensor: {name} = {value!r}{unit}", expected=f"a number {least} 0", key="sensor"
                 )
         if type(self.seed) is not int or self.seed < 0:
-            raise InputError.of(
-                "seed", self.seed, "a whole number not below 0", file="sensor", said=" is expected to be"
-            )
+            raise InputError.of("seed", self.seed, "a whole number not below 0", file="sensor")
 
     @property
     def error(self) -> float:
