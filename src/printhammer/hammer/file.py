@@ -166,7 +166,6 @@ def _build(
             texts["strike"],
             "a noun in lower case whose plural ends in s, such as 'closing'",
             written=shown(texts["strike"]),
-            said=": expected",
         )
     constants: dict[str, Constant] = {}
     top = {key: document[key] for key in quantities(Body) if key in document}
