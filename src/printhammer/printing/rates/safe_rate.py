@@ -59,7 +59,7 @@ MOST_RATES: Final = 10_000  # Largest number of rates in a grid
 _AT_FIRST: Final = 2  # Number of rates in the first ensemble, doubled from one to the next; arbitrary
 _FEW: Final = 3  # Number of slots of the patterns that are simulated first
 _AT_ONCE: Final = 16  # Largest number of rates per ensemble
-_HAMMERS_AT_ONCE: Final = 32
+_HAMMERS_AT_ONCE: Final = 32  # Number of hammers per ensemble
 
 
 class Failure(Declared):
