@@ -1,4 +1,4 @@
-"""Constants of a coil from exports of oscilloscopes: inverted, scaled and delayed columns give the truth.
+"""Constants from exports of oscilloscopes: inverted, scaled and delayed columns give the truth.
 
 A locked coil of R and L on a rail V: i = V/R (1 - exp(-R t / L)).
 """
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.hammers import CRUDE
 
 import printhammer as ph
 
@@ -66,3 +67,37 @@ def test_a_coil_from_an_export(tmp_path: Path, made: object) -> None:
             assert found[name].value == pytest.approx(truth, rel=0.02)
     # Of four intervals of 95 %, two outside have a chance of 1.4 %.
     assert sum(inside) >= 3
+
+
+SCALES = "displacement={}*-50 um/V+120 um, current={}*-10 A/V, delay(displacement)=3 us, delay(current)=2 us"
+
+
+@pytest.mark.parametrize("scope", ["picoscope", "tektronix"])
+def test_a_mass_from_an_export(tmp_path: Path, scope: str) -> None:
+    hammer = ph.load(CRUDE)
+    shot = ph.measure("motion", hammer, seed=34)
+    path = tmp_path / "shot.csv"
+    shot.write(path)
+    rows = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    assert rows[0] == "time [us],displacement [um],current [A]"
+    time, way, amperes = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]]).T
+    # What the two probes show: both inverted, 20 mV/um with an offset and 0.1 V/A, each late.
+    volts = np.column_stack(
+        [-(np.interp(time - 3.0, time, way) - 120.0) / 50.0, -0.1 * np.interp(time - 2.0, time, amperes)]
+    )
+    if scope == "picoscope":
+        body = "".join(
+            f"{1e-3 * t:.6f};{1e3 * a:.5f};{1e3 * b:.5f}\n" for t, (a, b) in zip(time, volts, strict=True)
+        )
+        path.write_text("Zeit;Kanal A;Kanal B\n(ms);(mV);(mV)\n\n" + body.replace(".", ","))
+        columns = "time=1, " + SCALES.format(2, 3)
+    else:
+        body = "".join(f"{1e-6 * t:.8e},{a:.8e},{b:.8e}\n" for t, (a, b) in zip(time, volts, strict=True))
+        path.write_text("Model,MSO54\nHorizontal Units,s,,\nVertical Units,V,V,\n\nTIME,CH1,CH2\n" + body)
+        columns = SCALES.format(2, 3)
+    start = hammer.replace("mass", 0.85 * hammer.mass)
+    found = ph.fit("motion", path, hammer=start, columns=columns, bandwidth="200 kHz")
+    assert not found.rejected
+    for name in ("mass", "backstop.damping"):
+        low, high = found[name].interval
+        assert low <= hammer.constants[name].si <= high

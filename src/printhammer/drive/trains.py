@@ -69,7 +69,7 @@ class PulseTrain(_Pulsed):
     Parameters
     ----------
     waveform
-        Waveform of every firing.
+        Waveform of every firing; None, as of a hammer without a waveform, is refused.
     rate, period
         Firings per second, Hz, or the time between them, s; one of the two.
     at
@@ -90,7 +90,7 @@ class PulseTrain(_Pulsed):
 
     def __init__(
         self,
-        waveform: Waveform,
+        waveform: Waveform | None,
         *,
         rate: float | str | None = None,
         period: float | str | None = None,
@@ -99,6 +99,10 @@ class PulseTrain(_Pulsed):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> None:
+        if waveform is None:
+            raise InputError.of(
+                "waveform", None, "a waveform, the hammer has none", said=" is expected to be"
+            )
         ways = [name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None]
         if len(ways) > 1:
             raise InputError(

@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from printhammer.drive.input import read_positive
 from printhammer.errors import InputError, located, nearest
 from printhammer.hammer.hammer import Hammer
 from printhammer.hammer.uncertainty import Uncertainty
@@ -170,7 +171,7 @@ def fit_motion(
     *,
     free: Sequence[str] | None = None,
     robust: bool = True,
-    bandwidth: float | None = None,
+    bandwidth: float | str | None = None,
     columns: str | None = None,
     earlier: Sequence[Fit] = (),
 ) -> Fit:
@@ -198,7 +199,7 @@ def fit_motion(
     columns : str, optional
         Contents of the table's columns, such as "time=1, displacement=2*50 um/V"; by default as described in
         a file beside the table, else by its heading; see `printhammer.support.tables.columns`.
-    bandwidth : float, optional
+    bandwidth : float or str, optional
         Bandwidth of the sensor (-3 dB), Hz; by default that of a comment ``# bandwidth: 200 kHz`` in the
         record, else unlimited. The current probe is assumed to have the same bandwidth.
     earlier : sequence of Fit, optional
@@ -217,11 +218,10 @@ def fit_motion(
     """
     if isinstance(paths, str) or not paths:
         raise InputError.of("paths", paths, "a sequence of at least one record")
-    if bandwidth is not None and not (np.isfinite(bandwidth) and bandwidth > 0.0):
-        raise InputError.of("bandwidth", bandwidth, "a positive number", unit="Hz")
+    width = None if bandwidth is None else read_positive(bandwidth, "Hz", "bandwidth")
     for each in reversed(earlier):
         hammer = each.into(hammer)
-    shots = [read_shot(path, hammer, bandwidth, columns) for path in paths]
+    shots = [read_shot(path, hammer, width, columns) for path in paths]
     records = _unused(paths, hammer)
     touched = any(shot.touching("backstop") for shot in shots)
     keys = _free_keys(hammer, free, shots, touched=touched)
