@@ -84,6 +84,7 @@ def recorded_impacts(
     signal: Signal = "current",
     delay: float | str = 0.0,
     bandwidth: float | str | None = None,
+    columns: str | None = None,
 ) -> RecordedImpacts:
     """Estimate the impact times in records of single shots from rest, fired at time 0.
 
@@ -102,6 +103,9 @@ def recorded_impacts(
         Delay of the probe, s.
     bandwidth : float or str, optional
         Bandwidth of the probe, Hz; by default that of a comment ``# bandwidth: 200 kHz``, else unlimited.
+    columns : str, optional
+        Contents of the columns of all tables, such as "time=1, current=2*-10 A/V"; by default as described in
+        a file beside each table, else by its heading; see `printhammer.support.tables.columns`.
 
     Raises
     ------
@@ -115,7 +119,7 @@ def recorded_impacts(
     estimates, errors, flight = [], [], math.nan
     units = Variability.of(hammer).draw(hammer, _UNITS, 0)
     for path in paths:
-        table = read_table(path, {"time": "s", signal: UNITS[signal]})
+        table = read_table(path, {"time": "s", signal: UNITS[signal]}, columns=columns)
         table.check_times()
         estimator = _estimator(hammer, table, signal, late, bandwidth_of(table) if width is None else width)
         t, values = table.values["time"], table.values[signal]

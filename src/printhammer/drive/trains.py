@@ -100,9 +100,7 @@ class PulseTrain(_Pulsed):
         start: float | str = 0.0,
     ) -> None:
         if waveform is None:
-            raise InputError.of(
-                "waveform", None, "a waveform, the hammer has none", said=" is expected to be"
-            )
+            raise InputError.of("waveform", None, "a waveform")
         ways = [name for name, value in (("rate", rate), ("period", period), ("at", at)) if value is not None]
         if len(ways) > 1:
             raise InputError(

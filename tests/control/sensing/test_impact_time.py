@@ -223,6 +223,14 @@ def test_impacts_in_recorded_files(wire: ph.Hammer, tmp_path: Path) -> None:
     assert set(impacts.flag) == {""}
     assert (impacts.uncertainty > 1e-6).all()
     assert (impacts.uncertainty < 5e-6).all()
+    # As an oscilloscope shows it, by a clamp that is inverted and 3 us late.
+    rows = [line.split(",") for line in paths[0].read_text("utf-8").splitlines() if line[:1] in "-0123456789"]
+    body = "".join(f"{float(t) + 3.0};{-0.1 * float(i):.7f}\n" for t, i in rows)
+    scope = tmp_path / "scope.csv"
+    scope.write_text("Time;Channel A\n(us);(V)\n\n" + body, "utf-8")
+    columns = "time=1, current=2*-10 A/V, delay(current)=3 us"
+    shown = recorded_impacts(wire, [scope], bandwidth="100 kHz", columns=columns)
+    assert shown.time[0] == pytest.approx(impacts.time[0], abs=2e-7)
     paths[0].write_text("time [us],current [A]\n" + "\n".join(f"{k},0.5" for k in range(90)), "utf-8")
     with refused("time"):
         recorded_impacts(wire, paths)

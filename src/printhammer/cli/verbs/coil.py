@@ -89,6 +89,9 @@ def impact_time(
         "Record of one shot, columns time, current or voltage: estimate its impact time instead; repeatable.",
         many=True,
     ),
+    columns: str | None = opt.text(
+        "COLUMNS", "Columns of the records, e.g. 'time=1, current=2*-10 A/V' (default: their headings)."
+    ),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
@@ -96,12 +99,14 @@ def impact_time(
     from printhammer.control.impact_estimator import UNITS
     from printhammer.control.impact_time import impact_time as studied
 
+    if columns is not None and not record:
+        raise InputError.of("--columns", columns, "it beside --record only", written=columns)
     if record:
         from printhammer.control.recorded_impacts import recorded_impacts
 
         opt.refuse({"noise": noise, "sampling-rate": sampling_rate, "bits": bits}, "none beside --record")
         probe = {name: passed[name] for name in ("signal", "delay", "bandwidth") if name in passed}
-        impacts = recorded_impacts(hammer, record, **probe)
+        impacts = recorded_impacts(hammer, record, columns=columns, **probe)
         return Answer(render(impacts.summary(), units), files={"out": Content.of(impacts)})
     grids: dict[str, Any] = {
         "noise": opt.between(noise, UNITS[passed.get("signal", "current")], "--noise"),
