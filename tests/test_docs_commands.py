@@ -49,7 +49,7 @@ def test_the_commands_on_a_page_can_be_read(page: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["engineer", "data_sheet", "chaos", "developer"])
+@pytest.mark.parametrize("name", ["engineer", "oscilloscope", "data_sheet", "chaos", "developer"])
 def test_the_commands_of_a_tutorial_run(name: str, tmp_path: Path) -> None:
     page = ROOT / "docs" / "tutorials" / f"{name}.md"
     done = subprocess.run(
