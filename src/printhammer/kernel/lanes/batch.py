@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 
 class Batch(NamedTuple):
-    """M members.
+    """Inputs of M members.
 
     Attributes
     ----------
@@ -15,13 +15,13 @@ class Batch(NamedTuple):
     hammers, controls, bounds : float64 array, shape (H, any), (H, 4), (H, 4)
         As in :class:`printhammer.kernel.single.carry.Setup`.
     piece_starts, pieces
-        Pieces of all sets of waveforms one after the other, and the first of each set.
+        Concatenated pieces of all sets of waveforms, and the index of the first piece of each set.
     rates : float64 array, shape (W, 3)
         Rates of the two exponentials and angular frequency of the sine in the waveforms of each set; for
         lanes.
     firing_starts, firings, begins
-        Firing times [s] and first pieces of all members one after the other, and the first of each; pieces
-        are counted within the member's set.
+        Concatenated firing times [s] and first pieces of all members, and the start index of each member;
+        pieces are counted within the member's set.
     replace : bool
         Whether a firing cuts off the pulses before it.
     states : float64 array, shape (M, 8)
@@ -56,7 +56,7 @@ class Kept(NamedTuple):
     Attributes
     ----------
     strobe_starts, strobe_times
-        Ascending times [s] of all members one after the other, and the first of each.
+        Concatenated ascending times [s] of all members, and the start index of each member.
     grid : float64 array, shape (T,)
         Times of the pictures, ascending [s]; may be empty.
     want_dots : bool
@@ -66,8 +66,8 @@ class Kept(NamedTuple):
     extra : int64 array, shape (M,)
         Number of extra contacts.
     dot_starts, dots
-        Rows of :mod:`printhammer.kernel.model.dots` of all members one after the other, and the first of
-        each: the firings of the member, then its extra contacts as far as there is room.
+        Concatenated rows of :mod:`printhammer.kernel.model.dots` of all members, and the start index of each
+        member: the firings of the member, then its extra contacts as far as there is room.
     strobes : float64 array, shape (strobe times, 4), with a coil circuit (strobe times, 7)
         See :mod:`printhammer.kernel.single.stretch`.
     x : float32 array, shape (M, T)

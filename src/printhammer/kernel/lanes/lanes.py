@@ -266,12 +266,12 @@ def lanes(
     spare : int64 array, shape (LANES,)
         Working space.
     left_over : int64 array, shape of `which`
-        Filled with the numbers of the members that the lanes are not for.
+        Filled with the indices of the members that the lanes do not support.
 
     Returns
     -------
     int
-        How many these are.
+        Number of these members.
     """
     left = 0
     waiting = 0

@@ -3,7 +3,8 @@
 The laws of the parts are compiled for lanes with this module in the place of :mod:`math`. Sources: Cody and
 Waite, Software Manual for the Elementary Functions (1980), for the reductions; the polynomials are Taylor and
 atanh series, long enough for the reduced range. Relative errors: exp and log 2e-16, pow 2e-16 (1 + |y ln x|);
-sin and cos have that of rounding their argument. What `math` would refuse gives NaN or an infinity.
+sin and cos have that of rounding their argument. Arguments outside the domain, for which `math` raises, give
+NaN or an infinity.
 """
 
 from __future__ import annotations

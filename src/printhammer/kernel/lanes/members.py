@@ -1,4 +1,4 @@
-"""Scalar loop over members: each run goes to its end, only requested results are stored.
+"""Scalar loop over members: each run goes to its end, and only requested results are stored.
 
 A run is integrated in stretches that fit the working space; after each, dots, strobes and samples are
 extracted from its record.
@@ -53,9 +53,9 @@ def members(
     Parameters
     ----------
     which : int64 array
-        Numbers of the members.
+        Indices of the members.
     batch, kept : Batch, Kept
-        The members, and what to keep of them.
+        The members, and their requested results.
     under_way, live : array, shape (2, any)
         Working space as in :func:`printhammer.kernel.single.run.run`, for the run and for its record.
     nodes, contacts, carry
@@ -64,7 +64,8 @@ def members(
     Returns
     -------
     int
-        How many of `which` are done; fewer than all where the working space is too small for the next.
+        Number of members of `which` that are done; fewer than all if the working space is too small for the
+        next.
     """
     grid, states, bounds = kept.grid, batch.states, batch.bounds
     for number in range(which.size):

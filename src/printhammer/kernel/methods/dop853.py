@@ -38,14 +38,14 @@ Point = Any
 """Time, displacement or w, velocity, and the electric state where there is a circuit."""
 
 VANISHING = 1e-280
-"""Sum of squares of error estimates below which an estimate stands for itself."""
+"""Sum of squares of error estimates below which the estimate of order 5 is used alone."""
 
 
 @compiled
 def combined_error(e5: float, e3: float) -> float:
     """Combine the estimates of order 5 and 3 into one of order 7 (Hairer, Norsett, Wanner, II.10)."""
     square = e5 * e5 + 0.01 * e3 * e3
-    # The squares of what has decayed to 1e-150 vanish; a NaN stays one.
+    # The squares of a decayed 1e-150 underflow; a NaN stays NaN.
     if square < VANISHING:
         return abs(e5)
     return e5 * e5 / math.sqrt(square)
@@ -53,7 +53,7 @@ def combined_error(e5: float, e3: float) -> float:
 
 @inlined
 def plus(total: Point, c: float, k: Point) -> Point:
-    """Return a sum of slopes and one more, times its weight."""
+    """Add a slope times its weight to a sum of slopes."""
     if HAS_CIRCUIT:
         return (
             total[0] + c * k[0],
@@ -68,7 +68,7 @@ def plus(total: Point, c: float, k: Point) -> Point:
 
 @inlined
 def _sum1(c: Numbers, k1: Point) -> Point:
-    """Return the first slope times its weight; the functions that follow add up more."""
+    """Multiply the first slope by its weight; the functions that follow add up more."""
     if HAS_CIRCUIT:
         return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2], c[0] * k1[3], c[0] * k1[4], c[0] * k1[5]
     return c[0] * k1[0], c[0] * k1[1], c[0] * k1[2]
@@ -144,7 +144,7 @@ def along(y: Point, h: float, slope: Point) -> Point:
 
 @inlined
 def point(t: float, place: float, v: float, drive: Drive) -> Point:
-    """Return a state, of which the electric part comes with the drive."""
+    """Return a state with the electric part of the drive."""
     if HAS_CIRCUIT:
         electric = drive[1]
         return t, place, v, electric[0], electric[1], electric[2]
@@ -162,7 +162,7 @@ def electric_of(y: Point) -> Electric:
 # In line at every stage, a coil's circuit would make the machine code seven times as long to compile.
 @(called if HAS_CIRCUIT else inlined)
 def time_slope(t: float, y: Point, law: ForceLaw) -> Point:
-    """Return the rates of time, position and velocity; `t` is exact where the time in `y` is a sum."""
+    """Return the rates of time, position and velocity; `t` replaces the rounded time in `y`."""
     mode, memory, hammer, drive = law
     if HAS_CIRCUIT:
         electric = electric_of(y)
@@ -188,7 +188,7 @@ def contact_slope(y: Point, hammer: Hammer, drive: Drive) -> Point:
 
 @inlined
 def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
-    """Return the slopes at the start of a step, of which the first three are known."""
+    """Return the slopes at the start of a step, with the first three passed."""
     if HAS_CIRCUIT:
         rates = electric_rates(y[0], y[1], y[2], electric_of(y), law.hammer, law.drive[0])
         if M.RESTING <= law.mode <= M.HELD_UNLOADING:
@@ -199,7 +199,7 @@ def slope_at(y: Point, place_rate: float, rate: float, law: ForceLaw) -> Point:
 
 @inlined
 def contact_slope_at(y: Point, rate: float, hammer: Hammer, drive: Drive) -> Point:
-    """Return the slopes at the start of a step in the backstop, of which the first three are known."""
+    """Return the slopes at the start of a step in the backstop, with the first three passed."""
     pace = 2.0 * y[1]
     if HAS_CIRCUIT:
         x = hammer[POSITION] - y[1] * y[1]
@@ -227,7 +227,7 @@ def electric_error(e5: Point, e3: Point, h: float, hammer: Hammer) -> float:
 def whole_time_step(
     t0: float, x0: float, v0: float, a0: float, h: float, law: ForceLaw
 ) -> tuple[float, float, float, float, float, Electric, float]:
-    """Do as `time_step`; return also the electric state at the end, and its error in units of its scales."""
+    """Like `time_step`, with the electric state at the end, and its error in units of its scales."""
     y = point(t0, x0, v0, law.drive)
     k1 = slope_at(y, v0, a0, law)
     y2 = along(y, h, _sum1(T.A02, k1))
@@ -280,7 +280,7 @@ def time_step(
 def whole_contact_step(
     t0: float, w0: float, v0: float, kv0: float, h: float, hammer: Hammer, drive: Drive, scales: Any
 ) -> tuple[float, float, float, float, float, Electric]:
-    """Do as `contact_step`; return also the electric state, whose error is part of the estimate."""
+    """Like `contact_step`, with the electric state, whose error is part of the estimate."""
     y = point(t0, w0, v0, drive)
     k1 = contact_slope_at(y, kv0, hammer, drive)
     k2 = contact_slope(along(y, h, _sum1(T.A02, k1)), hammer, drive)

@@ -1,7 +1,7 @@
 """Results of one stretch of a run: dots, strobes and samples, extracted from its record.
 
-A strobe is the whole state at an instant: displacement [m], velocity [m/s], mode, and what the mode
-remembers, the latest local maximum in the pack [m].
+A strobe is the whole state at an instant: displacement [m], velocity [m/s], mode, and the memory of the mode,
+the latest local maximum in the pack [m].
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def open_dot(
     -------
     tuple
         Index of the row, -1 if the contact belongs to no firing or there is no row left for it; and the
-        number of extra contacts so far, given as `extra` before.
+        updated number of extra contacts, `extra` before.
     """
     fired = firing_before(t, firings)
     earlier = int(dots[fired, D.CONTACTS]) if fired >= 0 else 0
@@ -108,7 +108,7 @@ def note_dots(
 ) -> int:
     """Write the pack contacts of a stretch to the rows of its member.
 
-    Returns the number of its extra contacts so far, given as `extra` before.
+    Returns the updated number of its extra contacts, `extra` before.
     """
     for number in range(contacts.shape[0]):
         contact = contacts[number]
@@ -142,8 +142,8 @@ def note_states(
 ) -> tuple[int, int]:
     """Fill strobes and samples from the indices `strobe` and `sample` on, up to the end of a stretch.
 
-    An instant at which a stretch ends belongs to the next one, if there is one. Returns the numbers of the
-    first strobe and sample that are left.
+    An instant at which a stretch ends belongs to the next stretch, if there is one. Returns the indices of
+    the first remaining strobe and sample.
     """
     n = nodes.shape[0]
     first, last, _edge = edges_at(nodes[0, 0], train)

@@ -57,15 +57,15 @@ def force_slopes(
 ) -> tuple[float, float, float, float, float, float]:
     """Return the derivatives of the forces at `y`: with displacement or w, velocity, time.
 
-    `peaks` is what the unloading branch needs of local maxima about `peak`, as `note_memories` has it.
+    `peaks` are the memories of local maxima about `peak` for the unloading branch, from `note_memories`.
 
     Returns
     -------
     tuple of float
-        Of magnet and spring force with displacement, at a fixed flux linkage if there is one; of the push of
-        the contact that is closed with displacement, velocity and latest local maximum; of what of it is lost
-        for good, with displacement and velocity. In the backstop those with displacement are times 2 w, but
-        for the first.
+        Slope of magnet and spring force with displacement, at a fixed flux linkage if there is one; slopes of
+        the push of the closed contact with displacement, velocity and latest local maximum; slopes of its
+        dissipative part with displacement and velocity. In the backstop all slopes with displacement, except
+        the first, are multiplied by 2 w.
     """
     scales, hammer = setting.scales, setting.hammer
     if HAS_BACKSTOP and mode == BACKSTOP:

@@ -1,6 +1,6 @@
 """Columns of a variational equation propagated along a recorded run, in a second pass over its nodes.
 
-A run that does not ask for them pays nothing.
+Runs without columns have no overhead.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def flow(
     Parameters
     ----------
     nodes, train, hammer
-        As recorded by :func:`printhammer.kernel.single.run.run` and given in its setup.
+        As recorded by :func:`printhammer.kernel.single.run.run` and passed in its setup.
     scales : tuple of float
         Scales of displacement and velocity.
     bounds : tuple of float
@@ -202,17 +202,17 @@ def flow(
     forced_by : tuple
         A plain tuple of the fields of `printhammer.kernel.variational.layout.Forcing`; else an empty one.
     marks : float64 array, shape (m,)
-        Ascending times [s]; at an instant of a switch: after it.
+        Ascending times [s]; at the instant of a switch, the time after it.
     wanted : int64 array, shape (q,)
-        Ascending numbers of nodes of the stretch.
+        Ascending indices of nodes of the stretch.
     renormalise : bool
-        Whether to make the columns orthonormal at every node and to note their growth instead.
+        Whether to orthonormalise the columns at every node, and record their growth.
     ended : bool
         Whether the run ends with the stretch; otherwise a mark at its end belongs to the next one.
     initial : float64 array, shape (3, n), with a circuit (6, n)
         Changes of displacement, velocity and latest local maximum at the first mark; of the electric state.
     carried : Carried
-        The columns, and what is noted of them.
+        The columns, with their recorded values.
     """
     train = Train(*train)
     # Without forcing no trace of it may pass through the calls: that alone would cost a tenth.

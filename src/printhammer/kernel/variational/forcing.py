@@ -1,10 +1,10 @@
 """Forcing of the variational equations: derivatives of the forces with constants, at a fixed state.
 
 The slope a_c of the acceleration with a constant is added to the rate of dv, and each energy grows by the
-change of its power. In the backstop the force is a function of w = sqrt(b - x), whose change is that of place
-and position, 2 w dw = db - dx; in the pack one of the depth. The derivation is in docs/tangent.md. Constants
-are changed where the laws read them, in the array of the hammer's constants, so that a part need not state
-what its constants do.
+change of its power. In the backstop the force is a function of w = sqrt(b - x), whose change follows from
+those of displacement and position, 2 w dw = db - dx; in the pack the force is a function of the depth. The
+derivation is in docs/tangent.md. Constants are changed in the array that the laws read, so that a part need
+not declare their effect.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ if TYPE_CHECKING:
 
 @compiled
 def set_live_moves(first: int, last: int, train: Train, forcing: Forcing) -> None:
-    """Rewrite the changes of the pieces under way, in the order in which `pass_edges` has them."""
+    """Rewrite the changes of the active pieces, in the order of `pass_edges`."""
     fire_moves, piece_moves, live_moves = forcing.fire_moves, forcing.piece_moves, forcing.live_moves
     for k in range(fire_moves.shape[0]):
         j = 0

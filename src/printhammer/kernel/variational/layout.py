@@ -53,20 +53,20 @@ DELAYED = 5
 
 
 class Forcing(NamedTuple):
-    """What n constants change, and working space for it; an empty tuple stands for it where nothing does.
+    """Changes of the kernel's arrays with n constants, and working space; an empty tuple without constants.
 
     Attributes
     ----------
     varied, moves : float64 arrays, shapes (n, 9, h) and (n, h)
         The hammer's constants moved by -4 to 4 times `SPACING` of their changes, and the changes.
     of_hammer : int64 array, shape (n,)
-        Which laws a column changes, a sum of bits.
+        Laws that a column changes, as a sum of bits.
     fire_moves, piece_moves : float64 arrays, shapes (n, f) and (n, m, 6)
         Changes of the firing times [s] and of the waveforms' tables.
     live_moves, memories : float64 arrays, shapes (n, 5 f) and (n, 9)
         Working space.
     value_spacing : float
-        By how much the drive is moved to see what it does to the force [A or N].
+        Step of the drive for the derivative of the force [A or N].
     """
 
     varied: Any
@@ -87,18 +87,18 @@ class Carried(NamedTuple):
     Attributes
     ----------
     columns : float64 array, shape (r, n)
-        Those at the end of the stretch or at the last mark.
+        Columns at the end of the stretch or at the last mark.
     work : float64 array, shape (15, `work_width`)
         Working space.
     track : float64 array, shape (2 + n,)
-        Zeros, but one at place 1, before the first stretch; what is needed to go on afterwards, at place 1
-        whether the motion is differentiable so far.
+        Before the first stretch zeros, except a one at index 1; afterwards the data for the next stretch,
+        with at index 1 whether the motion is differentiable so far.
     states : float64 array, shape (m, 4), with a circuit (m, 8)
         Displacement, velocity, mode and latest local maximum at the marks; electric state and path.
     changes, growth : float64 array, shapes (m, r, n) and (m, n)
-        The columns at the marks, and the logarithms of their growth since the mark before.
+        Columns at the marks, and the logarithms of their growth since the mark before.
     passed : float64 array, shape (q, 2, r, n)
-        The columns at the wanted nodes before the switch there and after it.
+        Columns at the requested nodes, before and after the switch there.
     """
 
     columns: Any

@@ -1,8 +1,8 @@
 """Derivatives of the force laws, by differences of fourth order on one side of every kink.
 
-A part need not state its derivatives. In the middle of a law's range the five-point formula is central, at an
-end of the range, at a surface and beside a kink it is one-sided. The spacings below make the truncation and
-the rounding about equally small, some 1e-12 of the slope. M. Abramowitz and I. A. Stegun, *Handbook of
+A part need not define its derivatives. In the middle of a law's range the five-point formula is central; at
+an end of the range, at a surface and beside a kink it is one-sided. The spacings below make truncation and
+rounding errors about equal, some 1e-12 of the slope. M. Abramowitz and I. A. Stegun, *Handbook of
 Mathematical Functions* (1964), table 25.2.
 """
 
@@ -105,8 +105,8 @@ def pack_slopes(
 ) -> tuple[float, float]:
     """Return the slopes of the pack force with displacement [N/m] and velocity [N s/m].
 
-    On an unloading branch, with its local maximum `peak`, nothing beyond that is looked at: the branch goes
-    with so high a power of the depth that in a shallow contact it would hide what is within.
+    On an unloading branch, with its local maximum `peak`, the law is not evaluated beyond the maximum: the
+    branch has so high a power of the depth that in a shallow contact it would dominate the differences.
     """
     front = hammer[FRONT]
     x = max(x, front)
@@ -181,7 +181,7 @@ def contact_force(w: float, v: float, hammer: Hammer) -> float:
 def contact_slopes(w: float, v: float, scales: Any, hammer: Hammer) -> tuple[float, float, float, float]:
     """Return the slopes of the backstop's force with w [N/m^0.5] and with velocity [N s/m].
 
-    Then, where constants force the columns, those of its viscous part.
+    If constants force the columns, also the slopes of its viscous part.
     """
     c = hammer[BACKSTOP_PART:MAGNET]
     w = max(w, 0.0)

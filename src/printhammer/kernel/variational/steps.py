@@ -87,8 +87,8 @@ def length_in_contact(
 ) -> float:
     """Return the s, from a state in the backstop at time `t0`, of the time `t` [s].
 
-    As `printhammer.kernel.methods.contact.s_at`, but content with what the variation needs. Where it
-    `leaves` at `t`, w = 0 is solved for in the end: the time stands still there.
+    As `printhammer.kernel.methods.contact.s_at`, with the accuracy that the variation needs. If the armature
+    `leaves` at `t`, w = 0 is solved for, since dt/ds = 0 there.
     """
     kv0 = contact_rate(w0, v0, t0, hammer, drive)
     s, change = 0.0, math.inf
@@ -134,8 +134,8 @@ def place_of_rest(t: float, node: Any, k: int, columns: Any, setting: Setting) -
 def settle(pause: float, node: Any, columns: Any, setting: Setting) -> float:
     """Let the columns decay for `pause` [s] about a rest position in the backstop.
 
-    The linear oscillator with the slopes of that place, in closed form. Returns the logarithm of a factor
-    taken out of the columns.
+    The decay is that of the linear oscillator with the slopes at the rest position, in closed form. Returns
+    the logarithm of a factor taken out of the columns.
     """
     scales, bounds, hammer = setting.scales, setting.bounds, setting.hammer
     x, w = node[1], node[4]
@@ -192,8 +192,8 @@ def rest(t: float, t_to: float, node: Any, columns: Any, setting: Setting) -> fl
 def rest_with_current(t: float, t_to: float, node: Any, columns: Any, work: Any, setting: Setting) -> float:
     """Propagate the columns through a rest from `t` to `t_to` [s] while the circuit evolves.
 
-    An armature held in the backstop still moves about its place; anywhere else it stays there. Returns the
-    logarithm of a factor taken out of the columns.
+    An armature held in the backstop still oscillates about its rest position; elsewhere it does not move.
+    Returns the logarithm of a factor taken out of the columns.
     """
     hammer, live = setting.hammer, setting.drive
     mode, grown = int(node[3]), 0.0

@@ -1,7 +1,7 @@
 """Derivatives of the coil circuit with constants: the forcing of its rows, and moving edges.
 
 At a fixed state and time the rates of the electric state change with the resistances, the voltages and the
-current that a linkage makes; an edge that comes later lets the rates before it last longer.
+current of a linkage; a later edge prolongs the rates before it.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def add_supply(rates: Any, y: Any, count: int, x: float, setting: Setting) -> No
 
 @compiled
 def latest_edge(t: float, train: Train, first: int, last: int) -> tuple[int, int]:
-    """Return pulse and piece that begin latest of those that `pass_edges` has still to pass; or -1."""
+    """Return pulse and piece of the latest edge that `pass_edges` has still to pass; or -1."""
     pulse, begun = -1, -1
     for p in range(first, last):
         piece = train.under_way[p]
