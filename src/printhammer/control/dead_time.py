@@ -162,7 +162,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         return f"dead time of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate the times over rail and temperature, and state where no width gives the blow."""
+        """Tabulate the times over rail and temperature, and state where no width gives the impact speed."""
         own = f"{quantity(self.own_width, 's')}, impact after {quantity(self.own_time, 's')}"
         rail, coil = np.meshgrid(self.voltage, self.temperature, indexing="ij")
         columns = [
@@ -240,7 +240,7 @@ def dead_time(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InOneThread],
 ) -> DeadTime:
-    """Compute the time from switching on to impact, and the pulse width that gives the same blow.
+    """Compute the time from switching on to impact, and the pulse width of equal impact speed.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ class Group:
 
 
 class _Posed(NamedTuple):
-    """Distinct problems of the members without drives: arrays with a row each, and the row index `by`."""
+    """Distinct problems of the members, without drives: a row each, and the row `by` of each member."""
 
     constants: FloatArray
     controls: FloatArray

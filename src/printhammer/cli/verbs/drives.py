@@ -29,7 +29,8 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
             flag="--least-force",
         ),
         "largest": opt.text(
-            "CURRENT", "Limit on the magnitude of the current (default: 2 A, or what the own pulse reaches)."
+            "CURRENT",
+            "Limit on the magnitude of the current (default: 2 A, or the peak of the hammer's own pulse).",
         ),
         "slew": opt.number(
             "Limit on the slope of the current, A/s (default: steepest rise of the hammer's waveform).",
@@ -40,7 +41,7 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
         ),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Burst (.csv: its current as a sampled waveform)"),
+    out=opt.results("Burst; .csv: its current as a sampled waveform"),
 )
 def energy(
     job: Job,
@@ -109,7 +110,8 @@ def energy(
     "printhammer feedback hendriks-1983 --rate '1.6 kHz' --out feedback.png",
     {
         "current": opt.text(
-            "CURRENT", "Limit on the magnitude of the current (default: 2 A, or what the own pulse reaches)."
+            "CURRENT",
+            "Limit on the magnitude of the current (default: 2 A, or the peak of the hammer's own pulse).",
         ),
         "edge": opt.text(
             "TIME", "Time constant of the driver (default: decay time of the hammer's waveform)."

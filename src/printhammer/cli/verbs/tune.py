@@ -85,7 +85,7 @@ _MOST_RATES: Final = 2000  # Largest number of rates; arbitrary
             default="own",
         ),
         "largest_current": opt.text(
-            "CURRENT", "Limit on the current (default: 2 A, or what the own pulse reaches)."
+            "CURRENT", "Limit on the current (default: 2 A, or the peak of the hammer's own pulse)."
         ),
     },
     out=opt.results("Compensation table", ".h"),
@@ -200,7 +200,7 @@ _PANEL: Final = "The sensor"
             "Seed for the simulated hammers, and for the test unit if --unit is not given.", default=1983
         ),
         "largest_current": opt.text(
-            "CURRENT", "Limit on the current (default: 2 A, or what the own pulse reaches)."
+            "CURRENT", "Limit on the current (default: 2 A, or the peak of the hammer's own pulse)."
         ),
         "threads": opt.THREADS,
     },

@@ -99,7 +99,7 @@ class Driver(Declared):
 
 
 class BoundedSequence(PulseSequence):
-    """Pulses of a driver, with its current limit, A, as the largest value so that none is computed."""
+    """Pulses of a driver whose stated largest value is its current limit, A, rather than a computed peak."""
 
     bounded = True
 

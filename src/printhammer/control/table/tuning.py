@@ -293,7 +293,7 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
 
 
 def _bridge(draft: Draft) -> None:
-    """Retune the first rates that are not usable, as long as that makes them so; in place.
+    """Retune short gaps of unusable rates in place, from the lowest on, until a gap stays unusable.
 
     The table ends below the first rate that stays poor, so that a gap of a few rates would cost all above.
     """

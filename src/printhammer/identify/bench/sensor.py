@@ -57,7 +57,7 @@ class Amount:
         return cls(size, of)
 
     def at(self, true: FloatArray) -> FloatArray:
-        """Return the size at each true value, SI, with the shape of `true`."""
+        """Evaluate the amount at each true value, SI, with the shape of `true`."""
         if self.of == READING:
             return self.size * np.abs(true)
         return np.full(true.shape, self.size * (full_scale(true) if self.of else 1.0))

@@ -377,7 +377,7 @@ def _restitution(sheet: DataSheet) -> dict[str, Any]:
 
 
 def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Return the pack table, for the target that the armature strikes."""
+    """Build the table of the pack, which models the target that the armature strikes."""
     place = "target" if "target" in sheet.entries else "stroke"
     table: dict[str, Any] = {"law": "dashpot", "front": sheet.constant(place)}
     if "stop.stiffness" in sheet.entries:

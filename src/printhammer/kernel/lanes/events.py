@@ -155,7 +155,7 @@ def note_samples(
     x: Any,
     b: float,
 ) -> None:
-    """Store the samples of a lane's latest step before the time `until`, and with `last` at it.
+    """Store the samples of a lane's latest step up to the time `until`, which is included only if `last`.
 
     With `fine`, one more force evaluation raises the order of the samples by one.
     """
@@ -185,7 +185,7 @@ def note_strobes(
     train: Train,
     hammer: Hammer,
 ) -> None:
-    """Store the strobes of a lane's latest step before the time `until`, and with `last` at it.
+    """Store the strobes of a lane's latest step up to the time `until`, which is included only if `last`.
 
     A strobe at a node waits for the node's mode, which the next step has.
     """

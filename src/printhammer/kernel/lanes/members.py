@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @inlined
 def control_of(batch: Batch, row: int) -> Control:
-    """Return the `control` of the hammer in a row."""
+    """Return the step-size control (`Control`) of the hammer in a row."""
     controls = batch.controls
     return controls[row, 0], controls[row, 1], controls[row, 2], controls[row, 3]
 

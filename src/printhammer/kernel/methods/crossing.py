@@ -113,7 +113,7 @@ def gap_and_change(
 def land_on_gap(
     which: int, start: Any, h: float, upper: float, law: ForceLaw, control: Control
 ) -> tuple[float, float, float, float, Electric]:
-    """Return the state at which a gap closes within `upper` of a step of `h`: t, x, v, a, electric state."""
+    """Locate the closing of a gap in the first `upper` of a step of `h`: t, x, v, a, electric state."""
     t, x, v, a = start
     live = law.drive[0]
     low, high = 0.0, upper

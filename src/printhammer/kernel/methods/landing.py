@@ -71,8 +71,8 @@ def whole_step(
 def error_ratio(error_x: float, error_v: float, error_e: float, mode: int, control: Control) -> float:
     """Return the ratio of a step's error estimate to the allowance; NaN stays NaN.
 
-    That of the electric state is in units of its scales. `control` is (scale of x, scale of v, allowance of
-    the order 6 estimate, allowance of the order 7 estimate).
+    The error estimate of the electric state is in units of its scales. `control` is (scale of x, scale of v,
+    allowance of the order 6 estimate, allowance of the order 7 estimate).
     """
     ratio_x = abs(error_x) / control[0]
     ratio_v = abs(error_v) / control[1]

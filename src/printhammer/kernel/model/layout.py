@@ -1,8 +1,8 @@
 """Layout of the hammer's constants in the single array of the kernel.
 
-Inverse mass, position of the backstop and front of the pack come first, then the packed constants of damping,
-spring, pack, backstop, coil with its supply, and magnet, each from a fixed place on: sixteen places each,
-thirteen for the damping, the magnet's last and of any length.
+Inverse mass, position of the backstop and front of the pack come first. The packed constants of damping,
+spring, pack, backstop, coil with its supply, and magnet follow, each part at a fixed index: thirteen places
+for the damping, sixteen for each of the others, and any number for the magnet, which is last.
 """
 
 from typing import Any, NamedTuple
