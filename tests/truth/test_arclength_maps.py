@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.errors import refused
 
 from printhammer.chaos.continuation.arclength import Curve, Steps, follow
-from printhammer.chaos.continuation.branch_points import birth_of, follow_doubled, points_of
+from printhammer.chaos.continuation.branch_points import BranchPoint, birth_of, follow_doubled, points_of
+from printhammer.chaos.continuation.crossings import CROSSINGS, follow_crossing
 from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue
 
 STEPS = Steps(precision=1e-12, most=200)
@@ -86,10 +88,10 @@ def test_logistic_map() -> None:
     assert [stop.parameter for stop in curve.stops] == [0.5, 4.0]
     assert [curve.nodes[0].parameter, curve.nodes[-1].parameter] == [0.5, 4.0]
     found = places(logistic, curve, [1.0, 1.0])
-    assert found.keys() == {"period doubling", "branching"}
+    assert found.keys() == {"period doubling", "transcritical"}
     assert found["period doubling"] == [pytest.approx(3.0, abs=SHARP)]
     # x = 0 is the other curve, and crosses at p = 1.
-    assert found["branching"] == [pytest.approx(1.0, abs=1e-8)]
+    assert found["transcritical"] == [pytest.approx(1.0, abs=1e-8)]
 
 
 def test_logistic_map_doubled() -> None:
@@ -187,3 +189,70 @@ def test_places_do_not_depend_on_units(scale: float) -> None:
 
     curve = follow(other, [0.6 * scale], 2.5, scales=[scale, 1.0], bounds=(2.0, 4.0), steps=STEPS)
     assert places(other, curve, [scale, 1.0]) == {"period doubling": [pytest.approx(3.0, abs=SHARP)]}
+
+
+def cubic(u: Any, p: float) -> MapValue:
+    """x -> x + 0.2 (p x - x^3): x = 0 and x^2 = p meet in a pitchfork at p = 0."""
+    (x,) = u
+    return MapValue(
+        np.array([x + 0.2 * (p * x - x**3)]), np.array([[1.0 + 0.2 * (p - 3.0 * x * x)]]), np.array([0.2 * x])
+    )
+
+
+def tilted(a: float, b: float) -> MapFamily:
+    """In the plane: x -> x + 0.1 (x - a p) (x - b p), y -> y / 2 + x, whose two lines meet at p = 0."""
+
+    def family(u: Any, p: float) -> MapValue:
+        x, y = u
+        image = np.array([x + 0.1 * (x - a * p) * (x - b * p), 0.5 * y + x])
+        jacobian = np.array([[1.0 + 0.1 * (2.0 * x - (a + b) * p), 0.0], [1.0, 0.5]])
+        return MapValue(image, jacobian, np.array([-0.1 * ((a + b) * x - 2.0 * a * b * p), 0.0]))
+
+    return family
+
+
+def crossed(family: MapFamily, curve: Curve, scales: Any) -> tuple[BranchPoint, Curve]:
+    """The one crossing of a curve, and the curve that crosses."""
+    (point,) = [
+        point for point in points_of(family, curve, scales, STEPS.precision) if point.kind in CROSSINGS
+    ]
+    bounds = (-2.0, 2.0)
+    return point, follow_crossing(family, point.node, scales=scales, bounds=bounds, steps=STEPS)
+
+
+def test_a_pitchfork_from_both_of_its_curves() -> None:
+    level = curve_of(cubic, [0.0], -1.0, (-2.0, 2.0))
+    point, bent = crossed(cubic, level, [1.0, 1.0])
+    assert point.kind == "pitchfork"
+    assert point.parameter == pytest.approx(0.0, abs=1e-8)
+    for node in bent.nodes:
+        assert node.state[0] ** 2 == pytest.approx(node.parameter, abs=1e-9)
+    assert [stop.parameter for stop in bent.stops] == [2.0, 2.0]
+    assert bent.nodes[0].state[0] * bent.nodes[-1].state[0] == pytest.approx(-2.0)
+    # From the bent curve it is the same pitchfork, and no fold beside it.
+    (again,) = points_of(cubic, bent, [1.0, 1.0], STEPS.precision)
+    assert again.kind == "pitchfork"
+    _point, back = crossed(cubic, bent, [1.0, 1.0])
+    assert all(node.state[0] == pytest.approx(0.0, abs=1e-10) for node in back.nodes)
+    assert sorted(stop.parameter for stop in back.stops) == [-2.0, 2.0]
+
+
+@settings(max_examples=8, deadline=None)
+@given(a=st.floats(min_value=-2.0, max_value=0.5), apart=st.floats(min_value=0.3, max_value=2.0))
+def test_a_transcritical_point_of_two_lines(a: float, apart: float) -> None:
+    family, b = tilted(a, a + apart), a + apart
+    curve = curve_of(family, [-a, -2.0 * a], -1.0, (-2.0, 2.0))
+    point, other = crossed(family, curve, [1.0] * 3)
+    assert point.kind == "transcritical"
+    assert point.parameter == pytest.approx(0.0, abs=1e-7)
+    for node in other.nodes:
+        assert node.state == pytest.approx([b * node.parameter, 2.0 * b * node.parameter], abs=1e-9)
+    assert {stop.parameter for stop in other.stops} == {-2.0, 2.0}
+
+
+def test_a_fold_has_no_other_curve() -> None:
+    curve = curve_of(ring, [1.0], 0.0, (-2.0, 2.0))
+    point = points_of(ring, curve, [1.0, 1.0], STEPS.precision)[0]
+    assert point.kind == "fold"
+    with refused("parameter"):
+        follow_crossing(ring, point.node, scales=[1.0, 1.0], bounds=(-2.0, 2.0), steps=STEPS)

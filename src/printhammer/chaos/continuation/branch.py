@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.continuation.branch_points import BIRTH
+from printhammer.chaos.continuation.crossings import CROSSINGS, Crossing
 from printhammer.chaos.continuation.family import Passage, Surface, Touch
 from printhammer.chaos.orbits.search import orbit
 from printhammer.drive.input import read_count
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch_points import BranchPoint
     from printhammer.chaos.orbits.orbit import Orbit
 
-EventKind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "grazing", "section"]
+EventKind = Literal["fold", "period doubling", "Neimark-Sacker", Crossing, "grazing", "section"]
 KINDS: Final[tuple[str, ...]] = get_args(EventKind)
 
 Change = Literal["", "appears", "vanishes", "splits", "merges", "several"]
@@ -50,7 +51,8 @@ class BranchEvent(Declared, eq=False):
     kind: EventKind = part(
         '"fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are'
         ' born; "Neimark-Sacker": a complex pair of multipliers crosses the unit circle, a torus is born;'
-        ' "branching": two branches cross; "grazing": a contact appears or vanishes; "section": nothing'
+        ' "pitchfork" and "transcritical": two branches cross, of which one turns back or none does,'
+        ' "branching" where that is unknown; "grazing": a contact appears or vanishes; "section": nothing'
         " to the orbit, but a contact comes near the section, which moves to another phase"
     )
     value: float = part("value of the constant, SI")
@@ -138,26 +140,27 @@ def stable_ranges(
 ) -> list[tuple[float, float]]:
     """Compute the ranges of the constant over which the orbits of a branch are stable, ascending.
 
-    `ends` are the values at which the branch ends, which may lie beyond its first and last orbit.
+    `ends` are the values at which the branch ends, which may lie beyond its first and last orbit. A branch
+    of asymmetric orbits turns back at a pitchfork and stays stable.
     """
     limits = [event for event in events if event.kind not in ("grazing", "section")]
     values = along.tolist()
     ranges: list[tuple[float, float]] = []
-    begin: float | None = None
+    stretch: list[float] = []
     for i, value in enumerate(values):
         if i and bool(stable[i]) != bool(stable[i - 1]):
             between = [event.value for event in limits if event.after == i - 1]
             edge = between[0] if between else 0.5 * (value + values[i - 1])
             if stable[i]:
-                begin = between[-1] if between else edge
-            elif begin is not None:
-                ranges.append((begin, edge))
-                begin = None
-        elif not i and stable[0]:
-            begin = ends[0]
-    if begin is not None:
-        ranges.append((begin, ends[1]))
-    return sorted((min(pair), max(pair)) for pair in ranges)
+                stretch = [between[-1] if between else edge, value]
+            else:
+                ranges.append((min(*stretch, edge), max(*stretch, edge)))
+        elif stable[i]:
+            stretch += [value] if i else [ends[0], value]
+            stretch += [event.value for event in limits if event.after == i - 1]
+    if len(stable) and stable[-1]:
+        ranges.append((min(*stretch, ends[1]), max(*stretch, ends[1])))
+    return sorted(ranges)
 
 
 MOST: Final = 1000
@@ -223,23 +226,29 @@ class Branch(Result):
     contacts: tuple[str, ...] = part(
         "sequence of the contacts of each orbit, P for the pack and B for the backstop", repr=False
     )
+    symmetry: str = scalar(
+        "",
+        'whether the middle orbit is its own mirror image, x -> -x half a period later: "symmetric" or'
+        ' "asymmetric"; "" where a pack or a backstop is on one side',
+    )
     events: tuple[BranchEvent, ...] = part(
-        "folds, period doublings, Neimark-Sacker points, branchings and grazings, in order along the curve",
+        "folds, period doublings, Neimark-Sacker points, crossings and grazings, in order along the curve",
         repr=False,
     )
     stops: tuple[Stop, Stop] = part(
         "why and where the branch ends before its first and after its last orbit",
         repr=False,
     )
-    follow_doubled: Callable[[BranchEvent, int, int | None], Branch] = part(
-        "follows the branch born at a period doubling, given the number of steps and of threads", repr=False
+    follow_event: Callable[[BranchEvent, int, int | None], Branch] = part(
+        "follows the branch that begins at an event, given the number of steps and of threads", repr=False
     )
     curve: Curve = part("the same in the variables of `printhammer.chaos.continuation.arclength`", repr=False)
 
     @property
     def title(self) -> str:
         """Title of the result, in one line."""
-        return f"period-{self.firings} orbits of {self.regime.hammer.name} along {self.parameter}"
+        kind = f"{self.symmetry} period" if self.symmetry else "period"
+        return f"{kind}-{self.firings} orbits of {self.regime.hammer.name} along {self.parameter}"
 
     def summary(self) -> Summary:
         """Summarise where the orbit is stable, and the events of the branch."""
@@ -384,7 +393,28 @@ class Branch(Result):
         """
         if event.kind != "period doubling" or event not in self.events:
             raise InputError.of("event", event.kind, "a period doubling of this branch")
-        return self.follow_doubled(event, read_count(most, "most"), threads)
+        return self.follow_event(event, read_count(most, "most"), threads)
+
+    def crossing(
+        self, event: BranchEvent, *, most: SupportsIndex = MOST, threads: int | None = None
+    ) -> Branch:
+        """Return the branch that crosses this one at a pitchfork or a transcritical point.
+
+        Parameters
+        ----------
+        event : BranchEvent
+            A crossing of this branch.
+        most, threads
+            As for `doubled`.
+
+        Raises
+        ------
+        InputError
+            The event is no crossing of this branch, or no orbit of another branch is near.
+        """
+        if event.kind not in CROSSINGS or event not in self.events:
+            raise InputError.of("event", event.kind, "a crossing of this branch")
+        return self.follow_event(event, read_count(most, "most"), threads)
 
 
 def branches_table(branches: Sequence[Branch], attributes: Mapping[str, Any]) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Special points of a curve of fixed points: folds, period doublings, tori, branchings, changes of motion.
+"""Special points of a curve of fixed points: folds, period doublings, tori, crossings, changes of motion.
 
 Each kind has a test function that changes sign at the point (W. J. F. Govaerts, *Numerical Methods for
 Bifurcations of Dynamical Equilibria*, SIAM 2000; Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*,
@@ -10,7 +10,7 @@ of the curve:
 | fold | component of t along the parameter |
 | period doubling | det(J + I): a multiplier is -1 |
 | Neimark-Sacker | product over pairs of mu_i mu_j - 1: a complex pair crosses the unit circle |
-| branching | determinant of the corrector's matrix, the tangent its last row: two curves cross |
+| crossing | determinant of the corrector's matrix, the tangent its last row: pitchfork or transcritical |
 | change | none; the label of the motion differs |
 
 A product mu_i mu_j = 1 of two real multipliers, a neutral saddle, is no bifurcation and is left out. A sign
@@ -29,12 +29,20 @@ import numpy as np
 import numpy.typing as npt
 
 from printhammer.chaos.continuation.arclength import Curve, Steps, Stop, Watch, follow
-from printhammer.chaos.continuation.fixed_points import Corrector, MapFamily, MapValue, Node, between
+from printhammer.chaos.continuation.crossings import CROSSINGS, Crossing, crossing_kind, locate_crossing
+from printhammer.chaos.continuation.fixed_points import (
+    Corrector,
+    MapFamily,
+    MapValue,
+    Node,
+    between,
+    on_chord,
+)
 from printhammer.errors import InputError
 from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
-Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branching", "change", "section"]
+Kind = Literal["fold", "period doubling", "Neimark-Sacker", Crossing, "change", "section"]
 
 BIRTH: Final = "period doubling"
 """Reason for stopping of an orbit of even period at the period doubling that it is born from."""
@@ -50,9 +58,7 @@ _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
 """Fraction of a step to which a change is bisected, and range of margins for its interpolation."""
 _NEAR: Final = 1e-4
-"""Fraction of a step within which a fold and a branching are the same point."""
-_BRACKET: Final = 1e-5
-"""Fraction of a step to which a branching is bracketed."""
+"""Fraction of a step within which a fold and a crossing are the same point."""
 _AMPLITUDE: Final = 1e-2  # First scaled distance from a doubling at which its orbit is sought
 _LEAST_AMPLITUDE: Final = 1e-6
 _CLOSER: Final = 4.0
@@ -69,7 +75,10 @@ _HALF_DOUBLES: Final = 0.5
 class BranchPoint(Declared):
     """A bifurcation or a change of motion on a curve of fixed points."""
 
-    kind: Kind = part('"fold", "period doubling", "Neimark-Sacker", "branching", "change" or "section"')
+    kind: Kind = part(
+        '"fold", "period doubling", "Neimark-Sacker", "pitchfork", "transcritical", "branching", "change" or'
+        ' "section"'
+    )
     node: Node = part("fixed point there")
     after: int = part("index of the node of the curve before the point")
     labels: tuple[Hashable, Hashable] = part("labels of the motion before and after it")
@@ -133,14 +142,14 @@ def points_of(
     """
     follower = Corrector(family, scales, precision)
 
-    def branching_test(node: Node) -> float:
+    def crossing_test(node: Node) -> float:
         return float(np.linalg.det(np.vstack([follower.derivative(node.value), node.tangent])))
 
     tests: dict[Kind, Callable[[Node], float]] = {
         "fold": lambda node: float(node.tangent[-1]),
         "period doubling": lambda node: doubling_test(node.value.jacobian),
         "Neimark-Sacker": lambda node: torus_test(node.value.jacobian),
-        "branching": branching_test,
+        "branching": crossing_test,
     }
     every: list[BranchPoint] = []
     # At the period doubling that an orbit is born from its curve turns back, which is not a fold.
@@ -152,33 +161,40 @@ def points_of(
             kinds = [kind for kind in kinds if kind not in ("fold", "branching")]
         points = []
         for kind in kinds:
-            locate = _branching if kind == "branching" else zero_between
+            locate = locate_crossing if kind == "branching" else zero_between
             share, node = locate(follower, here, ahead, tests[kind])
             if kind == "Neimark-Sacker" and not _has_pair(node if node is not None else here):
                 continue
-            chord = _on_chord(here, ahead, share, here.arc + share * (ahead.arc - here.arc))
+            chord = on_chord(here, ahead, share, here.arc + share * (ahead.arc - here.arc))
             labels, sharp = (here.value.label, ahead.value.label), node is not None
-            points.append((share, kind, BranchPoint(kind, node or chord, after, labels, sharp)))
-        if {"fold", "branching"} <= set(kinds):
-            shares = {kind: share for share, kind, _ in points}
-            if abs(shares["fold"] - shares["branching"]) < _NEAR:
-                points = [entry for entry in points if entry[1] != "fold"]
+            named = crossing_kind(follower, node) if kind == "branching" and node is not None else kind
+            points.append((share, kind, BranchPoint(named, node or chord, after, labels, sharp)))
         points += _changes(follower, here, ahead, after, margin)
         every += [point for *_, point in sorted(points, key=lambda entry: entry[0])]
-    return every
+    return _without_folds_at_crossings(every, curve)
+
+
+def _without_folds_at_crossings(points: list[BranchPoint], curve: Curve) -> list[BranchPoint]:
+    """Remove folds at crossings: a curve that turns back at a pitchfork has no fold of its own there."""
+    crossings = [point for point in points if point.kind in CROSSINGS]
+
+    def is_at(point: BranchPoint, crossing: BranchPoint) -> bool:
+        if not point.sharp and point.after == crossing.after:
+            # Newton's method fails at the crossing, so that the fold cannot be located.
+            return True
+        step = curve.nodes[point.after + 1].arc - curve.nodes[point.after].arc
+        return abs(point.node.arc - crossing.node.arc) < _NEAR * step
+
+    return [
+        point
+        for point in points
+        if point.kind != "fold" or not any(is_at(point, crossing) for crossing in crossings)
+    ]
 
 
 def _has_sign_change(before: float, after: float) -> bool:
     """Whether a test function changes sign by more than rounding, as matters for area-preserving maps."""
     return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
-
-
-def _on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
-    """Return the point at a fraction of the straight line between two nodes."""
-    state = begin.state + share * (end.state - begin.state)
-    return replace(
-        begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc
-    )
 
 
 def _has_pair(node: Node) -> bool:
@@ -224,29 +240,6 @@ def zero_between(
     return (share, None) if best[1] is None else (place, best[1])
 
 
-def _branching(
-    follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
-) -> tuple[float, Node | None]:
-    """Locate the crossing of two curves; the result is as for `zero_between`.
-
-    Newton's method fails at the crossing itself, which is therefore bracketed and interpolated.
-    """
-    low, high, one, other = 0.0, 1.0, here, ahead
-    for _ in range(_ROUNDS):
-        share = low + (high - low) * test(one) / (test(one) - test(other))
-        off = 0.1 * (high - low)
-        if off < _BRACKET:
-            break
-        before = between(follower, here, ahead, max(share - off, low))
-        beyond = between(follower, here, ahead, min(share + off, high))
-        if before is None or beyond is None or test(before) * test(beyond) >= 0.0:
-            break
-        low, high, one, other = max(share - off, low), min(share + off, high), before, beyond
-    if one is here:
-        return share, None
-    return share, _on_chord(one, other, (share - low) / (high - low), one.arc)
-
-
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
@@ -259,7 +252,7 @@ def _changes(
         if sharp and beyond.arc > before.arc:
             place = here.arc + share * (ahead.arc - here.arc)
             part = min(max((place - before.arc) / (beyond.arc - before.arc), 0.0), 1.0)
-            middle = _on_chord(before, beyond, part, place)
+            middle = on_chord(before, beyond, part, place)
         else:
             state = 0.5 * (before.state + beyond.state)
             middle = replace(before, state=state, parameter=0.5 * (before.parameter + beyond.parameter))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -191,3 +192,11 @@ def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node 
     level = float(here.tangent @ begin) + share * float(here.tangent @ (end - begin))
     z = z + (level - float(here.tangent @ z)) * here.tangent
     return follower.correct(z, here.tangent, arc=here.arc + share * (ahead.arc - here.arc))
+
+
+def on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
+    """Return the place at a share of the straight way between two nodes."""
+    state = begin.state + share * (end.state - begin.state)
+    return replace(
+        begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc
+    )

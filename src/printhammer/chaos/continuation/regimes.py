@@ -1,22 +1,23 @@
 """Map of printing regimes: all periodic orbits of a hammer, followed along the rate.
 
 At several rates stable and unstable orbits are searched for; each orbit that lies on no known branch is
-followed in both directions. Period doublings lead to further branches. An island, an orbit that exists only
-between two folds and is joined to no other branch, is a closed loop. Islands that contain none of the rates
-are missed.
+followed in both directions. Period doublings and crossings lead to further branches. An island, an orbit that
+exists only between two folds and is joined to no other branch, is a closed loop. Islands that contain none of
+the rates are missed.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final, SupportsIndex, Unpack
 
 import numpy as np
 
 from printhammer.chaos.continuation.arclength import Steps
-from printhammer.chaos.continuation.branch import MOST, Branch, branches_table
+from printhammer.chaos.continuation.branch import MOST, Branch, BranchEvent, branches_table
+from printhammer.chaos.continuation.crossings import CROSSINGS
 from printhammer.chaos.continuation.tracer import PRECISION, Tracer, read_bounds
 from printhammer.chaos.orbits.search import orbits
 from printhammer.chaos.strobe.map import MAP_EFFORT
@@ -161,7 +162,7 @@ def regimes(
     seeds : int, optional
         Number of rates, evenly spaced inside the range, at which orbits are searched for.
     doublings : int, optional
-        Number of successive period doublings whose new orbits are followed.
+        Number of generations of branches that are followed from period doublings and crossings.
     waveform, overlap
         For a hammer: as for `printhammer.Regime.of`.
     most
@@ -200,7 +201,7 @@ def regimes(
             collected.add(list(search.found))
             effort.report(k + 1, count + levels)
         for k in range(levels):
-            collected.double(k)
+            collected.switch(k)
             effort.report(count + k + 1, count + levels)
     return collected.result()
 
@@ -208,7 +209,7 @@ def regimes(
 def follow_doublings(
     branch: Branch, levels: int, *, most: int = MOST, threads: int | None = None
 ) -> Branches:
-    """Follow the branches born at the period doublings of a branch, recursively to `levels` levels.
+    """Follow the branches that begin at period doublings and crossings of a branch, for `levels` generations.
 
     Raises
     ------
@@ -220,7 +221,7 @@ def follow_doublings(
     collected.found.append(branch)
     with collected.kept_at_interrupt():
         for k in range(levels):
-            collected.double(k)
+            collected.switch(k)
     return collected.result()
 
 
@@ -271,19 +272,27 @@ class _Collected:
         alike = [branch for branch in self.found if branch.firings == orbit.firings]
         return any(_is_on(branch, orbit) for branch in alike)
 
-    def double(self, level: int) -> None:
-        """Follow the orbits born at the period doublings of all branches found so far."""
+    @staticmethod
+    def switch_of(branch: Branch, event: BranchEvent) -> Callable[..., Branch] | None:
+        """Return what follows another branch from an event, if there is one."""
+        if event.kind == "period doubling":
+            return branch.doubled
+        return branch.crossing if event.kind in CROSSINGS else None
+
+    def switch(self, level: int) -> None:
+        """Follow what begins at the period doublings and crossings of all branches found so far."""
         for number, branch in enumerate(list(self.found)):
             for place, event in enumerate(branch.events):
-                if event.kind != "period doubling" or (number, place) in self.done:
+                follow = self.switch_of(branch, event)
+                if follow is None or (number, place) in self.done:
                     continue
                 self.done.add((number, place))
                 if any(_has_end_at(other, event.value, event.state) for other in self.found):
                     continue
                 try:
-                    born = branch.doubled(event, most=self.steps.most, threads=self.effort.threads)
+                    born = follow(event, most=self.steps.most, threads=self.effort.threads)
                 except InputError as error:
-                    self.refused.append(f"level {level + 1}, period doubling at {event.value:.9g}: {error}")
+                    self.refused.append(f"level {level + 1}, {event.kind} at {event.value:.9g}: {error}")
                     continue
                 middle = born.orbit(len(born) // 2)
                 alike = [other for other in self.found if other.firings == born.firings]

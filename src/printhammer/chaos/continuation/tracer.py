@@ -19,10 +19,11 @@ from printhammer.chaos.continuation.branch_points import (
     follow_doubled,
     points_of,
 )
+from printhammer.chaos.continuation.crossings import follow_crossing
 from printhammer.chaos.continuation.family import Passage, RegimeFamily, has_rigid_backstop
 from printhammer.chaos.continuation.fixed_points import Corrector, Node
 from printhammer.chaos.continuation.grazing_ends import fades, grazing_end
-from printhammer.chaos.strobe.map import quiet_section, state_later
+from printhammer.chaos.strobe.map import mirror_image, quiet_section, state_later
 from printhammer.drive.input import read_number
 from printhammer.errors import InputError
 from printhammer.run.effort import Effort
@@ -202,10 +203,29 @@ class Tracer:
             stops[end] = Stop(GRAZING, place, nodes[end].state, _AT_GRAZING)
         return Curve(nodes, (stops[0], stops[1]))
 
+    def followed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
+        """Return the branch that begins at a period doubling, or crosses, one of so many firings."""
+        if event.phase != self.regime.phase:
+            return self.at_phase(event.phase).followed(firings, event, most, threads)
+        way = self.doubled if event.kind == "period doubling" else self.crossed
+        return way(firings, event, most, threads)
+
+    def crossed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
+        """Return the branch that crosses that of an orbit of so many firings."""
+        family, steps = self.family(firings), Steps(most=most, precision=PRECISION)
+        curve = follow_crossing(
+            family,
+            event.point.node,
+            scales=self.scales,
+            bounds=self.bounds,
+            steps=steps,
+            watch=self.watch(firings, steps, self.effort),
+        )
+        curve = self.grazed(family, curve)
+        return self.described([(family, curve.nodes)], curve.stops, steps, threads)
+
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
         """Follow the branch born at a period doubling of an orbit of `firings` firings."""
-        if event.phase != self.regime.phase:
-            return self.at_phase(event.phase).doubled(firings, event, most, threads)
         family = self.family(2 * firings)
         steps = Steps(most=most, precision=PRECISION)
         curve = follow_doubled(
@@ -365,11 +385,22 @@ class Tracer:
             damping_loss=of_courses("damping_loss"),
             residual=np.array([node.residual for node in nodes]),
             contacts=tuple(row.sequence for row in passages),
+            symmetry=self.symmetry_of(*owned[count // 2]),
             events=tuple(events),
             stops=(self.in_words(first), self.in_words(last)),
             curve=Curve(nodes, stops),
-            follow_doubled=partial(self.doubled, family.firings),
+            follow_event=partial(self.followed, family.firings),
         )
+
+    def symmetry_of(self, family: RegimeFamily, node: Node) -> str:
+        """Return whether an orbit is its own mirror image; "" where the device has no such symmetry."""
+        regime = family.regime.with_(self.parameter, node.parameter)
+        image = mirror_image(regime, node.state, self.effort.tolerance)
+        if image is None or not np.isfinite(image).all():
+            return ""
+        states = np.asarray(family.course(node.state, node.parameter).states)
+        apart = np.abs((states - image) / self.scales[:2]).max(axis=1).min()
+        return "symmetric" if apart < _SHORTER else "asymmetric"
 
     def in_words(self, stop: Stop) -> Stop:
         """Return a stop whose sentence names the constant and its unit."""

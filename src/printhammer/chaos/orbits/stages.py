@@ -33,7 +33,7 @@ from printhammer.chaos.orbits.guesses import (
 )
 from printhammer.chaos.orbits.newton import Closing, ExactMaps, FastMaps, Guess, close_orbits
 from printhammer.chaos.orbits.orbit import KINDS, Orbit, multipliers_of, orbit_of
-from printhammer.chaos.strobe.map import state_later
+from printhammer.chaos.strobe.map import mirror_image
 from printhammer.errors import InputError
 from printhammer.hammer.names import PERIOD
 from printhammer.run.effort import Effort
@@ -374,17 +374,13 @@ class Search:
 
         If the forces are not odd, Newton's method finds none, or another orbit.
         """
-        hammer = self.regime.hammer
-        if hammer.pack is not None or hammer.backstop is not None or self.regime.drive is None:
-            return
-        centre = np.array([2.0 * hammer.origin, 0.0])
         for orbit, hits in list(described):
             regime = orbit.regime
-            half = state_later(regime, orbit.section, (orbit.phase + 0.5) % 1.0, self.effort.tolerance)
-            if not np.isfinite(half).all():
+            image = mirror_image(regime, orbit.section, self.effort.tolerance)
+            if image is None or not np.isfinite(image).all():
                 continue
             exact = ExactMaps(regime, self.effort)
-            guess = _guess(replace(orbit, section=centre - half), exact)
+            guess = _guess(replace(orbit, section=image), exact)
             for closing in _closed(exact, [guess], self.scales, LONE):
                 if closing.closed:
                     self._describe(described, [(regime, _Known(closing, [], hits))])

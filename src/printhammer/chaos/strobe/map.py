@@ -306,6 +306,20 @@ def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: floa
     return record.nodes[-1, 1:3].copy() if record.status_name == "ok" else np.full(2, np.nan)
 
 
+def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatArray | None:
+    """Compute the state, (m, m/s), at which the mirror image of a motion passes the section.
+
+    The mirror image is x -> -x, about the origin of the magnet's gap, half a period later: a motion of the
+    same hammer if its forces are odd, as in Duffing's equation. None where a pack, a backstop or pulses act
+    on one side only; NaN where a run ends before.
+    """
+    hammer = regime.hammer
+    if hammer.pack is not None or hammer.backstop is not None or regime.drive is None:
+        return None
+    half = state_later(regime, state, (regime.phase + 0.5) % 1.0, tolerance)
+    return np.array([2.0 * hammer.origin, 0.0]) - half
+
+
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
     """Sample the times since the section at which there is a contact, densely enough."""
     times = [np.zeros(0)]

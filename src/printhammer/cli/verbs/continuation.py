@@ -70,7 +70,9 @@ def continue_(
     firings: int | None = _FIRINGS,
     state: tuple[float, float] | None = _STATE,
     phase: float = _PHASE,
-    doublings: int = opt.whole("Number of successive period doublings to follow.", default=0),
+    doublings: int = opt.whole(
+        "Number of generations of branches to follow from period doublings and crossings.", default=0
+    ),
     regimes: bool = opt.switch("Search for orbits at several rates and continue them all.", panel=_ALL),
     longest: int = opt.whole("Largest orbit period to search for, in firings.", panel=_ALL, default=3),
     seeds: int = opt.whole("Number of rates at which orbits are searched for.", panel=_ALL, default=6),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from printhammer.chaos.continuation.crossings import CROSSINGS
 from printhammer.errors import InputError
 from printhammer.figures.elements import style
 from printhammer.figures.elements.marks import legend_in_columns
@@ -33,10 +34,12 @@ _MARKS: Final[dict[str, dict[str, Any]]] = {
     "fold": {"marker": "o", "ms": 4.5, "mfc": "white"},
     "period doubling": {"marker": "s", "ms": 4.5, "mfc": "white"},
     "Neimark-Sacker": {"marker": "D", "ms": 4.5, "mfc": "white"},
-    "branching": {"marker": "x", "ms": 5.0},
+    "pitchfork": {"marker": "x", "ms": 5.0},
+    "transcritical": {"marker": "+", "ms": 6.0},
+    "branching": {"marker": "*", "ms": 5.0},
     "grazing": {"marker": "|", "ms": 13.0},
 }
-_TURNS: Final = ("fold", "period doubling", "Neimark-Sacker", "branching")
+_TURNS: Final = ("fold", "period doubling", "Neimark-Sacker", *CROSSINGS)
 _UNSTABLE: Final[dict[str, Any]] = {"lw": style.HAIR, "ls": (0, (4, 2)), "zorder": 2.0}
 _AXIS: Final = {"s": ("ms", 1e3), "1": ("", 1.0)}
 
