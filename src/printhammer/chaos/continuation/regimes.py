@@ -274,13 +274,13 @@ class _Collected:
 
     @staticmethod
     def switch_of(branch: Branch, event: BranchEvent) -> Callable[..., Branch] | None:
-        """Return what follows another branch from an event, if there is one."""
+        """Select the method that follows another branch from an event; None if there is none."""
         if event.kind == "period doubling":
             return branch.doubled
         return branch.crossing if event.kind in CROSSINGS else None
 
     def switch(self, level: int) -> None:
-        """Follow what begins at the period doublings and crossings of all branches found so far."""
+        """Follow the branches that begin at period doublings and crossings of all branches so far."""
         for number, branch in enumerate(list(self.found)):
             for place, event in enumerate(branch.events):
                 follow = self.switch_of(branch, event)
