@@ -274,7 +274,7 @@ class _Collected:
 
     @staticmethod
     def switch_of(branch: Branch, event: BranchEvent) -> Callable[..., Branch] | None:
-        """Select the method that follows another branch from an event; None if there is none."""
+        """Select the method that follows another branch from an event, or None where no branch begins."""
         if event.kind == "period doubling":
             return branch.doubled
         return branch.crossing if event.kind in CROSSINGS else None
