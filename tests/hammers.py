@@ -21,7 +21,6 @@ import printhammer as ph
 from printhammer.derivatives import flow
 from printhammer.drive.waveforms.shapes import HalfSine, Rectangle, Sampled, Trapezoid, Waveform
 from printhammer.kernel.compile import specialise
-from printhammer.kernel.compile.variational import _built
 from printhammer.parts.backstop.elastomer import ElastomerBackstop
 from printhammer.parts.backstop.hertz import HertzBackstop
 from printhammer.parts.backstop.rigid import RigidBackstop
@@ -300,7 +299,7 @@ def _plain(laws: Any) -> specialise.Kernel:
 def _plain_variational(plain: specialise.Kernel, *, forced: bool) -> specialise.Kernel:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(numba.config, "DISABLE_JIT", True)
-        return _built.__wrapped__(plain, forced)
+        return specialise._built.__wrapped__(plain, forced)
 
 
 def magnet_table(folder: Path) -> dict[str, str]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from printhammer.kernel.compile.variational import variational
+from printhammer.kernel.compile.specialise import variational
 from printhammer.kernel.model.layout import BACKSTOP_PART, COIL, DAMPING, FRONT, MAGNET, PACK, SPRING
 from printhammer.kernel.model.modes import PAUSED, STATUS_NAMES
 from printhammer.kernel.variational import layout as V

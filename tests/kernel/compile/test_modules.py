@@ -3,6 +3,7 @@
 import lzma
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from printhammer.kernel.compile import cache, calls, link, modules
 from printhammer.kernel.compile.bindings import bindings_of
 from printhammer.kernel.compile.modules import Entry, Module
 from printhammer.kernel.compile.signatures import RESULTS, signature_of
+from printhammer.kernel.compile.specialise import specialise
 from printhammer.kernel.compile.templates import TEMPLATES, compile_law, execute_all
-from printhammer.kernel.model.laws import Laws
+from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
 from printhammer.run.problem import Problem, laws_of
 
 HERTZ = Laws(
@@ -104,6 +106,63 @@ print([name for name in sys.modules if name.partition(".")[0] == "numba"])
     for _ in range(2):
         done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     assert done.strip() == "[]"
+
+
+OWN_LAW = """
+import math
+
+def backstop_elastic(c, w):
+    return c[1] * cube(w)
+
+def cube(w):
+    return w * w * w
+
+def backstop_viscous(c, w, v):
+    return -c[2] * w * v
+
+def backstop_energy(c, w):
+    return 0.4 * c[1] * math.pow(w, 5.0)
+
+def backstop_switch(c, w, v):
+    return 1.0
+"""
+
+
+@pytest.mark.parametrize("for_lanes", [False, True])
+def test_a_law_of_ones_own_is_lowered_by_the_public_interface_of_numba(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, for_lanes: bool
+) -> None:
+    import llvmlite.binding as llvm
+
+    (tmp_path / "own_backstop.py").write_text(OWN_LAW)
+    monkeypatch.syspath_prepend(tmp_path)
+    laws = Laws("", "", "", "own_backstop", "printhammer.parts.absent")
+    monkeypatch.setitem(sys.modules, "printhammer.kernel.compile.lower", None)
+    content = modules.laws_of("backstop", bindings_of(laws), for_lanes)._make()
+    defined = {
+        function.name
+        for function in llvm.parse_bitcode(content).functions
+        if not function.is_declaration and function.linkage == llvm.Linkage.external
+    }
+    assert defined == {link.law_symbol(name, for_lanes) for name in LAW_FUNCTIONS["backstop"]}
+
+
+def test_a_law_of_ones_own_computes_what_the_same_law_that_ships_computes(
+    hammer: ph.Hammer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from printhammer.parts.backstop import hertz
+
+    source = Path(hertz.__file__).read_text("utf-8").partition("@register")[0]
+    (tmp_path / "own_hertz.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    drive = ph.PulseTrain(hammer.waveform, period=1e-3, pulses=3)
+    problem = Problem(hammer, drive, (hammer.position or 0.0, 0.0), 0.0, 1e-9)
+    shipped = problem.run(4e-3)
+    problem.__dict__["kernel"] = specialise(replace(laws_of(hammer, drive), backstop="own_hertz"))
+    own = problem.run(4e-3)
+    assert own.steps == shipped.steps > 50
+    np.testing.assert_array_equal(own.nodes, shipped.nodes)
+    np.testing.assert_array_equal(own.contacts, shipped.contacts)
 
 
 VERBS = (

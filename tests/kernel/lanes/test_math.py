@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from printhammer.kernel.compile.compiling import inlined
+from printhammer.kernel.compile.templates import compile_module
 from printhammer.kernel.lanes import math as lane_math
 
 ULP = 2.0**-53
@@ -22,7 +24,7 @@ Array = npt.NDArray[np.float64]
 @functools.cache
 def loop(name: str) -> Any:
     """A function of `lane_math` in a loop over arrays, with the settings of the kernel."""
-    function = getattr(lane_math, name)
+    function = getattr(compile_module(lane_math, inlined), name)
     if name == "pow":
 
         def apply(x: Any, y: Any, out: Any) -> None:

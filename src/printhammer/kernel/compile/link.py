@@ -24,6 +24,11 @@ _OURS: Final = (ENTRY, LAW, CHOICE, "_ZN")
 """How symbols begin that must not stay open; numba's begin with the last."""
 
 
+def law_symbol(name: str, for_lanes: bool) -> str:
+    """Return the symbol of a law for arrays of constants, or for lanes."""
+    return f"{LAW}lane.{name}" if for_lanes else LAW + name
+
+
 class LinkError(ValueError):
     """Modules that do not fit together."""
 

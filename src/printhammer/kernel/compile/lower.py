@@ -8,7 +8,7 @@ hammer: with a coil's circuit and without there are two templates.
 from __future__ import annotations
 
 import functools
-from types import FunctionType, ModuleType
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import llvmlite.binding as llvm
@@ -16,20 +16,24 @@ from numba import types
 
 from printhammer.kernel.compile import opening
 from printhammer.kernel.compile.compiling import all_inlined, compiled, inlined
-from printhammer.kernel.compile.link import ENTRY, LAW
+from printhammer.kernel.compile.link import ENTRY, law_symbol
 from printhammer.kernel.compile.signatures import RESULTS, signature_of
-from printhammer.kernel.compile.templates import TEMPLATES, VARIATIONAL, compile_law, execute, execute_all
+from printhammer.kernel.compile.templates import (
+    TEMPLATES,
+    VARIATIONAL,
+    compile_law,
+    compile_module,
+    execute,
+    execute_all,
+)
 from printhammer.kernel.lanes import layout as lane_layout
 from printhammer.kernel.lanes import math as lane_math
 from printhammer.kernel.model import laws as declared
-from printhammer.kernel.model.laws import LAW_FUNCTIONS
+from printhammer.kernel.model.laws import LAW_FUNCTIONS, floats_of
 from printhammer.kernel.variational.layout import electric_row
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
-
-_LANE = "lane."
-"""How the symbol of a law for lanes goes on after that of laws."""
 
 _LAYOUT = ("INVERSE_MASS", "POSITION", "FRONT", "DAMPING", "SPRING", "PACK", "BACKSTOP_PART", "MAGNET")
 
@@ -63,19 +67,20 @@ def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool
         function = functions[name]
         if for_lanes:
             constants = _tuple([types.float64] * lane_layout.PLACES[role][1])
-            helper = _lane_law(function)
+            helper = compile_law(function, inlined, math=_lane_math())
         else:
             helper = compile_law(function, compiled)
-        library, symbol, kind = _lowered(helper, (constants, *(types.float64,) * _floats(name)))
+        library, symbol, kind = _lowered(helper, (constants, *(types.float64,) * floats_of(name)))
         if kind != types.float64:
             raise TypeError(f"{function.__module__}.{name} returns {kind}, expected a float")
-        whole.link_in(library.with_callees(symbol, LAW + (_LANE if for_lanes else "") + name))
+        whole.link_in(library.with_callees(symbol, law_symbol(name, for_lanes)))
     return bytes(whole.as_bitcode())
 
 
-def _floats(name: str) -> int:
-    """Return the number of arguments of a law after the constants."""
-    return int(declared.__annotations__[name].removeprefix("Law"))
+@functools.cache
+def _lane_math() -> ModuleType:
+    """Return the elementary functions of lanes, compiled."""
+    return compile_module(lane_math, inlined)
 
 
 def _lowered(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str, Any]:
@@ -105,7 +110,7 @@ def _opened() -> dict[str, Any]:
         if kind in ("bool", "int"):
             namespace[name] = opening.Choice(name, types.boolean if kind == "bool" else types.int64)
     for name in (name for functions in LAW_FUNCTIONS.values() for name in functions):
-        namespace[name] = opening.law(name, LAW + name, _floats(name))
+        namespace[name] = opening.law(name, law_symbol(name, False), floats_of(name))
     return namespace
 
 
@@ -127,7 +132,7 @@ def _lanes() -> dict[str, Any]:
         name: value for name, value in _opened().items() if isinstance(value, opening.Choice)
     }
     for name in (name for functions in LAW_FUNCTIONS.values() for name in functions):
-        vector[name] = opening.law(name, LAW + _LANE + name, _floats(name))
+        vector[name] = opening.law(name, law_symbol(name, True), floats_of(name))
     return _execute_lanes(_plain(False), {**vector, "HAS_CIRCUIT": False})
 
 
@@ -139,7 +144,7 @@ def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, A
     inlined; what looks after switches is scalar and uses the plain kernel. `plain` holds the names of the
     plain templates, `vector` the laws for lanes and the choices.
     """
-    scalar, vector = dict(plain), dict(vector)
+    scalar, vector = ({**names, "lane_math": _lane_math()} for names in (plain, vector))
 
     def module(name: str, namespace: dict[str, Any], kind: str) -> ModuleType:
         return execute(name, f"{kind}_template", namespace)
@@ -179,17 +184,3 @@ def _with_lane_layout(module: ModuleType) -> ModuleType:
         if hasattr(module, name):
             setattr(module, name, getattr(lane_layout, name))
     return module
-
-
-def _lane_law(function: Any) -> Any:
-    """Compile a law, and the helpers of its module that it calls, for lanes."""
-    scope = dict(function.__globals__)
-    scope["math"] = lane_math
-    scope.update(
-        {
-            name: _lane_law(value)
-            for name in function.__code__.co_names
-            if isinstance(value := function.__globals__.get(name), FunctionType)
-        }
-    )
-    return inlined(FunctionType(function.__code__, scope, function.__name__, function.__defaults__))

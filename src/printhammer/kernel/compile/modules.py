@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from printhammer.kernel.compile import calls, link
 from printhammer.kernel.compile.cache import Code, File, say_once
 from printhammer.kernel.compile.signatures import RESULTS, signature_of
+from printhammer.kernel.model.laws import LAW_FUNCTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -131,13 +132,22 @@ def every_template() -> Iterator[Module]:
 
 def laws_of(role: str, bindings: Bindings, for_lanes: bool) -> Module:
     """Return the law functions of a part, for arrays of constants or for lanes."""
+    package = __name__.partition(".")[0]
+    ours = all(bindings.names[name].__module__.partition(".")[0] == package for name in LAW_FUNCTIONS[role])
 
     def make() -> bytes:
-        from printhammer.kernel.compile import lower
+        if ours:
+            from printhammer.kernel.compile import lower
 
-        return lower.laws(role, bindings.names, for_lanes)
+            return lower.laws(role, bindings.names, for_lanes)
+        from printhammer.kernel.compile import own
 
-    sources = _digest_of(("compile/compiling.py", "compile/linking.py", "compile/lower.py", "model/laws.py"))
+        return own.laws(role, bindings.names, for_lanes)
+
+    lowering = (
+        ("compile/compiling.py", "compile/linking.py", "compile/lower.py") if ours else ("compile/own.py",)
+    )
+    sources = _digest_of((*lowering, "model/laws.py"))
     if for_lanes:
         sources += _digest_of(("lanes/layout.py", "lanes/math.py"))
     return Module(role, f"{role} {for_lanes} {sources} {bindings.digests[role]}", make)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.bindings import bindings_of
 from printhammer.kernel.compile.modules import Entry, one_at_a_time
-from printhammer.kernel.compile.templates import TEMPLATES, compile_law, execute_all
+from printhammer.kernel.compile.templates import TEMPLATES, VARIATIONAL, compile_law, execute_all
+from printhammer.kernel.variational.layout import changing, electric_row
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -113,4 +114,28 @@ def _specialised(laws: Laws) -> Kernel:
     kernel = Kernel(laws, label, [Entry(name, variant, bindings, {}, label) for name in ENTRIES])
     if is_interpreted():
         kernel.interpret(kernel.namespace)
+    return kernel
+
+
+def variational(plain: Kernel, *, forced: bool) -> Kernel:
+    """Return the kernel whose entry point `flow` carries columns along the runs of a plain one.
+
+    See :mod:`printhammer.kernel.variational.flow`; `forced` says whether constants force the columns. It is
+    apart from the plain kernel, so that runs which do not ask for derivatives compile nothing for them.
+    """
+    with one_at_a_time:
+        return _built(plain, forced)
+
+
+@functools.cache
+def _built(plain: Kernel, forced: bool) -> Kernel:
+    bindings = bindings_of(plain.laws)
+    circuit, damped = bindings.choices["HAS_CIRCUIT"], bindings.choices["HAS_DAMPING"]
+    choices = {"CHANGING": changing(forced, damped, circuit)}
+    variant = {"HAS_CIRCUIT": circuit, "FORCED": forced}
+    label = f"{plain.label}, by {'constants' if forced else 'states'}"
+    kernel = Kernel(plain.laws, label, [Entry("flow", variant, bindings, choices, label)])
+    if is_interpreted():
+        own = {**choices, "FORCED": forced, "ELECTRIC_ROW": electric_row(forced)}
+        kernel.interpret(execute_all(VARIATIONAL, {**plain.namespace, **own}, f"{id(kernel):x}"))
     return kernel

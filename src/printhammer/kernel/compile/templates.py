@@ -74,13 +74,25 @@ def _functions_of(module: ModuleType) -> dict[str, Any]:
     }
 
 
-def compile_law(function: Callable[..., Any], compiled: Callable[..., Any]) -> Any:
-    """Compile a law, together with the helpers that it calls."""
-    if isinstance(function, FunctionType) and (helpers := helpers_of(function)):
-        scope = dict(function.__globals__)
-        scope.update({name: compile_law(helper, compiled) for name, helper in helpers.items()})
+def compile_law(function: Callable[..., Any], compiled: Callable[..., Any], **names: Any) -> Any:
+    """Compile a law, together with the helpers that it calls; `names` are what names in it stand for."""
+    helpers = helpers_of(function) if isinstance(function, FunctionType) else {}
+    if helpers or names:
+        scope = {**function.__globals__, **names}
+        scope.update({name: compile_law(helper, compiled, **names) for name, helper in helpers.items()})
         function = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     return compiled(function)
+
+
+def compile_module(module: ModuleType, compiled: Callable[..., Any]) -> ModuleType:
+    """Return a copy of a module whose public functions are compiled, each for what calls it."""
+    copy = ModuleType(module.__name__)
+    scope = vars(copy)
+    scope.update(vars(module))
+    for name, value in vars(module).items():
+        if isinstance(value, FunctionType) and not name.startswith("_"):
+            scope[name] = compiled(FunctionType(value.__code__, scope, name, value.__defaults__))
+    return copy
 
 
 def execute(template: str, tag: str, namespace: dict[str, Any]) -> ModuleType:

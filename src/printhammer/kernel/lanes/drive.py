@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.lanes import layout as R
-from printhammer.kernel.lanes import math as lane_math
 
 if TYPE_CHECKING:
+    from printhammer.kernel.lanes import math as lane_math
     from printhammer.kernel.model.laws import CUBIC, EXPONENTIALS, SINE
 
 

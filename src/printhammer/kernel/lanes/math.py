@@ -1,10 +1,10 @@
 """Elementary functions without branches or calls, for loops that the compiler vectorises.
 
-The laws of the parts are compiled for lanes with this module in the place of :mod:`math`. Sources: Cody and
-Waite, Software Manual for the Elementary Functions (1980), for the reductions; the polynomials are Taylor and
-atanh series, long enough for the reduced range. Relative errors: exp and log 2e-16, pow 2e-16 (1 + |y ln x|);
-sin and cos have that of rounding their argument. Arguments outside the domain, for which `math` raises, give
-NaN or an infinity.
+The laws of the parts are compiled for lanes with this module in the place of :mod:`math`, each function with
+what calls it. Sources: Cody and Waite, Software Manual for the Elementary Functions (1980), for the
+reductions; the polynomials are Taylor and atanh series, long enough for the reduced range. Relative errors:
+exp and log 2e-16, pow 2e-16 (1 + |y ln x|); sin and cos have that of rounding their argument. Arguments
+outside the domain, for which `math` raises, give NaN or an infinity.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
-
-from printhammer.kernel.compile.compiling import inlined
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,19 +60,16 @@ if not TYPE_CHECKING:
     from_bits = intrinsic(_from_bits)
 
 
-@inlined
 def sqrt(x: float) -> float:
     """Return the square root."""
     return math.sqrt(x)
 
 
-@inlined
 def isnan(x: float) -> bool:
     """Whether `x` is not a number."""
     return x != x  # noqa: PLR0124
 
 
-@inlined
 def exp(x: float) -> float:
     """Return the exponential of `x`; 0 below -708, infinity above 709."""
     y = min(max(x, -708.0), 709.0)
@@ -100,7 +95,6 @@ def exp(x: float) -> float:
     return scaled if x == x else x  # noqa: PLR0124
 
 
-@inlined
 def log(x: float) -> float:
     """Return the natural logarithm of a normal number; NaN below 0, minus infinity at 0."""
     b = bits(x)
@@ -131,14 +125,12 @@ def log(x: float) -> float:
     return result if x >= 0.0 else nan
 
 
-@inlined
 def pow(x: float, y: float) -> float:
     """Return `x` to the power `y` for x >= 0 and y > 0 or normal x."""
     result = exp(y * log(x))
     return result if x > 0.0 else (0.0 if (x == 0.0 and y > 0.0) else nan)
 
 
-@inlined
 def sin(x: float) -> float:
     """Return the sine, for arguments up to some thousands."""
     n = (x * 0.3183098861837907 + _ROUND) - _ROUND
@@ -159,7 +151,6 @@ def sin(x: float) -> float:
     return from_bits(bits(result) ^ ((int(n) & 1) << 63))
 
 
-@inlined
 def cos(x: float) -> float:
     """Return the cosine, for arguments up to some thousands."""
     return sin(x + 0.5 * pi)

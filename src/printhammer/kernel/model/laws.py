@@ -80,6 +80,12 @@ LAW_FUNCTIONS = {
 }
 """Names of the law functions of each part."""
 
+
+def floats_of(law: str) -> int:
+    """Return the number of arguments of a law function after its constants."""
+    return int(__annotations__[law].removeprefix("Law"))
+
+
 HAS_PACK: bool
 HAS_BACKSTOP: bool
 HAS_DAMPING: bool

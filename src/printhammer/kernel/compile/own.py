@@ -1,0 +1,70 @@
+"""Laws of one's own as modules, by numba's public interface alone.
+
+Templates and the laws that ship are lowered when the wheel is built, by private classes of numba. A law from
+elsewhere is lowered where it is used, and must not depend on the version of numba there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import llvmlite.binding as llvm
+import numba
+from numba import types
+
+from printhammer.kernel.compile.link import law_symbol
+from printhammer.kernel.compile.templates import compile_law, compile_module
+from printhammer.kernel.lanes import layout as lane_layout
+from printhammer.kernel.lanes import math as lane_math
+from printhammer.kernel.model.laws import LAW_FUNCTIONS, floats_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+_OPTIONS: Final[dict[str, Any]] = {
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "nogil": True,
+    "_nrt": False,
+}
+"""Those of the kernel, see :mod:`printhammer.kernel.compile.compiling`."""
+
+_FOR_C: Final = "cfunc."
+"""How the symbol of the wrapper for C begins; it goes on with that of the function for compiled callers."""
+
+
+def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool) -> bytes:
+    """Return the law functions of a part, as bitcode of one module."""
+
+    def compiled(function: Any) -> Any:
+        return numba.njit(**_OPTIONS)(function)
+
+    constants: Any = types.Array(types.float64, 1, "C")
+    names = {}
+    if for_lanes:
+        constants = types.UniTuple(  # type: ignore[no-untyped-call]
+            types.float64, lane_layout.PLACES[role][1]
+        )
+        names["math"] = compile_module(lane_math, compiled)
+    whole = llvm.parse_assembly("")
+    for name in LAW_FUNCTIONS[role]:
+        arguments = (constants, *(types.float64,) * floats_of(name))
+        law = compile_law(functions[name], compiled, **names).py_func
+        lowered = numba.njit(types.float64(*arguments), **_OPTIONS)(law)
+        whole.link_in(_alone(lowered.inspect_llvm(arguments), law_symbol(name, for_lanes)))
+    return bytes(whole.as_bitcode())
+
+
+def _alone(text: str, symbol: str) -> Any:
+    """Return the module of a compiled function as text, in which only the function is seen, as `symbol`."""
+    module = llvm.parse_assembly(text)
+    (name,) = (
+        function.name.removeprefix(_FOR_C)
+        for function in module.functions
+        if function.name.startswith(_FOR_C)
+    )
+    module.get_function(name).name = symbol
+    for one in (*module.functions, *module.global_variables):
+        if not one.is_declaration:
+            one.linkage = "external" if one.name == symbol else "internal"
+    return module
