@@ -175,8 +175,8 @@ class Orbits(Result):
         count = len(self.found)
         most = "1 firing" if self.longest == 1 else f"up to {self.longest} firings"
         head = f"{count or 'no'} orbit{'' if count == 1 else 's'} of {most}"
-        tried = f"{sum(self.guesses)} guesses in motions from {self.starts} states"
-        ends = [f"{self.repeats} led to one of these again"] if self.repeats else []
+        tried = f"{sum(self.guesses)} initial guesses, from motions that start at {self.starts} states"
+        ends = [f"{self.repeats} more converged to these orbits"] if self.repeats else []
         failed = [
             f"{number} {_WORDS.get(reason, reason)}" for reason, number in sorted(self.failures.items())
         ]

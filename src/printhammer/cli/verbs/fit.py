@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from printhammer.identify.result import Fit
 
 GROUP: Final = "Fit constants to measurements: CSV tables whose header gives the unit of each column."
-_MEASURED: Final = "printhammer measure all hendriks-1983 --out lab &&"
+_MEASURED: Final = "printhammer measure all hendriks-1983 --out lab --force &&"
 """Makes the tables that the examples read."""
 
 EXAMPLE: Final = (
@@ -91,7 +91,9 @@ def magnet(
 
 @verb(
     "fit solenoid",
-    "printhammer fit solenoid solenoid.csv --turns 957 --current '1.2 A' --out solenoid.toml",
+    r"printf 'gap [mm],inductance [mH],force [N]\n0.25,81.4,63.4\n0.5,51.8,22.6\n1,32.2,6.92\n1.5,24.8,3.31\n"
+    r"2,20.8,1.93\n3,16.7,0.892\n' > solenoid.csv &&"
+    " printhammer fit solenoid solenoid.csv --turns 600 --current '0.8 A' --out solenoid.toml",
     _PASSED,
     **_FILES,
 )
@@ -265,7 +267,8 @@ _probe = partial(opt.text, panel="Probe")
 
 @verb(
     "fit coil",
-    "printhammer fit coil current.csv --hammer driven.toml --locked '100 um' --out coil.toml",
+    "printhammer measure current relay-5v --locked '0 mm' --out current.csv &&"
+    " printhammer fit coil current.csv --hammer relay-5v --locked '0 mm' --out coil.toml",
     {
         **_PASSED,
         "offset": _probe("CURRENT", "Offset of the current probe, e.g. '2 mA', '0 mA +- 5 mA' or 'fit'."),
