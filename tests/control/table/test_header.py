@@ -142,6 +142,7 @@ def test_a_dot_is_known_when_its_first_pulse_is_fired(tmp_path: Path) -> None:
                 assert ahead[row, number] == max(0, math.ceil(slots_before - 1e-6))
         # 0.75 ms after the last dot the two slots after it must be known to be empty.
         assert ahead[row, 0] == math.ceil(2.0 - 750e-6 * rate) == 2
+    assert (ahead == table.look_ahead).all()
     (tmp_path / "table.h").write_text(table.to_header())
     text = '#include "table.h"\n#include <stdio.h>\n'
     text += f'int main(void) {{ printf("%u\\n", {PREFIX}_slots_ahead(1u)); return 0; }}\n'

@@ -31,7 +31,7 @@ from printhammer.control.table.formats import (
     csv_head,
     read_table,
 )
-from printhammer.control.table.header import NANOSECOND, bits_of, header_text, size_of
+from printhammer.control.table.header import NANOSECOND, bits_of, header_text, look_ahead, size_of
 from printhammer.drive.input import read_positive
 from printhammer.drive.trains import Drive
 from printhammer.drive.waveforms.shapes import Waveform
@@ -48,7 +48,7 @@ from printhammer.results.summary import (
     Summary,
 )
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
-from printhammer.support.arrays import FloatArray
+from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.files import read_text, write_file
 
 if TYPE_CHECKING:
@@ -287,11 +287,18 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
             Cells("width", width, "s"),
             Cells("brake after", np.where(brake > 0.0, delay, np.nan), "s"),
             Cells("brake", np.where(brake > 0.0, brake, np.nan), "s"),
+            Cells("known ahead\n[slots]", self.look_ahead[-1, places]),
             Cells("worst,\nof the limits", 100.0 * worst, "%", ".1f"),
         ]
         low, high, count = self.rates[0], self.rates[-1], self.rates.size
         span = f"{low:g} Hz to {high:g} Hz, {count} rates, at " if count > 1 else ""
         return Summary([Grid(columns, f"Table for {span}{high:g} Hz", most=12)])
+
+    @property
+    def look_ahead(self) -> IntArray:
+        """Slots that the pattern must be known ahead, (rates, entries); see `header.look_ahead`."""
+        times = {name: getattr(self, name) for name in COLUMNS}
+        return look_ahead(times, self.rates, self.gaps, self.reach)
 
     @property
     def provenance(self) -> dict[str, Any]:
