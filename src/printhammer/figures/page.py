@@ -113,23 +113,23 @@ VIEWS: Final = get_args(View)
 ZOOM_SHAPE: Final = 3.5
 """Width of the worst place in units of the height of the wires."""
 
-_WIDTH: Final = 7.6
-_SIDE: Final = 0.2
-_LABEL: Final = 0.24
-_GAP: Final = 0.1
-_BESIDE: Final = 0.15
-_UPRIGHT: Final = 0.5
-_BAR: Final = 1.5
-_LEAST_MARK: Final = 1.8
+_WIDTH: Final = 7.6  # Width of the figure, in
+_SIDE: Final = 0.2  # Margin at either side, in
+_LABEL: Final = 0.24  # Height of a heading, in
+_GAP: Final = 0.1  # Gap between panels, in
+_BESIDE: Final = 0.15  # Gap between panels side by side, in
+_UPRIGHT: Final = 0.5  # Ratio of height to width above which panels are side by side; arbitrary
+_BAR: Final = 1.5  # Length of the colour bar, in
+_LEAST_MARK: Final = 1.8  # Smallest size of a mark, points
 _NEUTRAL: Final = "#c6ccd1"
-_TALLEST: Final = 4.5
-_LARGEST: Final = 0.1
-_FOOT: Final = 0.62
-_INCH: Final = 25.4e-3
-_FINENESS: Final = 10
-_ACROSS: Final = 2000
-_ZOOM_FINENESS: Final = 50
-_SHEET_FINENESS: Final = 16
+_TALLEST: Final = 4.5  # Largest height of a panel, in
+_LARGEST: Final = 0.1  # Largest distance between slots in the figure, in
+_FOOT: Final = 0.62  # Height of the text at the foot, in
+_INCH: Final = 25.4e-3  # An inch, m
+_FINENESS: Final = 10  # Pixels per slot of a page
+_ACROSS: Final = 2000  # Largest number of pixels across
+_ZOOM_FINENESS: Final = 50  # Pixels per slot of the worst place
+_SHEET_FINENESS: Final = 16  # Pixels per slot of a sheet at true size
 _MICRONS: Final = Scale("Placement error", "m", "um")
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_SLOTS: Final = 64  # Largest number of slots shown; arbitrary
-_US: Final = 1e6
+_US: Final = 1e6  # Microseconds in a second
 _ROOM: Final = 1.25  # Half-width of the axes in units of the limits or of the dots; arbitrary
 
 

@@ -40,8 +40,8 @@ MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
 FAR: Final = 1e4
 """Distance from the origin, in strokes, beyond which the armature counts as runaway; arbitrary."""
 
-_NODES: Final = 2048
-_CONTACTS: Final = 256
+_NODES: Final = 2048  # Rows of nodes in the smallest working space
+_CONTACTS: Final = 256  # Rows of contacts in the smallest working space
 _NODES_A_FLIGHT: Final = 40  # Rows of nodes per flight in the initial guess of the memory
 _MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FIRST: Final = "first"
 LAST: Final = "last"
-_ENDS: Final = {FIRST: 0, LAST: -1}
+_ENDS: Final = {FIRST: 0, LAST: -1}  # Index of the end of a branch, by its name
 _LIST: Final = ", ".join(KINDS)
 
 

@@ -339,7 +339,7 @@ class Search:
                 described.append((orbit, own.hits))
 
     def _along(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add the orbits on the branches through known orbits, and the orbits joined from these."""
+        """Add the orbits on the branches through known orbits, and orbits from guesses that join these."""
         first = [orbit for orbit, _hits in described]
         short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
         states = self.effort.quiet.mapped(crossings, short)

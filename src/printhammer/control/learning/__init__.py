@@ -1,1 +1,1 @@
-"""Run-to-run calibration of a compensation table, on a hammer nobody has measured, from one number a dot."""
+"""Run-to-run calibration of a compensation table for an unmeasured hammer, from one reading per dot."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch import Branch
     from printhammer.chaos.continuation.regimes import Branches
 
+# Colour of an orbit period, in firings
 _COLOURS: Final = {1: style.BLUE, 2: style.ORANGE, 3: style.GREEN, 4: style.YELLOW}
 _SHOWN: Final = {
     "x": ("Displacement at the section", "m", "µm", 1e6),

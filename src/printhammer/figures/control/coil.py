@@ -100,8 +100,8 @@ def _axes(ax: Axes) -> None:
 
 
 _DASHES: Final = ("-", (0, (4, 2)), (0, (1, 1.5)))  # Dashes of successive lines
-_MILLI: Final = 1e3
-_MICRO: Final = 1e6
+_MILLI: Final = 1e3  # Milliseconds in a second
+_MICRO: Final = 1e6  # Microseconds in a second
 
 
 @styled

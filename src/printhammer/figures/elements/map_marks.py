@@ -41,8 +41,8 @@ UNKNOWN: Final = "#e4e4e4"
 LOWEST, HIGHEST, RATES, TIMES = 500.0, 2500.0, 640, 1024
 """Range of rates in the paper's figures as drawn here, Hz, and the numbers of rates and times."""
 
-_KILO: Final = 1e3
-_LOST: Final = 2.0
+_KILO: Final = 1e3  # Rate from which the axis is in kHz, Hz
+_LOST: Final = 2.0  # Width of the lines of lost dots, points
 
 
 def chart_of(

@@ -38,9 +38,9 @@ SURFACES: Final = {"backstop": "#8a8a8a", "pack": YELLOW}
 WIDTH: Final = 6.4
 """Width of a figure, in."""
 
-TEXT, SMALL, TINY = 9.0, 8.0, 6.5
-LINE, THIN, HAIR = 1.4, 0.9, 0.6
-_LINE_OF_REMARK: Final = 112
+TEXT, SMALL, TINY = 9.0, 8.0, 6.5  # Font sizes, points
+LINE, THIN, HAIR = 1.4, 0.9, 0.6  # Line widths, points
+_LINE_OF_REMARK: Final = 112  # Number of characters in a line of a remark
 
 RC: Final[dict[str, Any]] = {
     "axes.edgecolor": INK,

@@ -44,7 +44,7 @@ _DEGREES: Final = 0.22
 """Degrees of freedom per sample of a noise estimate from the median of third differences."""
 _TOLD: Final = 0.05
 """Relative standard error up to which a held constant is reported as one that could be fitted."""
-_OFF: Final = 5.0
+_OFF: Final = 5.0  # Standard errors from which a deviation is reported
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
