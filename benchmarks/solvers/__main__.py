@@ -47,7 +47,7 @@ def solvers(
 
     others = None if peers is None else load_peers(Path(peers))
     announce_compiling()
-    with job.telling() as say:
+    with job.status_line() as say:
         report = run(quick=quick, threads=threads, peers=others, say=say)
     texts = {".json": report.to_json, ".md": report.to_markdown}
     return Answer(

@@ -90,7 +90,7 @@ def search(
     start = monotonic()
     count: int = 0
     best: dict[str, Any] | None = None
-    with job.telling("compiling and sampling") as say:
+    with job.status_line("compiling and sampling") as say:
 
         def tell(noted: int, least: float, row: dict[str, Any]) -> None:
             nonlocal count, best
@@ -137,7 +137,7 @@ def judge(
     announce_compiling()
     names = list(claims()) if every_claim else list(STATED)
     (judged,) = job.outputs
-    with job.counting("judging") as count, worker_pool(workers) as pool:
+    with job.progress_bar("judging") as count, worker_pool(workers) as pool:
         count(0, len(chosen))
 
         def tell(done: int, of: int, _row: dict[str, Any]) -> None:
@@ -174,7 +174,7 @@ def base_rates(
     from studies.reconstruction.workers import worker_pool
 
     announce_compiling()
-    with job.counting("random hammers") as tell, worker_pool(workers) as pool:
+    with job.progress_bar("random hammers") as tell, worker_pool(workers) as pool:
         tell(0, hammers)
         table = count(hammers, seed, slow=slow, pool=pool, tell=tell)
     return Answer(
@@ -220,7 +220,7 @@ def schemes(
     from studies.reconstruction.workers import worker_pool
 
     announce_compiling()
-    with job.counting("random hammers") as tell, worker_pool(workers) as pool:
+    with job.progress_bar("random hammers") as tell, worker_pool(workers) as pool:
         tell(0, hammers)
         table = schemes_json(hammer, hammers, seed, pool=pool, tell=tell)
     return Answer(
@@ -328,7 +328,7 @@ def ship(
     job.check_new(written)
     announce_compiling()
     hammer.save(folder / f"{name}.toml")
-    with job.counting("judging") as count:
+    with job.progress_bar("judging") as count:
 
         def tell(claim: str) -> None:
             count(list(claims()).index(claim), len(claims()), claim.replace("_", " "))

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from printhammer.cli.terminal import counting, pace_of, say, telling
+from printhammer.cli.terminal import pace_of, progress_bar, say, status_line
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def test_nothing_is_written_where_nobody_looks(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("FORCE_COLOR", raising=False)
-    with counting("orbits") as count, telling("judging") as tell:
+    with progress_bar("orbits") as count, status_line("judging") as tell:
         count(1, 2)
         tell("more")
     assert capsys.readouterr() == ("", "")
@@ -26,7 +26,7 @@ def test_nothing_is_written_where_nobody_looks(
 
 @pytest.mark.usefixtures("terminal")
 def test_a_terminal_sees_what_is_counted(capsys: pytest.CaptureFixture[str]) -> None:
-    with counting("orbits") as count:
+    with progress_bar("orbits") as count:
         count(3, 7)
     out, err = capsys.readouterr()
     assert out == ""
@@ -36,7 +36,7 @@ def test_a_terminal_sees_what_is_counted(capsys: pytest.CaptureFixture[str]) -> 
 
 @pytest.mark.usefixtures("terminal")
 def test_a_terminal_sees_what_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    with telling("sampling") as tell:
+    with status_line("sampling") as tell:
         tell("12 candidates")
     out, err = capsys.readouterr()
     assert out == ""
@@ -45,7 +45,7 @@ def test_a_terminal_sees_what_is_told(capsys: pytest.CaptureFixture[str]) -> Non
 
 @pytest.mark.usefixtures("terminal")
 def test_what_is_said_meanwhile_stands_above_the_bar(capsys: pytest.CaptureFixture[str]) -> None:
-    with counting("trains") as count, telling("judging"):
+    with progress_bar("trains") as count, status_line("judging"):
         count(1, 2)
         say("compiling runs")
     say("done")
@@ -55,13 +55,13 @@ def test_what_is_said_meanwhile_stands_above_the_bar(capsys: pytest.CaptureFixtu
 
 
 def test_an_error_goes_through() -> None:
-    with pytest.raises(ZeroDivisionError), counting("orbits"):
+    with pytest.raises(ZeroDivisionError), progress_bar("orbits"):
         raise ZeroDivisionError
 
 
 @pytest.mark.usefixtures("terminal")
 def test_count_rate_and_time_left_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
-    with counting("judging") as count:
+    with progress_bar("judging") as count:
         count(0, 4)
         count(1, 4, "settle out")
     err = " ".join(capsys.readouterr().err.split())

@@ -153,13 +153,13 @@ class Job:
                     f"{path}: expected a new file, this one is there; --force writes over it", file=path
                 )
 
-    def counting(self, name: str, *, remaining: bool = True) -> AbstractContextManager[terminal.Counted]:
-        """Show a progress bar and record the duration; see `terminal.counting`."""
-        return self._timed(terminal.counting(name, remaining=remaining))
+    def progress_bar(self, name: str, *, remaining: bool = True) -> AbstractContextManager[terminal.Counted]:
+        """Show a progress bar and record the duration; see `terminal.progress_bar`."""
+        return self._timed(terminal.progress_bar(name, remaining=remaining))
 
-    def telling(self, first: str = "…") -> AbstractContextManager[Callable[[str], None]]:
-        """Show a status line and record the duration; see `terminal.telling`."""
-        return self._timed(terminal.telling(first))
+    def status_line(self, first: str = "…") -> AbstractContextManager[Callable[[str], None]]:
+        """Show a status line and record the duration; see `terminal.status_line`."""
+        return self._timed(terminal.status_line(first))
 
     @contextmanager
     def _timed(self, shown: AbstractContextManager[Shown]) -> Iterator[Shown]:

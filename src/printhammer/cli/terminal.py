@@ -86,7 +86,7 @@ class Counted(Protocol):
 
 
 @contextmanager
-def counting(name: str, *, remaining: bool = True) -> Iterator[Counted]:
+def progress_bar(name: str, *, remaining: bool = True) -> Iterator[Counted]:
     """Show a progress bar called `name` with count, rate and time left; yield its callback.
 
     Without `remaining`, the elapsed time replaces the time left, which means nothing if most steps may turn
@@ -127,7 +127,7 @@ def pace_of(done: float, total: float | None, seconds: float | None) -> str:
 
 
 @contextmanager
-def telling(first: str = "…") -> Iterator[Callable[[str], None]]:
+def status_line(first: str = "…") -> Iterator[Callable[[str], None]]:
     """Show a status line for a computation of unknown length; yield a function that sets its text."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 

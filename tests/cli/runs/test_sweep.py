@@ -6,7 +6,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from printhammer.cli.verbs.sweep import Telling, duration_text, progress_text
+from printhammer.cli.verbs.sweep import SweepProgress, duration_text, progress_text
 from printhammer.results.store import open_store
 from printhammer.sweep.plan import size_text
 
@@ -107,9 +107,9 @@ def test_without_a_terminal_there_is_a_line_now_and_then(
 ) -> None:
     clock = iter(range(0, 100, 4))
     monkeypatch.setattr("printhammer.cli.verbs.sweep.time.monotonic", lambda: float(next(clock)))
-    with Telling() as telling:
+    with SweepProgress() as shown:
         for done in range(8):
-            telling.tell(done, 0, 8)
+            shown.tell(done, 0, 8)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
     assert lines[0].startswith("2 of 8 members, ")

@@ -262,7 +262,7 @@ class DiagramBuilder:
         """Run trains from states; return their states, periods and distances."""
         regimes = [self.table.regimes[row] for row in rows]
         done = self.done
-        effort = replace(self.effort, progress=lambda part, _all: self.tell(done + part))
+        effort = replace(self.effort, progress=lambda part, _all: self.report_progress(done + part))
         columns = run_columns(regimes, states, *self.counts, effort)
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
         scales = self.table.scales[list(rows)]
@@ -317,7 +317,7 @@ class DiagramBuilder:
             cycles, _distances = cycles_of(again, fronts, scales)
             self.sensitive[rows] |= cycles != table.cycles[rows]
 
-    def tell(self, done: int) -> None:
+    def report_progress(self, done: int) -> None:
         """Report the number of finished trains; trains run again to close joints do not count."""
         self.effort.report(min(done, self.known), self.known)
 
@@ -334,7 +334,7 @@ class DiagramBuilder:
                 begun[row] = regime, (x, v, *(electric if regime.fired.quantity == "voltage" else ()))
         self.known += len(begun)
         done = self.done
-        effort = replace(self.effort, progress=lambda part, _all: self.tell(done + part))
+        effort = replace(self.effort, progress=lambda part, _all: self.report_progress(done + part))
         exponents = exponents_onward(list(begun.values()), self.points, effort)
         for row, exponent in zip(begun, exponents, strict=True):
             if exponent.ok and exponent.smooth:

@@ -82,7 +82,7 @@ def bifurcation(
     passed |= {"firings": firings, "exponents": exponents}
     interrupted = False
     try:
-        with job.counting("trains") as tell:
+        with job.progress_bar("trains") as tell:
             result = computed(hammer, progress=tell, direction=start, **axis, **passed)
     except InterruptedDiagram as interrupt:
         interrupted, result = True, interrupt.diagram
@@ -200,7 +200,7 @@ def basins(
         firing = firing_of(job, hammer, passed, 1.05e-3, ", or --quench")
     if saddles is not None:
         read_count(saddles, "saddles")
-    with job.counting("cells") as tell:
+    with job.progress_bar("cells") as tell:
         if quench:
             mapped = quench_map(hammer, progress=tell, **passed)
             status, content, summary = mapped.status, Content.of(mapped), mapped.summary()
@@ -212,7 +212,7 @@ def basins(
     if saddles is not None:
         from printhammer.chaos.basins.saddles import saddle_manifolds
 
-        with job.counting("saddles") as tell:
+        with job.progress_bar("saddles") as tell:
             curves, hidden = saddle_manifolds(planes, saddles, progress=tell)
         shown.append(
             f"manifolds of {len(curves)} saddles drawn"

@@ -46,7 +46,7 @@ def dead_time(
         "voltage": opt.between(voltage, "V", "--voltage"),
         "temperature": opt.between(temperature, "degC", "--temperature"),
     }
-    with job.counting("fired") as tell:
+    with job.progress_bar("fired") as tell:
         made = timed(hammer, progress=tell, **grid, **passed)
     return Answer(
         render(made.summary(), units),
@@ -113,7 +113,7 @@ def impact_time(
         "sampling_rate": opt.between(sampling_rate, "Hz", "--sampling-rate"),
         "bits": [opt.read_whole(each, "--bits") for each in bits or ()],
     }
-    with job.counting("sampled") as tell:
+    with job.progress_bar("sampled") as tell:
         study = studied(
             hammer,
             progress=tell,

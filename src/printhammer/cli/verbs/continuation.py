@@ -118,7 +118,7 @@ def continue_(
     interrupted = False
     try:
         if regimes:
-            with job.counting("regimes", remaining=False) as tell:
+            with job.progress_bar("regimes", remaining=False) as tell:
                 fired = Regime.of(hammer, **firing) if "drive" in firing else hammer
                 result = all_regimes(
                     fired,
@@ -138,7 +138,7 @@ def continue_(
         interrupted, result = True, interrupt.branches
     job.show(*render(result.summary()))
     if second is not None and ends is not None and not interrupted:
-        with job.counting("curves", remaining=False) as tell:
+        with job.progress_bar("curves", remaining=False) as tell:
             chart = stability_chart(result[0], second, ends, grid=(grid, grid), progress=tell)
         return Answer(["", *render(chart.summary())], files={"out": Content.of(chart)})
     known = len(result) and second is None
@@ -169,7 +169,7 @@ def _followed(
 
     if levels < 0:
         raise InputError.of("doublings", levels, "a whole number from 0 on", written=str(levels))
-    with job.counting("orbits", remaining=False) as tell:
+    with job.progress_bar("orbits", remaining=False) as tell:
         branch = continuation(hammer, parameter, bounds, progress=tell, **options)
     return follow_doublings(branch, levels, most=options["most"])
 
@@ -263,7 +263,7 @@ def curve(
         ends = both(lowest, highest, "--from", "--to", parameter)
         check_two(parameter, second)
         orbit: dict[str, Any] = {"firings": firings, "state": state, "phase": phase}
-        with job.counting("orbits", remaining=False) as tell:
+        with job.progress_bar("orbits", remaining=False) as tell:
             branch = continuation(hammer, parameter, ends, progress=tell, **firing, **orbit, **passed)
         result = bifurcation_curve(branch, second, bounds, **chosen)
     return Answer(render(result.summary()), files={"out": Content.of(result)})

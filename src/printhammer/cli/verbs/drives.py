@@ -78,7 +78,7 @@ def energy(
             )
         from printhammer.control.least_work.rates import FOUND, least_work_rates
 
-        with job.counting("rates") as tell:
+        with job.progress_bar("rates") as tell:
             several = least_work_rates(hammer, rates, progress=tell, **passed)
         missing = int((several.status != FOUND).sum())
         complaint = f"no current was found at {missing} of {several.status.size} rates"
@@ -87,7 +87,7 @@ def energy(
             files={"out": Content.of(several)},
             complaints=[complaint] if missing else [],
         )
-    with job.counting("dots planned") as tell:
+    with job.progress_bar("dots planned") as tell:
         result = least_work(hammer, rate or rate_text(hammer, 1000.0), progress=tell, **passed)
     shown = render(result.summary(), units)
     if supply:
@@ -167,7 +167,7 @@ def feedback(
     change = Perturbation(current=read_positive(supply, "1", "supply") - 1.0, travel=travel or 0.0)
     sensor = PositionSensor(**opt.given(noise=noise, delay=delay, interval=interval, step=step, seed=seed))
     driven = perturbed(hammer, change)
-    with job.counting("tables, closed loops") as tell:
+    with job.progress_bar("tables, closed loops") as tell:
         result = compared(
             hammer, rate or rate_text(hammer, 1600.0), driven=driven, sensor=sensor, progress=tell, **passed
         )

@@ -79,7 +79,7 @@ def map_(
         raise InputError(f"--columns {columns} is given", key="--columns", expected="it with --measured only")
     beside = None if measured is None else load_measured_map(measured, columns=columns)
     grid, moments = _axes(hammer, beside, lowest, highest, rates, times)
-    with job.counting("rates") as tell:
+    with job.progress_bar("rates") as tell:
         chart = frequency_map(hammer, grid, times=moments, progress=tell, **passed)
     return Answer(
         render(summary_of(chart, beside)),

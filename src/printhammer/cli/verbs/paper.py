@@ -100,7 +100,7 @@ def paper(
 
     if not job.force:
         check_place(out)
-    with job.counting("paper,") as count:
+    with job.progress_bar("paper,") as count:
         report = write_report(hammer, out, progress=count, pdf=pdf)
     counts = ", ".join(_verdict(verdict, f"{report.count(verdict)} {verdict}") for verdict in _STYLES)
     job.show(table(_COLUMNS, report.results), "", marked(f"{len(report.results)} claims: {counts}"))

@@ -54,7 +54,7 @@ def chosen_strategy(
     from printhammer.control.feedback.controller import Controller
     from printhammer.control.feedback.plant import driver_of
 
-    with job.counting("tables of the controller") as tell:
+    with job.progress_bar("tables of the controller") as tell:
         return {"strategy": FeedbackStrategy(Controller(hammer, driver_of(hammer), progress=tell))}, None
 
 
@@ -168,7 +168,7 @@ def quality(
         from printhammer.printing.dots.paper import Paper
         from printhammer.printing.rates.quality import quality as report
 
-        with job.telling("printing"):
+        with job.status_line("printing"):
             slots = pattern if pulses is None else pulses
             varied = None if paper is None else Paper.load(paper)
             result = report(hammer, rate or 0.0, slots, **common, **opt.given(pitch=pitch, paper=varied))
@@ -176,7 +176,7 @@ def quality(
     elif task == "safe-rate":
         from printhammer.printing.rates.safe_rate import safe_rate as safe
 
-        with job.telling("patterns") as say:
+        with job.status_line("patterns") as say:
             result = safe(hammer, progress=lambda at: say(f"patterns up to {at:g} Hz"), **many)
     elif task == "yield":
         from printhammer.printing.rates.tolerance import tolerance_yield
@@ -185,12 +185,12 @@ def quality(
         if yield_ is None or yield_ < 1:
             raise InputError(f"--yield {yield_}: expected a number of hammers, 1 or more", key="--yield")
         drawn = opt.given(seed=seed, judged_by=judged_by)
-        with job.counting("hammers") as tell:
+        with job.progress_bar("hammers") as tell:
             result = tolerance_yield(hammer, rate, number=yield_, progress=tell, **spreads, **drawn, **many)
     else:
         from printhammer.printing.rates.damping import damping_study
 
-        with job.counting("materials") as tell:
+        with job.progress_bar("materials") as tell:
             result = damping_study(hammer, progress=tell, **opt.given(current=current), **many)
     return Answer(
         render(result.summary(), units),
@@ -340,7 +340,7 @@ def print_(
     if limits is not None:
         passed["limits"] = limits_named(limits)
     passed |= chosen_strategy(job, hammer, table, feedback, serial)[0]
-    with job.telling("printing"):
+    with job.status_line("printing"):
         page = print_page(hammer, asked, often, head=head, **passed)
     save = page.save
     views: dict[str, Any] = {name: Content(save, partial(page.plot, view=name)) for name in ("zoom", "sheet")}

@@ -75,7 +75,7 @@ def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **pa
     from printhammer.chaos.orbits.search import orbits as search
 
     firing = firing_of(job, hammer, passed, 1.05e-3)
-    with job.counting("orbits", remaining=False) as tell:
+    with job.progress_bar("orbits", remaining=False) as tell:
         result = search(hammer, progress=tell, **firing, **passed)
     regime = result.regime
     missing = "no periodic orbit was found; more --starts or --guesses may find one"
@@ -142,7 +142,7 @@ def lyapunov(
         chart, plot = LyapunovChart.of([single]), single.plot
         shown = render(single.summary())
     else:
-        with job.counting("trains") as tell:
+        with job.progress_bar("trains") as tell:
             chart = lyapunovs(
                 hammer, periods, overlap=firing.get("overlap"), threads=threads, progress=tell, **passed
             )

@@ -79,7 +79,7 @@ _KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
 }
 
 
-def _made(name: str, hammer: Hammer) -> tuple[str, float]:
+def _compile_code(name: str, hammer: Hammer) -> tuple[str, float]:
     """Compile or load one kind of machine code in a separate process; return its name and the time, s."""
     start = time.perf_counter()
     _KERNELS[name](hammer)
@@ -93,7 +93,7 @@ def _announce(sentences: SimpleQueue[str | None]) -> None:
 
 
 @contextmanager
-def _saying(sentences: SimpleQueue[str | None]) -> Iterator[None]:
+def _print_messages(sentences: SimpleQueue[str | None]) -> Iterator[None]:
     """Print the sentences that other processes put into a queue."""
 
     def work() -> None:
@@ -124,12 +124,12 @@ def warm(job: Job, hammer: Hammer = opt.FIRED) -> Answer:
     spawn = get_context("spawn")
     sentences = spawn.SimpleQueue()
     with (
-        job.counting("machine code", remaining=False) as tell,
-        _saying(sentences),
+        job.progress_bar("machine code", remaining=False) as tell,
+        _print_messages(sentences),
         ProcessPoolExecutor(2, spawn, _announce, (sentences,)) as pool,
     ):
         # In the order of `_KERNELS`: the longest compilation and the one needed first start first.
-        tasks = [pool.submit(_made, name, hammer) for name in _KERNELS]
+        tasks = [pool.submit(_compile_code, name, hammer) for name in _KERNELS]
         tell(0, len(tasks))
         for done, task in enumerate(as_completed(tasks), 1):
             rows.append(task.result())

@@ -64,9 +64,9 @@ def sweep(
 
     announce_compiling()
     began = time.monotonic()
-    with Telling() as telling:
-        result = run_sweep(spec, out, threads=threads, dask=dask, progress=telling.tell)
-    job.show(ended(result, telling.new, time.monotonic() - began))
+    with SweepProgress() as shown:
+        result = run_sweep(spec, out, threads=threads, dask=dask, progress=shown.tell)
+    job.show(ended(result, shown.new, time.monotonic() - began))
     job.wrote(out)
     return Answer()
 
@@ -89,7 +89,7 @@ def ended(result: xr.Dataset, new: float, seconds: float) -> str:
 _LINE_EVERY: Final = 10.0  # Interval between progress lines, s; arbitrary
 
 
-class Telling:
+class SweepProgress:
     """Progress of a sweep on the standard error: a bar on a terminal, else a line every ten seconds.
 
     Attributes

@@ -37,13 +37,13 @@ def tuned_along(
             expected=f"one rate, such as --rate {rate_text(hammer, 1300.0)!r}",
         )
     check_endings(job.wanted["out"], (*opt.DATA, ".h"), "--out")
-    with job.counting("tuning") as tell:
+    with job.progress_bar("tuning") as tell:
         made = tune_along(hammer, axis, values, progress=tell, **options)
-    made = _told(job, made, header, budget, units)
+    made = _show_table(job, made, header, budget, units)
     return Answer(files={"out": Content(lambda path: made.save(path, **header))})
 
 
-def _told(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
+def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
     """Show the table, rounded to the tick if any, check its size against the budget, and return it."""
     made = made.quantised(header["tick"]) if header else made
     made.to_header(budget=budget, **header)
@@ -138,15 +138,15 @@ def tune(
                 f"--report {job.wanted['report'][0]} is given", key="--report", expected="none beside --along"
             )
         return tuned_along(job, hammer, along, opt.given(tick=tick), budget, {**passed, **options}, units)
-    with job.counting("tuning") as tell:
+    with job.progress_bar("tuning") as tell:
         made = tuned(hammer, progress=tell, **passed, **options)
     header = opt.given(tick=tick)
-    made = _told(job, made, header, budget, units)
+    made = _show_table(job, made, header, budget, units)
     files = {"out": Content(partial(save_table, made, header), made.plot)}
     if not judge:
         return Answer(files=files)
     try:
-        with job.counting("judging") as tell:
+        with job.progress_bar("judging") as tell:
             report = judge_table(hammer, made, progress=tell, **options)
     except PrinthammerError as error:
         # Hours of tuning are in the table: it is written whatever the judge says.
@@ -281,7 +281,7 @@ def learn(
     passed.setdefault("rate", rate_text(hammer, 1275.0))
     passed.setdefault("largest_current", current_bound(hammer))
     passed.setdefault("driver", "switch" if pulse_of(hammer).quantity == "current" else "own")
-    with job.counting("learning") as tell:
+    with job.progress_bar("learning") as tell:
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
     likely = 100.0 * result.certainty[-1]
     if np.isnan(likely):
@@ -315,7 +315,7 @@ def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict
             key="--signal-noise",
             expected="the noise of a sample, such as '5 mA' or '50 mV'",
         )
-    with job.counting("sampling") as tell:
+    with job.progress_bar("sampling") as tell:
         study = impact_time(hammer, signal=signal, noise=[noise], dots=200, units=50, progress=tell)
     sensor = asdict(study.sensor())
     return {name: sensor[name] for name in ("noise", "offset", "missed") if sensor[name]}
