@@ -47,6 +47,7 @@ VERBS = {
     "strobe": "strobe {device} --period {period} --points 20 --no-verdict",
     "impact-time": "impact-time {device} --dots 10 --hammers 3",
     "quality": "quality {device} --rate {rate} --pattern 1101",
+    "quality --safe-rate": "quality {device} --safe-rate",
     "print": "print I --hammer {device} --rate {rate} --out page.png",
     "bifurcation": "bifurcation {device} --values 4 --firings 30 --refine 0 --no-exponents",
     "basins --quench": "basins {device} --quench --gaps {gaps} --widths {widths}",

@@ -87,6 +87,7 @@ def test_the_bound_on_the_current_is_that_of_the_device() -> None:
         ("run", "relay-5v"),
         ("map", "relay-5v", "--rates", "2", "--times", "4"),
         ("quality", "relay-5v", "--rate", "10 Hz", "--pattern", "11"),
+        ("duty", "relay-5v", "--thermal-resistance", "12 K/W", "--limit", "91 degC", "--ambient", "25 degC"),
         ("strobe", "relay-5v", "--period", "60 ms", "--points", "3", "--no-verdict"),
         ("basins", "relay-5v", "--quench", "--gaps", "10 ms, 20 ms, 2", "--widths", "10 ms, 20 ms, 2"),
     ],
@@ -96,6 +97,12 @@ def test_answers_about_a_relay_speak_of_closings(cli: Callable[..., Any], words:
     assert done.status == 0
     assert not re.search(r"\b(dots?|print(s|ed)?|paper|engraved)\b", done.out + done.err)
     assert words[0] == "strobe" or "closing" in done.out
+
+
+def test_refusals_of_a_relay_speak_of_closings(cli: Callable[..., Any]) -> None:
+    done = cli("energy", "relay-5v", "--dots", "1")
+    assert done.status == 2
+    assert not re.search(r"(?<!-)\bdots?\b", done.err)
 
 
 def test_the_noun_for_a_strike_is_no_physics() -> None:

@@ -26,7 +26,7 @@ from printhammer.cli import terminal
 from printhammer.cli.options import FORCE, PART, Files, Option
 from printhammer.cli.screen import heading
 from printhammer.cli.terminal import complain, console, say, warn
-from printhammer.errors import InputError
+from printhammer.errors import InputError, PrinthammerError
 
 if TYPE_CHECKING:
     from printhammer.hammer.hammer import Hammer
@@ -252,7 +252,15 @@ def verb(
             words |= {name: values[name] for name in on if values[name] is not None}
             if "job" in signature.parameters:
                 words["job"] = job
-            return job.end(function(**words))
+            try:
+                answer = function(**words)
+            except PrinthammerError as error:
+                if job.hammer is not None:
+                    from printhammer.results.summary import worded
+
+                    error.args = (worded(str(error), job.hammer.strike),)
+                raise
+            return job.end(answer)
 
         # Typer reads docstring, signature and annotations.
         typed: Any = call

@@ -196,11 +196,14 @@ def duty(
             raise InputError(
                 f"--{name.replace('_', '-')} is missing", key=name, expected="it beside the heat of a dot"
             )
-    made = thermal_duty(heat if heat is not None else _fired(hammer, passed), **passed)
-    return Answer(render(made.summary()), files={"out": Content.of(made)})
+    fired = None if hammer is None else load_hammer(hammer, fired=True)
+    source: Any = heat if fired is None else _heat(fired, passed)
+    made = thermal_duty(source, **passed)
+    said = made.summary().worded("dot" if fired is None else fired.strike)
+    return Answer(render(said), files={"out": Content.of(made)})
 
 
-def _fired(name: str | None, passed: dict[str, Any]) -> Any:
+def _heat(hammer: Hammer, passed: dict[str, Any]) -> Any:
     """Return the heat of one dot of a hammer, as a function of the winding temperature."""
     from printhammer.control.duty import heat_of
 
@@ -210,4 +213,4 @@ def _fired(name: str | None, passed: dict[str, Any]) -> Any:
             key="--feed",
             expected="it beside --heat only: a hammer has a driver of its own",
         )
-    return heat_of(load_hammer(str(name), fired=True))
+    return heat_of(hammer)

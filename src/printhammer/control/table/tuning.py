@@ -247,7 +247,7 @@ def tune(
     if lost.size:
         speed = float(grid[lost[0]])
         raise InputError(
-            (f"rate = {speed:g} Hz: no pulse prints every dot of rows {1e3 / speed:.4g} ms apart"),
+            (f"rate = {speed:g} Hz: no pulse makes every dot of rows {1e3 / speed:.4g} ms apart"),
             key="rate",
             value=speed,
             expected="a lower rate",
