@@ -93,6 +93,8 @@ def main() -> None:
     parser.add_argument("--perturbed", action="store_true")
     parser.add_argument("--keep", type=Path)
     asked = parser.parse_args()
+    if asked.keep is not None:
+        asked.keep.mkdir(parents=True, exist_ok=True)
     rows: list[list[Cell]] = []
     used = []
     for hammer in hammers(asked.hammer):
