@@ -211,7 +211,7 @@ def files(here: Path) -> Path:
     [
         ("search no/a.jsonl", "no/a.jsonl: expected a file in a folder that exists"),
         ("search .", ".: expected a file to write, this is a folder"),
-        ("search a.jsonl --aim shape", "--aim = 'shape', expected stated or all"),
+        ("search a.jsonl --aim shape", "--aim = 'shape': expected stated or all"),
         ("search a.jsonl --from none.jsonl", "none.jsonl: the log cannot be read"),
         ("search a.jsonl --from notes.txt", "notes.txt, line 1: expected the heading of the log of a search"),
         ("search search.jsonl --seed 3", "search.jsonl: the log of another search"),

@@ -91,9 +91,7 @@ def magnet(
 
 @verb(
     "fit solenoid",
-    r"printf 'gap [mm],inductance [mH],force [N]\n0.25,81.4,63.4\n0.5,51.8,22.6\n1,32.2,6.92\n1.5,24.8,3.31\n"
-    r"2,20.8,1.93\n3,16.7,0.892\n' > solenoid.csv &&"
-    " printhammer fit solenoid solenoid.csv --turns 600 --current '0.8 A' --out solenoid.toml",
+    "printhammer fit solenoid solenoid.csv --turns 600 --current '0.8 A' --out solenoid.toml",
     _PASSED,
     **_FILES,
 )
