@@ -103,10 +103,10 @@ def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
 
 
 def results(what: str, *more: str, **options: Any) -> Files:
-    """Return the option `--out` of a verb with a result: data files, pictures, and `more` endings."""
+    """Return the option `--out` for `what`: data files, pictures, and files with `more` endings."""
     endings = (*DATA, *more)
-    kinds = f"{what} ({', '.join(endings)}; SI)"
-    return files(f"{kinds} or picture (.svg, .png, .pdf); repeatable.", *endings, **options)
+    kinds = f"Output file for {what} ({', '.join(endings)}; SI)"
+    return files(f"{kinds} or a picture (.svg, .png, .pdf); repeatable.", *endings, **options)
 
 
 def file(what: str, *endings: str, **more: Any) -> Files:
@@ -301,7 +301,7 @@ def _hammer(use: str, *, flag: bool = False) -> Any:
     return text("HAMMER", what, default="hendriks-1983", argument=not flag, is_input=True, hammer=use)
 
 
-PART: Final = source("Python file that registers further laws of parts; repeatable.", many=True)
+PART: Final = source("Python file that registers additional laws of hammer parts; repeatable.", many=True)
 NAMED, HAMMER, FIRED = _hammer("named"), _hammer("loaded"), _hammer("fired")
 HAMMER_OPTION: Final = _hammer("loaded", flag=True)
 PERIOD: Final = text("TIME", "Time between firings, e.g. '1.05 ms'.", panel=_TRAIN)
@@ -309,17 +309,20 @@ RATE: Final = text("RATE", "Firings per second, e.g. '952 Hz'.", panel=_TRAIN)
 OVERLAP: Final = overlapping()
 TRAIN: Final = {"period": PERIOD, "rate": RATE, "overlap": OVERLAP}
 DRIVE: Final = source(
-    "Drive file, instead of --period or --rate: an endless force, or pulses at a constant rate.", panel=_TRAIN
+    "Drive file with a continuous periodic force or a pulse train, instead of --period or --rate.",
+    panel=_TRAIN,
 )
 FIRED_TRAIN: Final = {**TRAIN, "drive": DRIVE}
 LOWEST: Final = text("VALUE", "Lowest parameter value, with its unit.", flag="--from")
 HIGHEST: Final = text("VALUE", "Highest parameter value, with its unit.", flag="--to")
 TOLERANCE: Final = number("Error tolerance of one integration step, relative to stroke and typical speed.")
 THREADS: Final = whole("Number of threads (default: number of cores).")
-UNITS: Final = text("si|inch", "Unit system of the numbers on the terminal.", default=Units.SI, type=Units)
+UNITS: Final = text(
+    "si|inch", "Unit system of the numbers shown on the terminal.", default=Units.SI, type=Units
+)
 COLUMNS: Final = text(
     "COLUMNS",
-    "Columns of the table, counted from 1, with factor and offset: 'time=1, current=2*-10 A/V'"
-    " (default: file TABLE.toml beside it, or its heading).",
+    "Column numbers (from 1) of the quantities, with factor and offset, e.g. 'time=1, current=2*-10 A/V'"
+    " (default: from the file TABLE.toml beside the table, else from its heading).",
 )
 FORCE: Final = switch("Overwrite existing files.", flag="--force")

@@ -27,16 +27,21 @@ _of = partial(opt.text, panel=_PARAMETER)
     "printhammer bifurcation hendriks-1983 --from '1.2 ms' --to '1.35 ms' --values 60"
     " --direction both --out bifurcation.png",
     {
-        "transient": opt.whole("Number of firings to discard (default: all but 200, at least a third)."),
+        "transient": opt.whole(
+            "Number of firings to discard (default: all but the last 200, but at least a third)."
+        ),
         "refine": opt.whole(
-            "Number of times to halve the step where neighbouring verdicts differ.", default=2
+            "Number of times to halve the step where the classification of neighbouring motions differs.",
+            default=2,
         ),
         "overlap": opt.overlapping(_PARAMETER),
-        "drive": opt.source("Drive file: an endless force, or pulses.", panel=_PARAMETER),
+        "drive": opt.source(
+            "Drive file with a continuous periodic force or a pulse train.", panel=_PARAMETER
+        ),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("States at the firings and verdicts"),
+    out=opt.results("the states at the firings and the classification"),
 )
 def bifurcation(
     job: Job,
@@ -56,12 +61,12 @@ def bifurcation(
     ),
     firings: int = opt.whole("Number of firings at each value.", default=1000),
     exponents: bool = opt.switch(
-        "Compute Lyapunov exponents to separate strange motions from undecided ones.", default=True
+        "Compute Lyapunov exponents, to separate strange (chaotic) motions from undecided ones.", default=True
     ),
-    show: str = opt.choice("x|v", "Quantity on the vertical axis of the picture.", default="x"),
+    show: str = opt.choice("x|v", "Quantity on the vertical axis of the plot.", default="x"),
     **passed: Any,
 ) -> Answer:
-    """Compute a bifurcation diagram: periods and strange motions against a parameter.
+    """Compute a bifurcation diagram: periodic and strange (chaotic) motions against a parameter.
 
     The exit status is 1 if a run stopped early. Ctrl-C writes the finished part.
     """
@@ -146,14 +151,15 @@ _count = partial(opt.whole, panel=_BASINS)
     {
         **opt.FIRED_TRAIN,
         "x": opt.span(
-            "Displacements of the grid, e.g. '30 um, 260 um, 128' (default: the strobe window).",
+            "Displacement range and number of points, e.g. '30 um, 260 um, 128' (default: strobe window).",
             panel=_BASINS,
         ),
         "v": opt.span(
-            "Velocities of the grid, e.g. '-1 m/s, 1 m/s, 128' (default: the strobe window).", panel=_BASINS
+            "Velocity range and number of points, e.g. '-1 m/s, 1 m/s, 128' (default: strobe window).",
+            panel=_BASINS,
         ),
-        "firings": _count("Number of firings in a round (default: 200)."),
-        "rounds": _count("Maximum number of rounds for a cell (default: 20)."),
+        "firings": _count("Number of firings per round of simulation (default: 200)."),
+        "rounds": _count("Maximum number of rounds per grid cell (default: 20)."),
         "gaps": opt.span(
             "Times between the two firings (default: '0.5 ms, 0.9 ms, 128'; longer for a slow device).",
             panel=_QUENCH,
@@ -163,25 +169,29 @@ _count = partial(opt.whole, panel=_BASINS)
         ),
         "tail": opt.text(
             "TIME",
-            "Time after the second firing within which its dot has to come"
+            "Time limit after the second firing for the impact of its dot"
             " (default: 1 ms; longer for a slow device).",
             panel=_QUENCH,
         ),
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Basins or quench map"),
+    out=opt.results("the basins or the quench map"),
 )
 def basins(
     job: Job,
     hammer: Hammer = opt.HAMMER,
-    box: int | None = _count("Side of a box of the basin entropy, in cells (default: 4)."),
-    saddles: int | None = _count("Largest period, in firings, of the saddles whose manifolds are drawn."),
-    quench: bool = opt.switch("Map the dots of two pulses from rest, instead of basins.", panel=_QUENCH),
+    box: int | None = _count("Box size for the basin entropy, in cells per side (default: 4)."),
+    saddles: int | None = _count(
+        "Largest period, in firings, of the saddle orbits whose manifolds are drawn."
+    ),
+    quench: bool = opt.switch(
+        "Map the dots of two successive pulses from rest, instead of basins.", panel=_QUENCH
+    ),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Map the basins of attraction, or with --quench the second pulses that lose their dot.
+    """Map the basins of attraction, or with --quench the second pulses that print no dot.
 
     The exit status is 1 if a run stopped early.
     """

@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     " --out dead.csv --out dead.h",
     {
         "blow": opt.text(
-            "SPEED", "Impact speed for which the pulse width is solved (default: that at the nominal rail)."
+            "SPEED",
+            "Impact speed for which the pulse width is solved (default: that at the nominal voltage).",
         ),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Dead-time table", ".h"),
+    out=opt.results("the dead-time table", ".h"),
 )
 def dead_time(
     job: Job,
@@ -60,17 +61,19 @@ def dead_time(
     "printhammer impact-time impact-wire --noise '2 mA, 20 mA, 4' --sampling-rate '200 kHz, 1 MHz, 2'"
     " --bits 12 --out impact.svg",
     {
-        "signal": opt.choice("current|voltage", "Quantity that is sampled.", default="current"),
+        "signal": opt.choice("current|voltage", "Sampled signal of the coil.", default="current"),
         "full_scale": opt.text(
             "VALUE", "Full scale of the A/D converter (default: 1.5 times the largest nominal sample)."
         ),
         "delay": opt.text("TIME", "Delay of the probe, e.g. '2 us' (default: none)."),
         "bandwidth": opt.text("FREQUENCY", "Bandwidth of the probe, e.g. '50 kHz' (default: unlimited)."),
-        "known": opt.switch("Let the estimator know delay and bandwidth of the probe.", default=True),
-        "dots": opt.whole("Number of dots for each sampling setup.", default=50),
-        "seed": opt.whole("Seed of the hammers and of the noise.", default=0),
+        "known": opt.switch("Use the delay and bandwidth of the probe in the estimator.", default=True),
+        "dots": opt.whole(
+            "Number of dots for each combination of noise, sampling rate and resolution.", default=50
+        ),
+        "seed": opt.whole("Seed for drawing the hammers and the noise.", default=0),
     },
-    out=opt.results("Errors of the impact time"),
+    out=opt.results("the errors of the impact time"),
 )
 def impact_time(
     job: Job,
@@ -79,18 +82,20 @@ def impact_time(
         "Standard deviations of a sample (default: 0.1, 0.3 and 1 % of the peak current, or of 10 V)."
     ),
     sampling_rate: tuple[str, str, int] | None = opt.span(
-        "Sampling rates of the converter (default: 1 MHz)."
+        "Sampling rates of the A/D converter (default: 1 MHz)."
     ),
     bits: list[str] | None = opt.text(
         "N", "Resolution of the A/D converter in bits (default: 12); repeatable.", many=True
     ),
     hammers: int = opt.whole("Number of hammers drawn from the production spread.", default=20),
     record: list[Path] | None = opt.source(
-        "Record of one shot, columns time, current or voltage: estimate its impact time instead; repeatable.",
+        "Record of one shot (columns: time, and current or voltage) whose impact time is estimated, instead"
+        " of simulated shots; repeatable.",
         many=True,
     ),
     columns: str | None = opt.text(
-        "COLUMNS", "Columns of the records, e.g. 'time=1, current=2*-10 A/V' (default: their headings)."
+        "COLUMNS",
+        "Column numbers (from 1) of the records, e.g. 'time=1, current=2*-10 A/V' (default: from headings).",
     ),
     units: Units = opt.UNITS,
     **passed: Any,
@@ -138,7 +143,9 @@ def _coil(si: str, metavar: str, what: str) -> Any:
     " --ambient '50 degC' --out duty.csv",
     {
         "thermal_resistance": _coil(
-            "K/W", "K/W", "Thermal resistance from the winding to the air, or to the body if there is one."
+            "K/W",
+            "K/W",
+            "Thermal resistance from the winding to the air, or to the body in a two-mass model.",
         ),
         "thermal_capacity": _coil("J/K", "J/K", "Heat capacity of the winding; needed for burst times."),
         "body_resistance": _coil(
@@ -157,17 +164,20 @@ def _coil(si: str, metavar: str, what: str) -> Any:
             "Quantity that the driver holds constant as the coil warms (default: voltage).",
         ),
     },
-    out=opt.results("Allowed rates"),
+    out=opt.results("the allowed rates"),
 )
 def duty(
     hammer: str | None = opt.text(
-        "HAMMER", "Hammer whose coil has a resistance, instead of --heat.", argument=True, is_input=True
+        "HAMMER",
+        "Hammer file, or name of a shipped hammer, whose coil has a resistance; instead of --heat.",
+        argument=True,
+        is_input=True,
     ),
     heat: float | None = opt.quantity(
         "J", "ENERGY", "Heat of one dot with the winding at 20 degC, e.g. '4 mJ'.", positive=True
     ),
     rates: Path | None = opt.source(
-        "Table of rates that a maker allows (.csv); infers the thermal limit behind them."
+        "Manufacturer's table of permitted rates (.csv), from which the thermal limit is inferred."
     ),
     **passed: Any,
 ) -> Answer:

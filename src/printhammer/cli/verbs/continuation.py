@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _START: Final = "Start"
 _ALL: Final = "All regimes in the rate"
-_CHART: Final = "Chart of two constants"
+_CHART: Final = "Chart of two parameters"
 
 
 def read_state(written: str, name: str) -> tuple[float, float]:
@@ -38,7 +38,7 @@ _STATE: Final = opt.text(
     "X,V", "State (x, v) near the orbit, e.g. '46.2 um, 12 mm/s'.", panel=_START, read=read_state
 )
 _PHASE: Final = opt.number(
-    "Phase of the section after the firing, as a fraction of the period.",
+    "Phase of the Poincaré section after each firing, as a fraction of the period.",
     panel=_START,
     metavar="P",
     default=0.0,
@@ -55,13 +55,15 @@ _PHASE: Final = opt.number(
         "drive": opt.DRIVE,
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Branches"),
+    out=opt.results("the branches"),
 )
 def continue_(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     parameter: str = opt.text(
-        "NAME", "Continuation parameter: 'rate', 'period' or a key, e.g. 'backstop.damping'.", default="rate"
+        "NAME",
+        "Continuation parameter: 'rate', 'period' or a constant, e.g. 'backstop.damping'.",
+        default="rate",
     ),
     lowest: str | None = opt.LOWEST,
     highest: str | None = opt.HIGHEST,
@@ -71,9 +73,11 @@ def continue_(
     state: tuple[float, float] | None = _STATE,
     phase: float = _PHASE,
     doublings: int = opt.whole(
-        "Number of generations of branches to follow from period doublings and crossings.", default=0
+        "Number of generations of new branches to follow from period doublings and branch points.", default=0
     ),
-    regimes: bool = opt.switch("Search for orbits at several rates and continue them all.", panel=_ALL),
+    regimes: bool = opt.switch(
+        "Search for orbits at several rates and continue all of them in the rate.", panel=_ALL
+    ),
     longest: int = opt.whole("Largest orbit period to search for, in firings.", panel=_ALL, default=3),
     seeds: int = opt.whole("Number of rates at which orbits are searched for.", panel=_ALL, default=6),
     second: str | None = opt.text(
@@ -91,7 +95,7 @@ def continue_(
         default=32,
     ),
     show: str = opt.choice(
-        "v|x|flight_time|peak_force", "Quantity on the vertical axis of pictures.", default="v"
+        "v|x|flight_time|peak_force", "Quantity on the vertical axis of plots.", default="v"
     ),
     **passed: Any,
 ) -> Answer:
@@ -201,13 +205,13 @@ def read_event(written: str, name: str) -> int | str:
         "drive": opt.DRIVE,
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Bifurcation curve"),
+    out=opt.results("the bifurcation curve"),
 )
 def curve(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     parameter: str = opt.text(
-        "NAME", "Name of the first parameter: 'rate', 'period' or a key.", default="rate"
+        "NAME", "Name of the first parameter: 'rate', 'period' or a constant of the hammer.", default="rate"
     ),
     lowest: str | None = opt.LOWEST,
     highest: str | None = opt.HIGHEST,

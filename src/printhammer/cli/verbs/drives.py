@@ -23,9 +23,9 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
     "energy",
     "printhammer energy hendriks-1983 --rate '1 kHz' --dots 2 --out burst.png",
     {
-        "dots": opt.whole("Number of dots.", default=8),
+        "dots": opt.whole("Number of dots in the burst.", default=8),
         "force": opt.number(
-            "Lowest peak force of a dot, as a fraction of the single pulse's (default: 0.9).",
+            "Smallest peak force of a dot, as a fraction of the single pulse's (default: 0.9).",
             flag="--least-force",
         ),
         "largest": opt.text(
@@ -37,11 +37,12 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
             metavar="A/S",
         ),
         "spacing": opt.text(
-            "TIME", "Time between nodes of the current, e.g. '50 us' (default: from the pack contact)."
+            "TIME",
+            "Time between nodes of the current, e.g. '50 us' (default: from the duration of contact).",
         ),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Burst; .csv: its current as a sampled waveform"),
+    out=opt.results("the burst, with .csv its current as a sampled waveform"),
 )
 def energy(
     job: Job,
@@ -54,9 +55,9 @@ def energy(
     ),
     heat: bool = opt.switch("Minimise the coil heat instead of the positive work."),
     pulses: bool = opt.switch(
-        "Restrict the current to pulses of the hammer; optimise their times and widths."
+        "Restrict the current to the hammer's own pulses, and optimise their times and widths."
     ),
-    supply: bool = opt.switch("Show the dots of the burst if the current is off by up to 3 %."),
+    supply: bool = opt.switch("Show the dots of the burst if the current deviates by up to 3 %."),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
@@ -119,9 +120,9 @@ def energy(
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Deviations of force and arrival"),
+    out=opt.results("the deviations of force and arrival time"),
     run=opt.files(
-        "Picture of one run (.svg, .png, .pdf), or its drive (.toml); repeatable.",
+        "Output file for one run: a picture (.svg, .png, .pdf) or its drive (.toml); repeatable.",
         ".toml",
         panel="The run that is shown",
     ),
@@ -131,7 +132,7 @@ def feedback(
     hammer: Hammer = opt.HAMMER,
     rate: str | None = opt.text("RATE", "Dot slots per second (default: 1.6 kHz; lower for a slow device)."),
     noise: float | None = opt.number(
-        "Standard deviation of a sample, as a fraction of the travel to the pack (default: 0.01)."
+        "Standard deviation of a sensor sample, as a fraction of the travel to the pack (default: 0.01)."
     ),
     delay: float | None = opt.quantity("s", "TIME", "Delay of the sensor (default: 20 us)."),
     interval: float | None = opt.quantity(
@@ -143,7 +144,7 @@ def feedback(
     seed: int | None = opt.whole("Seed of the sensor noise (default: 0)."),
     supply: float = opt.number("Current of the driven hammer, as a fraction of nominal.", default=1.0),
     travel: float | None = opt.quantity(
-        "m", "LENGTH", "Extra distance of the driven hammer's pack, e.g. '10 um' (default: 0)."
+        "m", "LENGTH", "Additional distance from the driven hammer to its pack, e.g. '10 um' (default: 0)."
     ),
     beside: Path | None = opt.source(
         "Compensation table to compare with, made by `printhammer tune`.", flag="--table"

@@ -28,19 +28,21 @@ _RESULTS: Final = "Results"
 # In the order of writing.
 _FILES: Final = {
     "out": opt.files(
-        "Fitted constants as a fragment of a hammer file (.toml), or picture of data and residuals (.svg,"
-        " .png, .pdf); repeatable.",
+        "Output file for the fitted constants as a fragment of a hammer file (.toml), or a picture of data"
+        " and residuals (.svg, .png, .pdf); repeatable.",
         ".toml",
         panel=_RESULTS,
     ),
-    "covariance": opt.file("Covariance matrix of the constants (CSV).", panel=_RESULTS),
-    "into": opt.file("Hammer file to write: that of --hammer with the fitted constants.", panel=_RESULTS),
+    "covariance": opt.file("Output file for the covariance matrix of the constants (.csv).", panel=_RESULTS),
+    "into": opt.file(
+        "Output hammer file (.toml): the hammer of --hammer with the fitted constants.", panel=_RESULTS
+    ),
 }
 _measured = partial(opt.source, argument=True)
 _earlier = partial(opt.source, panel="Tables of the parts, fitted first")
 
 _HAMMER: Final = opt.text(
-    "HAMMER", "Hammer with the constants already known; the start of --into.", is_input=True
+    "HAMMER", "Hammer file or name that supplies the known constants; template for --into.", is_input=True
 )
 _STRICT: Final = opt.switch("Exit with status 1 if the data reject the law.")
 _PASSED: Final = {
@@ -98,7 +100,7 @@ def magnet(
 def solenoid(
     job: Job,
     file: Path = _measured(
-        "Table of a coil with held armature: columns gap, force, inductance or linkage, optionally current.",
+        "Table of a coil, armature held: columns gap, force, inductance or linkage, optionally current.",
         default=...,
     ),
     turns: float = opt.number("Number of turns of the coil.", metavar="N", default=...),
@@ -146,7 +148,7 @@ def spring(
     {
         **_PASSED,
         "thickness": opt.quantity("m", "LENGTH", "Thickness of the pack, e.g. '0.007 in'."),
-        "exponents": opt.switch("Fit the exponents, instead of 2.7 and 11."),
+        "exponents": opt.switch("Fit the exponents, instead of assuming 2.7 and 11."),
     },
     **_FILES,
 )
@@ -177,13 +179,15 @@ def backstop(
     job: Job,
     file: Path | None = _measured("Table of rebounds: columns impact speed, rebound speed."),
     radius: list[str] | None = opt.text(
-        "LENGTH", "Radius of the armature; a second one for a round backstop.", many=True
+        "LENGTH",
+        "Radius of the armature's contact surface; repeat the option for a round backstop.",
+        many=True,
     ),
     modulus: list[str] | None = opt.text(
-        "PRESSURE", "Young's modulus of armature and backstop, one option each.", many=True
+        "PRESSURE", "Young's modulus of the armature; repeat the option for the backstop.", many=True
     ),
     poisson: list[str] | None = opt.text(
-        "X", "Poisson ratio of armature and backstop, one option each.", many=True
+        "X", "Poisson ratio of the armature; repeat the option for the backstop.", many=True
     ),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
@@ -224,12 +228,15 @@ def backstop(
 def motion(
     job: Job,
     files: list[Path] = _measured(
-        "Records of single shots: columns time, displacement, optionally current; one file each.",
+        "Records of single shots, one per file: columns time, displacement, optionally current.",
         many=True,
         default=...,
     ),
     hammer: str | None = _HAMMER,
-    free: str | None = opt.text("KEYS", "Constants to fit, e.g. 'mass, backstop.damping'."),
+    free: str | None = opt.text(
+        "KEYS",
+        "Constants to fit (default: 'mass', and 'backstop.damping' if a record shows a backstop contact).",
+    ),
     magnet: Path | None = _earlier("Table of magnet and spring together, fitted first."),
     spring: Path | None = _earlier("Table of the spring alone, fitted first."),
     pack: Path | None = _earlier("Table of the pack, fitted first."),
@@ -273,15 +280,21 @@ _probe = partial(opt.text, panel="Probe")
         "gain": _probe("X", "Gain of the current probe, e.g. '1 +- 0.01' or 'fit'."),
         "delay": _probe("TIME", "Delay of the current probe, e.g. '2 us', '0 us +- 5 us' or 'fit'."),
         "bandwidth": _probe("FREQUENCY", "Bandwidth of the current probe, e.g. '200 kHz' or 'fit'."),
-        "resolution": _probe("CURRENT", "Step of the readings; default: found in the readings."),
-        "locked": opt.quantity("m", "LENGTH", "Displacement of a locked armature (default: free armature)."),
+        "resolution": _probe(
+            "CURRENT", "Quantisation step of the readings (default: estimated from the readings)."
+        ),
+        "locked": opt.quantity(
+            "m", "LENGTH", "Displacement at which the armature is locked (default: the armature is free)."
+        ),
     },
     **_FILES,
 )
 def coil(
     job: Job,
     files: list[Path] = _measured(
-        "Records of shots: columns time, current, optionally voltage; one file each.", many=True, default=...
+        "Records of single shots, one per file: columns time, current, optionally voltage.",
+        many=True,
+        default=...,
     ),
     hammer: str | None = _HAMMER,
     free: str | None = opt.text("KEYS", "Constants to fit (default: coil.resistance, coil.inductance)."),

@@ -33,7 +33,7 @@ GROUP: Final = "Show and check hammer files."
 def show(
     hammer: str = opt.NAMED,
     units: Units = opt.UNITS,
-    toml: bool = opt.switch("Print the hammer file, as a start for your own."),
+    toml: bool = opt.switch("Print the hammer file, as a template for your own."),
 ) -> Answer:
     """Show each constant with its status and source, and the equilibria of the armature."""
     from printhammer.hammer.equilibrium import equilibrium_picture
@@ -83,7 +83,7 @@ def check(hammer: str = opt.NAMED) -> Answer:
     "hammer schema",
     "printhammer hammer schema --out hammer.schema.json",
     {"part": opt.PART},
-    out=opt.file("File of the schema, instead of the terminal."),
+    out=opt.file("Output file for the schema (default: the terminal)."),
 )
 def schema(job: Job) -> Answer:
     """Print the JSON schema of hammer files, including the laws registered with --part."""
@@ -188,13 +188,13 @@ POOR = 0.15
     "hammer from-datasheet",
     "printhammer hammer from-datasheet --example impact-wire > sheet.toml"
     " && printhammer hammer from-datasheet sheet.toml --out wire.toml",
-    out=opt.file("Hammer file to write (.toml).", ".toml"),
+    out=opt.file("Output hammer file (.toml).", ".toml"),
 )
 def from_datasheet(
     sheet: Path | None = opt.argument("SHEET", "Data sheet of a solenoid (TOML).", type=Path, is_input=True),
     example: str | None = opt.text("NAME", "Print the data sheet of a shipped hammer, as an example."),
 ) -> Answer:
-    """Build a hammer from a maker's data sheet; each constant is marked printed, derived or assumed."""
+    """Build a hammer from a manufacturer's data sheet; mark constants as printed, derived or assumed."""
     if example is not None:
         typer.echo(_example(example), nl=False)
         return Answer()

@@ -32,7 +32,7 @@ _count = partial(opt.whole, panel=_BURST)
         "tolerance": opt.TOLERANCE,
         "threads": opt.THREADS,
     },
-    out=opt.results("Displacement map"),
+    out=opt.results("the displacement map"),
 )
 def map_(
     job: Job,
@@ -56,10 +56,12 @@ def map_(
     rates: int | None = _count("Number of rates (default: 512)."),
     times: int | None = _count("Number of sampling times (default: 512)."),
     measured: Path | None = opt.source(
-        "Measured map to compare with (CSV or NetCDF); it sets rates and times that are not set otherwise."
+        "Measured map to compare with (CSV or NetCDF); supplies the rates and times unless options set them."
     ),
     columns: str | None = opt.text(
-        "COLUMNS", "Columns of the measured table, e.g. 'time=1, 500 Hz=2*50 um/V' (default: its heading)."
+        "COLUMNS",
+        "Column numbers (from 1) of the measured table, with factors, e.g. 'time=1, 500 Hz=2*50 um/V'"
+        " (default: from its heading).",
     ),
     figure: str | None = opt.choice(
         "8|9", "Figure of the paper whose style the picture follows (default: 9)."

@@ -34,12 +34,14 @@ _bench = partial(opt.text, panel="Bench")
             " lengths; repeatable.",
             many=True,
         ),
-        "resolution": _sensor("AMOUNT", "Quantisation step of readings, in the form of --noise.", many=True),
-        "offset": _sensor("AMOUNT", "Zero offset of readings, in the form of --noise.", many=True),
+        "resolution": _sensor(
+            "AMOUNT", "Quantisation step of readings, in the format of --noise.", many=True
+        ),
+        "offset": _sensor("AMOUNT", "Zero offset of readings, in the format of --noise.", many=True),
         "sampling_rate": _sensor("RATE", "Sampling rate of records of motion or current (default: 1 MHz)."),
         "bandwidth": _sensor(
             "RATE",
-            "Bandwidth of motion and current sensors, a first-order low-pass (default: 200 kHz), or none.",
+            "Bandwidth of motion and current sensors, a first-order low-pass (default: 200 kHz), or 'none'.",
         ),
         "outliers": _sensor("SHARE", "Fraction of readings that are outliers, e.g. '2 %' (default: 0)."),
         "displacements": _bench("LIST", "Displacements at which the armature is held, e.g. '60 um, 100 um'."),
@@ -59,8 +61,10 @@ def measure(
         "KIND", "Kind of measurement: magnet, spring, pack, backstop, motion, current, or all.", default=...
     ),
     hammer: Hammer = opt.HAMMER,
-    out: Path | None = opt.folder("Table to write (CSV), or a folder if KIND is all.", metavar="FILE"),
-    exact: bool = opt.switch("Start from error-free sensors instead of an ordinary bench.", panel=_SENSORS),
+    out: Path | None = opt.folder("Output file (.csv), or output folder if KIND is all.", metavar="FILE"),
+    exact: bool = opt.switch(
+        "Start from error-free sensors instead of those of an ordinary bench.", panel=_SENSORS
+    ),
     seed: int = opt.whole("Seed of the random number generator.", default=0),
     **passed: Any,
 ) -> Answer:

@@ -20,9 +20,9 @@ _POINCARE: Final = 11  # Number of the figure of strobe points
 @verb("figure", "printhammer figure 3 hendriks-1983 --out build/figures")
 def figure(
     job: Job,
-    number: str = opt.argument("N", "Number of the figure in the paper.", default=...),
+    number: str = opt.argument("N", "Figure number in the paper.", default=...),
     hammer: Hammer = opt.HAMMER,
-    out: Path = opt.folder("Folder of the figure files.", default=Path("build/figures")),
+    out: Path = opt.folder("Output folder for the figure files.", default=Path("build/figures")),
     scheme: str = opt.choice(
         "exact|runge-kutta-4|trapezoid",
         "Integrator of Fig. 11: exact, or a scheme of 1983.",
@@ -30,7 +30,7 @@ def figure(
     ),
     reading: str = opt.choice(
         "firings|look-ahead|inside|grid|no-late-step",
-        "Rule for the short step of a scheme of 1983 at the backstop (only with --scheme).",
+        "Rule by which a scheme of 1983 takes short steps at the backstop (only with --scheme).",
         default="firings",
     ),
 ) -> Answer:
@@ -89,9 +89,9 @@ def paper(
     job: Job,
     hammer: Hammer = opt.HAMMER,
     out: Path = opt.folder(
-        "Folder of the report; an earlier report is replaced.", default=Path("build/paper")
+        "Output folder for the report; an earlier report is replaced.", default=Path("build/paper")
     ),
-    pdf: bool = opt.switch("Write the report as report.pdf, too."),
+    pdf: bool = opt.switch("Write the report as report.pdf as well."),
     strict: bool = opt.switch("Exit with status 1 if a claim fails."),
 ) -> Answer:
     """Reproduce all figures and claims of the paper: HTML report, figures and claims.json."""

@@ -23,7 +23,7 @@ TABLE: Final = opt.source("Compensation table of the drive (.csv, .json), made b
 SERIAL: Final = opt.text(
     "TEXT", "Serial number of the driven unit, for a learned table; 'any' skips the check."
 )
-FEEDBACK: Final = opt.switch("Drive with position feedback, as `printhammer feedback` (slow).")
+FEEDBACK: Final = opt.switch("Drive with position feedback, as in `printhammer feedback` (slow).")
 
 
 def chosen_strategy(
@@ -67,28 +67,32 @@ _instead = partial(opt.switch, panel=_MORE)
 
 
 @verb(
-    "quality", "printhammer quality hendriks-1983 --rate 900Hz --out quality.png", out=opt.results("Result")
+    "quality",
+    "printhammer quality hendriks-1983 --rate 900Hz --out quality.png",
+    out=opt.results("the result"),
 )
 def quality(
     job: Job,
     hammer: Hammer = opt.FIRED,
     rate: str | None = _report("RATE", "Dot slots per second, e.g. 900Hz."),
     pattern: str | None = _report(
-        "SLOTS", "Pattern of slots, e.g. 10110111 (default: de Bruijn cycle of order 8)."
+        "SLOTS", "Dot pattern, one digit per slot, e.g. 10110111 (default: de Bruijn cycle of order 8)."
     ),
     pulses: int | None = opt.whole(
         "Number of dots in successive slots, instead of --pattern.", panel="Report"
     ),
     pitch: str | None = _report("LENGTH", "Distance between neighbouring slots (default: 1/60 in)."),
-    paper: Path | None = opt.source("Variation of the paper along the line (.toml).", panel="Report"),
+    paper: Path | None = opt.source(
+        "File that describes how the paper varies along the line (.toml).", panel="Report"
+    ),
     table: Path | None = TABLE,
     serial: str | None = SERIAL,
     feedback: bool = FEEDBACK,
     safe_rate: bool = _instead(
-        "Find the highest rate up to which all patterns of eight slots stay within limits."
+        "Find the highest rate up to which all patterns of eight slots are printed within the limits."
     ),
     yield_: int | None = opt.whole(
-        "Number of hammers to draw; reports the yield at --rate, else their safe rates.",
+        "Number of random hammers; report the yield at --rate or, without --rate, their safe rates.",
         flag="--yield",
         panel=_MORE,
     ),
@@ -100,30 +104,32 @@ def quality(
     ),
     judged_by: str | None = _more(
         "own|design",
-        "Reference dot, with --yield: single pulse of the drawn hammer (own) or of the nominal one (design).",
+        "Reference dot, with --yield: single pulse of each hammer (own) or of the nominal hammer (design).",
     ),
-    seed: int | None = opt.whole("Seed of the draw, with --yield (default: 0).", panel=_MORE),
+    seed: int | None = opt.whole("Seed for drawing the hammers of --yield (default: 0).", panel=_MORE),
     current: str | None = _more("CURRENT", "Limit on the current, with --damping (default: 2 A)."),
     limits: str = _grid(
         "NAME",
-        "Limits on force, arrival: slots (10 %, 50 µs), dot-matrix (10 %, 100 µs), engraved (10 %, 15 µs).",
+        "Preset of the limits on force and arrival time: slots (10 %, 50 µs), dot-matrix (10 %, 100 µs),"
+        " engraved (10 %, 15 µs).",
         default="slots",
     ),
-    force_limit: str | None = _grid(
-        "X", "Limit on the force deviation, e.g. 10%, instead of that of --limits."
-    ),
+    force_limit: str | None = _grid("X", "Limit on the force deviation, e.g. 10%, instead of the preset's."),
     arrival_limit: float | None = opt.quantity(
-        "s", "TIME", "Limit on the arrival deviation, e.g. 50us, instead of that of --limits.", panel=_GRID
+        "s",
+        "TIME",
+        "Limit on the deviation of the arrival time, e.g. 50us, instead of the preset's.",
+        panel=_GRID,
     ),
     extra_contacts: int | None = opt.whole(
-        "Number of extra pack contacts allowed beyond those of the single pulse, as of bounces on a stop"
+        "Number of pack contacts allowed beyond those of the single pulse, e.g. from bounces on a stop"
         " (default: 0).",
         panel=_GRID,
     ),
     first: str | None = _grid("RATE", "Lowest rate of the grid (default: 100 Hz; lower for a slow device)."),
     last: str | None = _grid("RATE", "Highest rate of the grid (default: 4 kHz; lower for a slow device)."),
     step: str | None = _grid(
-        "RATE", "Spacing of the grid (default: 5 Hz, or 25 Hz for several hammers; less for a slow device)."
+        "RATE", "Rate step of the grid (default: 5 Hz, or 25 Hz for several hammers; less for a slow device)."
     ),
     tolerance: float | None = opt.TOLERANCE,
     threads: int | None = opt.THREADS,
@@ -255,16 +261,28 @@ _length = partial(opt.quantity, "m", "LENGTH", panel=_HEAD, positive=True)
     "printhammer print 'Bounce and chaotic motion' --rate 1.4kHz --out page.png",
     {"tolerance": opt.TOLERANCE, "threads": opt.THREADS},
     out=opt.files(
-        "Page (.png, .pdf, .svg) or its dots (.nc, .csv); repeatable. Default without any output option:"
+        "Output file for the page (.png, .pdf, .svg) or its dots (.nc, .csv); repeatable. Default without any"
+        " output option:"
         f" {', '.join(_USUAL)}.",
         ".nc",
         ".csv",
         panel=_FILES,
     ),
-    zoom=opt.files("Enlarged picture of the worst place (.png, .pdf, .svg).", many=False, panel=_FILES),
-    sheet=opt.files("Sheet of paper alone, at true size (.png, .pdf, .svg).", many=False, panel=_FILES),
+    zoom=opt.files(
+        "Output file for a magnified view of the region with the largest error (.png, .pdf, .svg).",
+        many=False,
+        panel=_FILES,
+    ),
+    sheet=opt.files(
+        "Output file for the sheet of paper alone, at true size (.png, .pdf, .svg).", many=False, panel=_FILES
+    ),
     save=opt.file(
-        "Dot pattern requested (.toml, .png, .pbm, .bmp).", ".toml", ".png", ".pbm", ".bmp", panel=_FILES
+        "Output file for the requested dot pattern (.toml, .png, .pbm, .bmp).",
+        ".toml",
+        ".png",
+        ".pbm",
+        ".bmp",
+        panel=_FILES,
     ),
 )
 def print_(
@@ -272,8 +290,12 @@ def print_(
     text: str | None = opt.argument("[TEXT]", "Text to print; \\n starts a new line."),
     rate: str | None = opt.text("RATE", "Dot slots per second on each wire, e.g. '1.2 kHz'."),
     hammer: Hammer = opt.HAMMER_OPTION,
-    pattern: Path | None = opt.source("Pattern file (.toml) or bitmap (.png, .pbm, .bmp).", panel=_PATTERN),
-    wires: int | None = opt.whole("Number of wires: 9 (built-in font), 18, 24 or any other.", panel=_PATTERN),
+    pattern: Path | None = opt.source(
+        "Dot pattern to print (.toml), or a bitmap (.png, .pbm, .bmp).", panel=_PATTERN
+    ),
+    wires: int | None = opt.whole(
+        "Number of wires of the print head, e.g. 9 (built-in font), 18 or 24.", panel=_PATTERN
+    ),
     font: Path | None = opt.source(
         "TrueType font (default: built-in for 9 wires, else DejaVu Sans Mono).", panel=_PATTERN
     ),
@@ -282,20 +304,20 @@ def print_(
     ),
     pitch: float | None = _length("Distance between slots (default: 1/60 in for 9 wires)."),
     wire_pitch: float | None = _length(
-        "Distance between neighbouring wires (default: equal print height for any number; 1/72 in for 9)."
+        "Distance between neighbouring wires (default: 1/72 in for 9 wires; else for the same print height)."
     ),
     wire_diameter: float | None = _length(
         "Diameter of a wire (default: 0.35 mm for 9 wires).", flag="--wire"
     ),
     density: float | None = opt.number(
-        "Optical density of the dot of a single pulse (default: 1).", panel=_HEAD
+        "Optical density of a dot printed by a single pulse (default: 1).", panel=_HEAD
     ),
     line_gap: float | None = opt.number(
         "Gap between print lines, as a fraction of the print height (default: 1/3; 0 for a bitmap).",
         panel=_HEAD,
     ),
     limits: str | None = opt.text(
-        "NAME", "Limits on force, arrival: slots (default), dot-matrix or engraved."
+        "NAME", "Preset of the limits on force and arrival time: slots (default), dot-matrix or engraved."
     ),
     table: Path | None = TABLE,
     serial: str | None = SERIAL,

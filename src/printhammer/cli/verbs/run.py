@@ -37,11 +37,11 @@ _record = partial(opt.file, panel=_FILES)
             "Integrator: the default, or one of the two schemes of 1983.",
             default="default",
         ),
-        "points": opt.whole("Number of points of the saved motion."),
+        "points": opt.whole("Number of time points of the saved motion."),
     },
-    out=opt.results("Motion (.json: its dots, contacts and energies)", panel=_FILES),
-    dots=_record("Table of dots (.csv or .parquet).", ".csv", ".parquet"),
-    contacts=_record("Table of contacts (.csv or .parquet).", ".csv", ".parquet"),
+    out=opt.results("the motion, with .json its dots, contacts and energies", panel=_FILES),
+    dots=_record("Output file for the table of dots (.csv, .parquet).", ".csv", ".parquet"),
+    contacts=_record("Output file for the table of contacts (.csv, .parquet).", ".csv", ".parquet"),
 )
 def run(
     job: Job,
@@ -51,7 +51,7 @@ def run(
     at: str | None = _drive("TIMES", "Firing times, e.g. '0 us, 700 us'."),
     pulses: int | None = opt.whole("Number of firings for --rate or --period (default: 9).", panel=_DRIVE),
     overlap: str | None = opt.overlapping(_DRIVE),
-    drive: Path | None = opt.source("Drive file, instead of the options of a train.", panel=_DRIVE),
+    drive: Path | None = opt.source("Drive file, instead of --rate, --period or --at.", panel=_DRIVE),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:

@@ -23,16 +23,14 @@ if TYPE_CHECKING:
         **opt.FIRED_TRAIN,
         "points": opt.whole("Number of points (firings recorded).", default=200),
         "transient": opt.whole("Number of firings to discard before the first point.", default=0),
-        "phase": opt.number(
-            "Phase of the section after the firing, as a fraction of the period.", metavar="P"
-        ),
+        "phase": opt.number("Sampling phase after each firing, as a fraction of the period.", metavar="P"),
         "tolerance": opt.TOLERANCE,
         "verdict": opt.switch("Classify the motion from firings 1001 to 2000.", default=True),
     },
-    out=opt.results("Points"),
+    out=opt.results("the points"),
 )
 def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
-    """Sample the state at each firing of an endless train, and classify it: periodic or strange.
+    """Sample the state at each firing of a periodic drive; classify the motion as periodic or strange.
 
     The exit status is 1 if the run stopped early.
     """
@@ -61,11 +59,12 @@ _search = partial(opt.whole, panel="Search")
         "starts": _search("Number of initial states from which trajectories are followed.", default=1024),
         "guesses": _search("Number of initial guesses for Newton's method at each orbit period.", default=48),
         "follow": _search(
-            "Largest period, in firings, of orbits that are continued 5 % in the drive period.", default=2
+            "Largest period, in firings, of orbits to continue over a 5 % change of the drive period.",
+            default=2,
         ),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Orbits"),
+    out=opt.results("the orbits"),
 )
 def orbits(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
     """Search for periodic orbits, stable and unstable, and report their multipliers and dots.
@@ -104,7 +103,7 @@ _trains = partial(opt.text, panel=_TRAINS)
         "transient": opt.whole("Number of firings to discard before the average.", default=1000),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("Exponents"),
+    out=opt.results("the exponents"),
 )
 def lyapunov(
     job: Job,

@@ -26,12 +26,12 @@ def studio(
     port: int | None = opt.whole(
         "Port on 127.0.0.1 (default: 19830, or a free port if that is taken; 0: a free port)."
     ),
-    state: Path | None = opt.source("State to open, as saved by the studio's export."),
+    state: Path | None = opt.source("File of the state to open, saved by the studio's export."),
     browser: bool = opt.switch(
         "Open the page in the default browser.", flag="--open/--no-open", default=True
     ),
 ) -> Answer:
-    """Start the studio, a page on this machine for its user alone; Ctrl-C stops it."""
+    """Start the studio, a local web page accessible only to its user; Ctrl-C stops it."""
     from printhammer.studio import serve
 
     def ready(address: str) -> None:

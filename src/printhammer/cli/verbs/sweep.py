@@ -26,15 +26,16 @@ if TYPE_CHECKING:
 @verb("sweep", "printhammer sweep --example > sweep.toml && printhammer sweep sweep.toml --out results.zarr")
 def sweep(
     job: Job,
-    spec: Path | None = opt.argument("SPEC", "Spec file of the sweep (TOML).", type=Path),
+    spec: Path | None = opt.argument("SPEC", "Specification file of the sweep (.toml).", type=Path),
     out: Path | None = opt.folder(
-        "Result store (Zarr), a new store or one to resume; a name in .csv: a table as well.", writes=False
+        "Result store (Zarr), new or to be resumed; with a .csv name, a table is written beside it.",
+        writes=False,
     ),
     threads: int | None = opt.THREADS,
-    dask: str | None = opt.text("ADDRESS", "Address of the scheduler of a dask cluster that does the work."),
+    dask: str | None = opt.text("ADDRESS", "Address of the scheduler of a Dask cluster that runs the sweep."),
     check: bool = opt.switch("Show the plan and the disk space it needs, without running it."),
-    example: bool = opt.switch("Print an example spec."),
-    schema: bool = opt.switch("Print the JSON schema of spec files."),
+    example: bool = opt.switch("Print an example specification file."),
+    schema: bool = opt.switch("Print the JSON schema of specification files."),
 ) -> Answer:
     """Run a sweep over any constants, drives and initial states.
 

@@ -73,24 +73,26 @@ _MOST_RATES: Final = 2000  # Largest number of rates; arbitrary
         "rates": opt.rates_between(
             "Rates of the table, instead of --rate, e.g. '1.2 kHz, 1.4 kHz, 41'.", _MOST_RATES
         ),
-        "history": opt.whole("Number of preceding gaps that index an entry, 1 to 4.", default=2),
+        "history": opt.whole("Number of preceding gaps that select a table entry, 1 to 4.", default=2),
         "reach": opt.whole(
             "Longest gap that is distinguished, in slots; longer gaps count as rest.", default=2
         ),
         "brake": opt.switch("Allow brake pulses.", default=True),
-        "robust": opt.switch("Minimise the mean square deviation over perturbed hammers, too."),
+        "robust": opt.switch("Minimise the mean square deviation over perturbed hammers as well."),
         "driver": opt.choice(
             "own|switch",
-            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar switch.",
+            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar driver (switch).",
             default="own",
         ),
         "largest_current": opt.text(
             "CURRENT", "Limit on the current (default: 2 A, or the peak of the hammer's own pulse)."
         ),
     },
-    out=opt.results("Compensation table", ".h"),
+    out=opt.results("the compensation table", ".h"),
     report=opt.files(
-        "Report on gain and loss: picture (.svg, .png, .pdf) or data (.nc, .csv, ...).", *opt.DATA, many=False
+        "Output file for the validation report: a picture (.svg, .png, .pdf) or data (.nc, .csv, ...).",
+        *opt.DATA,
+        many=False,
     ),
 )
 def tune(
@@ -105,8 +107,9 @@ def tune(
     budget: int | None = opt.whole("Maximum size of the arrays in the C header, bytes."),
     along: str | None = opt.text(
         "AXIS LOW, HIGH, N",
-        "Axis along which several tables are tuned: rail, temperature (of the coil), gap or forms, with its"
-        " values, e.g. 'rail 90 V, 110 V, 3'.",
+        "Quantity in which several tables are tuned, with its values, e.g. 'rail 90 V, 110 V, 3': rail"
+        " (voltage), temperature (of the coil), gap (added distance of the pack) or forms (relative change of"
+        " the thickness of the pack).",
     ),
     variability: bool = opt.switch("Select the entries that are best over the production spread."),
     tolerance: float | None = opt.TOLERANCE,
@@ -180,15 +183,15 @@ _PANEL: Final = "The sensor"
         "rate": opt.text("RATE", "Dot slots per second (default: 1.275 kHz; lower for a slow device)."),
         "driver": opt.choice(
             "own|switch",
-            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar switch (default: switch, or"
-            " own if the hammer has a driver).",
+            "Driver of the coil: the hammer's own pulse (own) or a fast unipolar driver (switch); default:"
+            " own if the hammer has a voltage driver, else switch.",
         ),
-        "history": opt.whole("Number of preceding gaps that index an entry, 1 to 4.", default=2),
+        "history": opt.whole("Number of preceding gaps that select a table entry, 1 to 4.", default=2),
         "reach": opt.whole(
             "Longest gap that is distinguished, in slots; longer gaps count as rest.", default=2
         ),
         "members": opt.whole(
-            "Number of simulated hammers that select the sequence of test lines.", default=400
+            "Number of simulated hammers on which the sequence of test lines is selected.", default=400
         ),
         "forgetting": opt.number("Fraction of the earlier corrections that each stage undoes.", default=0.02),
         "doubt": opt.number(
@@ -204,9 +207,14 @@ _PANEL: Final = "The sensor"
         ),
         "threads": opt.THREADS,
     },
-    out=opt.results("Dots printed at each stage"),
-    table=opt.files("Learned compensation table (.csv, .json, .h, ...).", *opt.DATA, ".h", pictures=False),
-    believed=opt.file("Hammer file with the estimated constants of the unit.", ".toml"),
+    out=opt.results("the dots printed at each stage"),
+    table=opt.files(
+        "Output file for the learned compensation table (.csv, .json, .h, ...).",
+        *opt.DATA,
+        ".h",
+        pictures=False,
+    ),
+    believed=opt.file("Output hammer file with the estimated constants of the unit (.toml).", ".toml"),
 )
 def learn(
     job: Job,
@@ -224,28 +232,31 @@ def learn(
         "VALUE", "Standard deviation of a coil sample, e.g. '5 mA' or '50 mV'.", panel=_PANEL
     ),
     force_noise: float | None = opt.number(
-        "Relative standard deviation of measured forces (default: no forces).", panel=_PANEL
+        "Relative standard deviation of measured forces (default: forces are not measured).", panel=_PANEL
     ),
     colour: float | None = opt.number(
         "Correlation of the noise of successive dots (default: 0).", panel=_PANEL
     ),
-    gain: float | None = opt.number("Scale error of the sensor (default: 0).", panel=_PANEL),
+    gain: float | None = opt.number("Relative scale error of the sensor (default: 0).", panel=_PANEL),
     offset: float | None = opt.quantity(
         "s",
         "TIME",
-        "Constant error of the sensor's times, unknown to the learner (default: 0).",
+        "Constant time error of the sensor, unknown to the learner (default: 0).",
         panel=_PANEL,
     ),
     offset_spread: float | None = opt.quantity(
         "s",
         "TIME",
-        "Standard deviation of the constant time error over units (default: unknown, with a prior of 25 us).",
+        "Standard deviation of the constant time error between units (default: none simulated; the learner"
+        " assumes 25 us).",
         panel=_PANEL,
     ),
     missed: float | None = opt.number(
         "Fraction of impacts that the sensor misses (default: 0).", panel=_PANEL
     ),
-    false: float | None = opt.number("Fraction of false impacts (default: 0).", panel=_PANEL),
+    false: float | None = opt.number(
+        "Fraction of impacts preceded by a false detection (default: 0).", panel=_PANEL
+    ),
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
