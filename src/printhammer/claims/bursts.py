@@ -54,7 +54,7 @@ def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
 
 
 def rates_of(settings: Mapping[str, Any]) -> list[float]:
-    """Return the rates of a claim, Hz, from the first to the last."""
+    """Return the firing rates at which a claim is evaluated, Hz, from the first to the last."""
     first, last, step = (settings[name] for name in ("first_rate_Hz", "last_rate_Hz", "rate_step_Hz"))
     return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
 

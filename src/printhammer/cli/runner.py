@@ -60,7 +60,7 @@ class Content:
 
     @classmethod
     def of(cls, result: Any, **options: Any) -> Content:
-        """Return the content of a result; `options` are passed to its `plot`."""
+        """Return the data and the picture of a result to write; `options` are passed to its `plot`."""
         return cls(result.save, lambda: result.plot(**options))
 
     def write(self, path: Path) -> None:

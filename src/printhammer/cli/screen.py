@@ -171,7 +171,7 @@ def heading(hammer: Hammer) -> str:
 
 
 def honesty(hammer: Hammer) -> str:
-    """Return the number of constants of each status, in one line; rich markup."""
+    """Return a one-line count of the constants by status, in Rich markup."""
     counts: dict[str, int] = {}
     for constant in hammer.constants.values():
         counts[constant.status] = counts.get(constant.status, 0) + 1

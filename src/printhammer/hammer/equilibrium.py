@@ -266,7 +266,7 @@ def equilibrium_picture(hammer: HammerLike, points: int = 241) -> EquilibriumPic
 
 
 def _compressed(force: StaticForce, position: float, current: float = 0.0) -> float | None:
-    """Find the equilibrium at which the armature compresses an elastic backstop, next to its surface."""
+    """Find the equilibrium nearest to the surface of an elastic backstop that the armature compresses."""
 
     def total(x: float) -> float:
         return force.total(x, current)

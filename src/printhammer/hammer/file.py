@@ -106,7 +106,7 @@ def build(
     """Build and validate the contents of a hammer file, in SI, from its TOML document.
 
     Messages begin with `where`, usually the file; force tables and sampled waveforms are read from `folder`.
-    Tables that are the same object as in the document `like` are reused from its contents.
+    A table that is the same object as in the document `like` is not parsed again: its contents are reused.
 
     Raises
     ------

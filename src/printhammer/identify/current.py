@@ -131,7 +131,7 @@ class Trace(Declared, eq=False):
 def read_trace(
     path: str | Path, hammer: Hammer, locked: float | None, has_offset: bool, columns: str | None = None
 ) -> Trace:
-    """Read a record; the locked displacement, m, is `locked` or, if None, that of a comment in the file."""
+    """Read a current record; `locked` is the displacement of a locked armature, m (None: from a comment)."""
     table = read_table(path, {"time": "s", "current": "A"}, optional={"voltage": "V"}, columns=columns)
     table.check_times()
     t = table.values["time"]

@@ -143,7 +143,7 @@ class Solution(Declared, eq=False):
 
 
 class NoSolutionError(ArithmeticError):
-    """No parameters of a law come near the data; `row` is farthest from the initial prediction."""
+    """No parameters of a law fit the data; `row` deviates most from the initial prediction."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"no parameters of the law come near the data, row {row} lies farthest off")

@@ -83,9 +83,9 @@ class MagnetPart(Part):
 
 
 class CoilPart(Part):
-    """The circuit of the coil on the magnet; its law is that of `printhammer.kernel.model.circuit`.
+    """Coil circuit of the magnet, with the law of `printhammer.kernel.model.circuit`.
 
-    It holds its constants in the order of the kernel's array, see `printhammer.kernel.model.layout`.
+    Its constants are in the order of the kernel's parameter array, see `printhammer.kernel.model.layout`.
     """
 
     role: ClassVar[str] = "coil"

@@ -134,7 +134,7 @@ class Group:
 
 
 class _Posed(NamedTuple):
-    """Distinct problems of the members, without drives: a row each, and the row `by` of each member."""
+    """Distinct problems of the members, without drives, one per row; `by` is the row of each member."""
 
     constants: FloatArray
     controls: FloatArray

@@ -115,7 +115,7 @@ class FiredAtFixedTolerance(Firing, AtFixedTolerance):
 
 
 class Regime(Declared):
-    """Hammer under a periodic drive: a waveform fired every `period`, or an endless force."""
+    """Hammer under a periodic drive: a waveform fired every `period`, or a continuous periodic force."""
 
     hammer: Hammer = part("the hammer")
     period: float = scalar("s", "time between firings, or period of the force")
@@ -155,7 +155,7 @@ class Regime(Declared):
         waveform : Waveform, optional
             Waveform of every firing; by default that of the hammer.
         drive : Drive, optional
-            Endless force with a period, instead of waveform, period and rate.
+            Continuous periodic force, instead of waveform, period and rate.
         overlap : str, optional
             "add" or "replace".
         phase : float, optional
@@ -165,7 +165,7 @@ class Regime(Declared):
         ------
         InputError
             There is no waveform, period and rate are not exactly one positive number, the drive is not an
-            endless force with a period, or the phase is invalid.
+            continuous periodic force, or the phase is invalid.
         """
         part = 0.0 if phase is None else read_phase(phase)
         if isinstance(hammer, Regime):
@@ -236,9 +236,9 @@ class Regime(Declared):
 
     @property
     def memory(self) -> int:
-        """Number of earlier pulses that can still be active at a firing; 0 for an endless force.
+        """Number of earlier pulses that can still be active at a firing; 0 for a continuous periodic force.
 
-        After that many firings a train looks the same at every later firing.
+        After that many firings, a train is periodic.
         """
         if self.drive is not None:
             return 0

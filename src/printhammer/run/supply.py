@@ -145,12 +145,13 @@ def current_scale(hammer: Hammer, drive: Drive) -> float:
 
 
 def take_supply(constants: FloatArray, hammer: Hammer, drive: Drive) -> None:
-    """Write the supply, and the scales of current and flux linkage, into the array of constants.
+    """Write the supply, and the scales of current and flux linkage, into the parameter array.
 
     Raises
     ------
     InputError
-        The hammer has no circuit for a voltage, or its flux linkage does not increase with the current.
+        The hammer has no coil circuit that a voltage could drive, or its flux linkage does not increase with
+        the current.
     """
     coil, supply = winding_of(hammer), supply_of(drive)
     current = typical_current(hammer, drive)

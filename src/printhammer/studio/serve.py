@@ -1,4 +1,4 @@
-"""Server of the studio: on this machine, for its user alone."""
+"""Local HTTP server of the studio, accessible only to the user who started it."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Session of one page: the latest state wins, and slow work delays nothing else.
 
-Questions on hammers and files are answered in this process, by a dedicated thread. Questions about states
-that are not displayed, and states themselves, go to worker processes: first curves and dots of a state, then,
-in parallel, the map and the detailed views. A worker that is told that its state is outdated and does not
-return is terminated; a worker that compiles is left to finish, since its code will be needed, and another
+Requests about hammers and files are answered in this process, by a dedicated thread. Requests about states
+that are not displayed, and states themselves, go to worker processes: first the curves and dots of a state,
+then, in parallel, the map and the detailed views. A worker that is told that its state is outdated and does
+not return is terminated; a worker that compiles is left to finish, since its code will be needed, and another
 worker serves the newer state meanwhile.
 """
 

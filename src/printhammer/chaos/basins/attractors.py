@@ -1,4 +1,4 @@
-"""Attractors: identified from the states of trains, and matched to the states of further trains."""
+"""Attractors: identification from the strobe states of trains, and assignment of trains to them."""
 
 from __future__ import annotations
 

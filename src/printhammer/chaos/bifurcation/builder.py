@@ -206,7 +206,7 @@ class DiagramBuilder:
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:
-        """Run the trains at the given values."""
+        """Run the trains at the parameter values of `grid`."""
         places = self.add(grid, 0)
         if self.ways == ("from rest",):
             self.run(places, np.array([state_or_rest(self.table.regimes[row], self.begin) for row in places]))

@@ -53,7 +53,7 @@ _SAME: Final = 1e-4
 
 
 class Branches(Result):
-    """Branches of periodic orbits along the same constant.
+    """Branches of periodic orbits continued in the same parameter.
 
     The list may be incomplete: further orbits may exist.
     """

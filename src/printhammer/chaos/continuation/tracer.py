@@ -152,7 +152,7 @@ class Tracer:
         return pieces, stop
 
     def before_end(self, nodes: list[Node]) -> list[Node]:
-        """Remove the orbits of a piece that lie so close to its end that the impact disturbs them."""
+        """Remove the orbits so near the end of a branch that the impact there spoils their derivatives."""
         places = np.array([np.append(node.state, node.parameter) for node in nodes]) / self.scales
         away = np.linalg.norm(places - places[0], axis=1) > _CLEAR
         return nodes[min(int(np.argmax(away)) if away.any() else 0, len(nodes) - 2) :]

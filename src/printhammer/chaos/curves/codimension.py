@@ -66,7 +66,7 @@ class CodimensionTwo(Declared):
 
     @property
     def message(self) -> str:
-        """The event in a few words."""
+        """Short description of the event."""
         return f"{self.kind} of {self.passages} passages" if self.passages > 1 else self.kind
 
 

@@ -231,7 +231,7 @@ class _Chart:
         self.value = branch.regime.value(second)
 
     def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
-        """Find the limits of branches along the second constant; return their first constants, and limits."""
+        """Locate the limits of branches in the second parameter, at several values of the first."""
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
         # A stable orbit is preferred: stability is lost at its limits.

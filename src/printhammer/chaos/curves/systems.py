@@ -70,7 +70,7 @@ KINDS: Final = (*TESTS, GRAZING)
 SPACING: Final = 1e-6
 """Step size of finite differences, in scales; they only steer Newton's method."""
 _PARTS: Final = 5.0
-"""The range of a constant divided by this is its scale, as half-widths are those of the state."""
+"""Ratio of the range of a parameter to its scale; the scales of the state are half-widths."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class MultiplierSystem:
 
 
 def place_of(node: Node) -> Place:
-    """Return the place in the plane that a fixed point of an extended map represents."""
+    """Return the point of the parameter plane that corresponds to a fixed point of an extended map."""
     place: Place = node.value.extra
     return place
 
@@ -215,7 +215,7 @@ class GrazingSystem:
         return place, (flight.end - at) / self.plane.scales[:2]
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the map of phase and first constant at a value of the second constant."""
+        """Evaluate the map of (phase, first parameter) at a value of the second parameter."""
         steps, point = SPACING * self.scales, np.append(whole, other)
         missed = []
         for phase, first, second in [point, *(point + step for step in np.diag(steps))]:
@@ -247,7 +247,7 @@ class ImpactSystem:
         self.scales = np.array([_PHASES, *plane.scales[1:]])
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the map of phase and velocity after the impact, and of the first constant."""
+        """Evaluate the map of (phase, velocity after the impact, first parameter)."""
         moves, point = SPACING * self.scales, np.append(whole, other)
         try:
             flights = [

@@ -130,7 +130,7 @@ class Strobe(Result):
         return window_of(self.hammer, self.drive)
 
     def entries(self) -> Entries:
-        """Return the states by name, and the current if it belongs to them."""
+        """Return the state components by name, including the current where it is a state variable."""
         return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
 
     def notes(self) -> dict[str, Any]:

@@ -97,7 +97,8 @@ _trains = partial(opt.text, panel=_TRAINS)
     {
         "overlap": opt.overlapping(_TRAINS),
         "drive": opt.source(
-            "Drive file, instead of --period or --rate: an endless force, or pulses.", panel=_TRAINS
+            "Drive file with a continuous periodic force or a pulse train, instead of --period or --rate.",
+            panel=_TRAINS,
         ),
         "firings": opt.whole("Number of firings over which the exponents are averaged.", default=1000),
         "transient": opt.whole("Number of firings to discard before the average.", default=1000),

@@ -75,9 +75,9 @@ class Learned:
 
 @dataclass
 class Touched:
-    """A touch of the pack from which the front is estimated.
+    """Contact with the pack, from which the position of its front is estimated.
 
-    `start` precedes the touch and `end` follows the contact, s. At the start, `state` (3,) holds
+    `start` is before and `end` after the contact, s. At the start, `state` (3,) holds
     displacement, m, speed, m/s, and current scale, with their `covariance` (3, 3).
     """
 
@@ -89,7 +89,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """A touch as estimated when its push was decided, before the contact revealed the front."""
+    """Contact as estimated when its pulse was chosen, before it revealed the position of the front."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float

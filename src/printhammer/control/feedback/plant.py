@@ -90,7 +90,7 @@ class Driver(Declared):
         return Switched(at=tuple(at), levels=tuple(levels), edge=self.edge, initial=initial)
 
     def push(self, width: float) -> Switched:
-        """Return a push of a width, s, with the largest current."""
+        """Return a rectangular pulse of the given width, s, at the maximum current."""
         return self.switched((0.0, width), (self.current, 0.0))
 
     def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:

@@ -74,9 +74,9 @@ class Fronts:
 
 
 def fronts(plant: Plant, forces: ForceMap, start: Launch, progress: Progress | None = None) -> Fronts:
-    """Compute impact maps and landings for all distances of the pack.
+    """Compute impact maps and landings for every distance of the pack.
 
-    `progress` is called with the number of finished steps, `STEPS` per distance, and of all.
+    `progress(done, total)` is called after each step; there are `STEPS` steps per distance.
     """
     maps: list[ImpactMap] = []
     landings: list[Landing] = []

@@ -48,7 +48,7 @@ _RIDGE: Final = 1e-3  # Ridge parameter of the regression, added to the diagonal
 
 @dataclass(frozen=True)
 class Surrogate:
-    """Quadratic approximation of a reading in the constants, in prior standard deviations."""
+    """Quadratic approximation of a reading as a function of the constants, in prior standard deviations."""
 
     constant: float
     slope: FloatArray  # (constants,)

@@ -181,7 +181,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
     """Return the time, s, from the end of a pulse until it stays below the fraction `share` of its peak.
 
-    For a driver this is the first time of the current alone; later induced currents are ignored.
+    For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """
     own: Any = pulse
     if pulse.quantity == "voltage":

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams: states at the firings against a parameter, with bands of verdicts below."""
+"""Bifurcation diagrams: states at the firings against a parameter; bands below classify the motion."""
 
 from __future__ import annotations
 

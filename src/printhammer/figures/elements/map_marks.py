@@ -179,7 +179,7 @@ def _strokes(
 
 
 def key(ax: Axes, chart: xr.Dataset) -> None:
-    """Draw the legend of the lines above a picture."""
+    """Draw the legend of the marker lines, above the map."""
     from matplotlib.lines import Line2D
     from matplotlib.patheffects import Stroke
 

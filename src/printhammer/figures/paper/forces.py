@@ -311,7 +311,7 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
 def _limits(
     hammer: Hammer, x: FloatArray, family: list[FloatArray], spring: FloatArray | None
 ) -> tuple[float, float]:
-    """Return limits that include every curve within the stroke; beyond it the fit may be singular."""
+    """Return axis limits that include every curve within the stroke; beyond it, a fit may be singular."""
     ends = list(places(hammer).values())
     stroke = (x >= min(ends)) & (x <= max(ends)) if len(ends) > 1 else np.full(x.shape, True)
     curves = [*family, *([] if spring is None else [spring, -spring])]

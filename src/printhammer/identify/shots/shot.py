@@ -1,8 +1,8 @@
-"""Displacement record of a single shot: reading, detection of contacts, and division into stretches.
+"""Displacement record of a single shot: reading, detection of contacts, and division into segments.
 
 The record is cut in free flight, midway between contacts, where a local parabola gives displacement and
-velocity as initial guesses for the integration of the next stretch. The current of the shot is the hammer's
-waveform fitted to the record, or the record itself.
+velocity as initial guesses for the integration of the next segment. The current of the shot is either the
+hammer's waveform, fitted to the recorded current, or the recorded current.
 """
 
 from __future__ import annotations

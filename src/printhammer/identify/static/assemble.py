@@ -192,7 +192,7 @@ def solved(data: Data, law: Law, start: FloatArray | Parameters, *, robust: bool
     Raises
     ------
     InputError
-        No parameters come near the data; the message names the line that is farthest off.
+        The law does not fit the data; the message names the line that deviates most.
     """
     try:
         return solve(law, data.values, start, robust=robust)
@@ -200,8 +200,8 @@ def solved(data: Data, law: Law, start: FloatArray | Parameters, *, robust: bool
         files = " and ".join(str(path) for path in data.files)
         raise InputError(
             (
-                f"{files}: the law does not fit: no constants come near the data, line"
-                f" {data.lines[error.row]} lies farthest off"
+                f"{files}: the law does not fit the data: line {data.lines[error.row]} deviates most from the"
+                " initial guess"
             ),
             file=files,
             key=f"line {data.lines[error.row]}",

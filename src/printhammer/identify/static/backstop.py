@@ -251,7 +251,7 @@ def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
 
 
 def _with_stiffness(fit: Fit, k: Stiffness) -> Fit:
-    """Return the fit with k added, and with l from k and l/k."""
+    """Add the stiffness k to a fit, and the damping l computed from k and the fitted ratio l/k."""
     from dataclasses import replace
 
     ratio = fit[RATIO]

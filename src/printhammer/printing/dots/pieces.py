@@ -50,7 +50,7 @@ class PiecewiseMotion:
 
     @property
     def contacts(self) -> list[Contact]:
-        """All contacts in order of touch; a contact that spans two pieces is merged into one."""
+        """All contacts, in order of touch time; a contact split between two segments is joined."""
         contacts: list[Contact] = []
         for motion in self._pieces:
             for contact in motion.contacts:

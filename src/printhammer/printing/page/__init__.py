@@ -1,1 +1,1 @@
-"""Pages: patterns of wires and columns, and the page that a head prints of them."""
+"""Pages: dot patterns by wire and column, and the page that a head prints from them."""

@@ -212,8 +212,8 @@ def safe_rate(
     limits : Limits, optional
         Limits on the dots; by default 10 % of the force, 50 us, no extra contacts.
     nominal : SinglePulse, optional
-        The single-pulse dot that judges the others; by default that of the hammer. For a hammer that differs
-        from the design of a drive, pass the dot of the design.
+        Reference dot, of a single pulse, with which all dots are compared; by default that of the hammer. If
+        the drive was designed for another hammer, pass the dot of that hammer.
     first, last, step : float or str, optional
         The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, and as much lower
         as a device is slower than the paper's hammer. In open loop the default grid leaves out lower rates at

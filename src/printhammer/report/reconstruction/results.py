@@ -145,7 +145,7 @@ class FamilyMember(_Table):
 
 
 class Conclusion(_Table):
-    """Consequence common to the hammers of the family."""
+    """Conclusion about the hammers of the reconstructed family, and whether it holds for all of them."""
 
     low: _Number | None = Field(description="the lowest value in the family")
     high: _Number | None = Field(description="the highest value in the family")
