@@ -3,7 +3,7 @@
 A verb is a function of its options, and of a `Job` if it has a parameter `job`, declared with `verb`. The
 runner parses the options, checks before the computation that every output file is new and writable, loads
 the hammer, and announces compilation; the verb computes and returns an `Answer`; the runner shows the answer,
-writes the files, prints complaints, and sets the exit status. `firing_of` reads the endless drive of the
+writes the files, prints complaints, and sets the exit status. `firing_of` reads the periodic drive of the
 verbs of chaos: period or rate, or a drive file.
 """
 
@@ -389,9 +389,9 @@ def firing_of(
 ) -> Firing:
     """Extract the firing options from `passed`, as keywords of `Regime.of`.
 
-    If `timed`, exactly one of period and rate is required; a drive file may replace both: an endless force,
-    or pulses at a constant rate. The example in a message is a `period`, s, scaled to the device. Raises
-    InputError for a hammer without a waveform, any other drive file, or superfluous options.
+    If `timed`, exactly one of period and rate is required; a drive file may replace both: a continuous
+    periodic force, or pulses at a constant rate. The example in a message is a `period`, s, scaled to the
+    device. Raises InputError for a hammer without a waveform, any other drive file, or superfluous options.
     """
     file: Path | None = passed.pop("drive", None)
     train = {name: passed.pop(name, None) for name in ("period", "rate", "overlap")}

@@ -184,7 +184,7 @@ class Regime(Declared):
                     "drive is given", key="drive", expected="no period, rate or waveform beside it"
                 )
             if drive.period is None or math.isfinite(drive.waveform.support):
-                raise InputError.of("drive", drive, "an endless force with a period")
+                raise InputError.of("drive", drive, "a continuous periodic force")
             return cls(hammer, float(drive.period), None, drive, overlap, part)
         if (period is None) == (rate is None):
             raise InputError(
@@ -204,7 +204,7 @@ class Regime(Declared):
 
     @property
     def fired(self) -> Waveform:
-        """Waveform of every firing, or the endless force."""
+        """Waveform of every firing, or the continuous periodic force."""
         if self.drive is not None:
             return self.drive.waveform
         return waveform_of(self.hammer, self.waveform)
@@ -252,7 +252,7 @@ class Regime(Declared):
         return self if self.phase == 0.0 else replace(self, phase=0.0)
 
     def pulses(self, count: int) -> Drive:
-        """Return a drive of `count` pulses from time 0, with none before; or the endless force."""
+        """Return a drive of `count` pulses from time 0, none before; or the continuous periodic force."""
         if self.drive is not None:
             return self.drive
         return PulseTrain(self.fired, period=self.period, pulses=count, overlap=self.overlap)
@@ -323,7 +323,8 @@ class Regime(Declared):
         ----------
         name : str
             "period", "rate", "waveform.amplitude" and the like, "drive.amplitude" or "drive.phase" under an
-            endless force, or the dotted key of any constant of the hammer, such as "backstop.damping".
+            continuous periodic force, or the dotted key of any constant of the hammer, such as
+            "backstop.damping".
         value : float
             SI.
         """
@@ -409,7 +410,7 @@ def regimes_of(
     periods : sequence, optional
         Times between firings, s or text with a unit, one for each train, or a single one for all hammers.
     drives : sequence of Drive, optional
-        Endless forces, instead of periods.
+        Continuous periodic forces, instead of periods.
     waveform, overlap, phase
         As for `Regime.of`, for all trains.
     """

@@ -1,1 +1,1 @@
-"""Bifurcation diagrams: states at the firings against a constant."""
+"""Bifurcation diagrams: states at the firings against a parameter."""

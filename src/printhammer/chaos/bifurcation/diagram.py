@@ -2,8 +2,8 @@
 
 Windows of a bifurcation diagram, and whether a series of period doublings precedes the strange trains.
 
-A window is an interval of the parameter in which all trains that were run have the same verdict. A value
-stands for the interval half-way to its neighbours, so that widths of windows add up to the whole range.
+A window is an interval of the parameter in which all trains that were run have the same classification. A
+value stands for the interval half-way to its neighbours, so that widths of windows add up to the whole range.
 Between two neighbours there may be more than a diagram shows.
 """
 
@@ -44,7 +44,7 @@ MOST_UNDECIDED: Final = 32
 
 
 class Window(Declared):
-    """Window: neighbouring values of the parameter with the same verdict; values and width in SI."""
+    """Window: neighbouring values of the parameter with the same classification; values and width in SI."""
 
     verdict: str = part('"period-q", "strange", "superstable" or "undecided"')
     period: int = part("number q; 0 where there is none")
@@ -227,7 +227,7 @@ class Bifurcation(Result, rows="direction column"):
         return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
 
     def _windows_grid(self, direction: str) -> Grid:
-        """Tabulate the verdicts of one direction: number of windows, total width, widest window."""
+        """Tabulate the classifications of one direction: number of windows, total width, widest window."""
         windows = sorted(self.windows(direction), key=lambda window: (window.period or 1000, window.verdict))
         total = sum(window.width for window in windows) or 1.0
         groups = [

@@ -1,1 +1,1 @@
-"""Continuation: periodic orbits followed along a constant, with their bifurcations."""
+"""Continuation: periodic orbits followed in a parameter, with their bifurcations."""

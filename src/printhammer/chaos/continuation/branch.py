@@ -1,4 +1,4 @@
-"""Branch: a curve of periodic orbits along one constant, with its bifurcations and grazings.
+"""Branch: a curve of periodic orbits in one parameter, with its bifurcations and grazings.
 
 Events along a branch are described in the terms of a hammer.
 """
@@ -101,7 +101,7 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
 
 
 def _grazing(point: BranchPoint) -> tuple[str, str]:
-    """Determine on which surface a contact changes, and how it changes as the constant grows."""
+    """Determine on which surface a contact changes, and how it changes as the parameter grows."""
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)
     before, after = (node.value.extra for node in ordered)
@@ -138,7 +138,7 @@ def _is_parted(touches: list[Touch], length: float) -> bool:
 def stable_ranges(
     along: FloatArray, stable: BoolArray, events: Sequence[BranchEvent], ends: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Compute the ranges of the constant over which the orbits of a branch are stable, ascending.
+    """Compute the ranges of the parameter over which the orbits of a branch are stable, ascending.
 
     `ends` are the values at which the branch ends, which may lie beyond its first and last orbit. A branch
     of asymmetric orbits turns back at a pitchfork and stays stable.
@@ -170,9 +170,9 @@ _DIGITS: Final = ".9g"
 
 
 class Branch(Result):
-    """A curve of periodic orbits along one constant.
+    """A curve of periodic orbits in one parameter.
 
-    Every array has one row for each orbit, in order along the curve; the values of the constant need not
+    Every array has one row for each orbit, in order along the curve; the values of the parameter need not
     ascend. Reasons for stopping are "bound"; "closed"; "period doubling": the orbit is born there; "grazing"
     of a rigid backstop; "merged" with an orbit of fewer firings; "no value": a run ends early; "lost":
     Newton's method does not converge; "jump": it converges to another curve; "length": the maximum number of
@@ -300,7 +300,7 @@ class Branch(Result):
 
     @property
     def stable_ranges(self) -> list[tuple[float, float]]:
-        """Ranges of the constant over which the orbits are stable, ascending."""
+        """Ranges of the parameter over which the orbits are stable, ascending."""
         return stable_ranges(
             self.values, self.stable, self.events, (self.stops[0].parameter, self.stops[1].parameter)
         )
@@ -360,7 +360,7 @@ class Branch(Result):
         return branches_table([self], self.attributes).drop(columns="branch")
 
     def orbit(self, number: int) -> Orbit:
-        """Recompute one of the orbits, converged anew at its value of the constant.
+        """Recompute one of the orbits, converged anew at its value of the parameter.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Continuation of a periodic orbit, stable or not, along a constant of the hammer to the ends of its branch.
+"""Continuation of a periodic orbit, stable or not, in a constant of the hammer to the ends of its branch.
 
 A branch is a curve of periodic orbits. Its Floquet multipliers show where and how the orbit loses stability;
 its sequence of contacts shows where a contact appears or vanishes, a grazing. The contact forces of the
@@ -44,7 +44,7 @@ def continuation(
     effort: Effort = MAP_EFFORT,
     **firing: Unpack[Fired],
 ) -> Branch:
-    """Follow a periodic orbit of a hammer along one constant.
+    """Follow a periodic orbit of a hammer in one parameter.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def continuation(
         another phase; no result depends on the phase.
     parameter : str
         "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
-        waveform or of an endless force, such as "waveform.amplitude" or "drive.amplitude".
+        waveform or of a continuous periodic force, such as "waveform.amplitude" or "drive.amplitude".
     bounds : tuple
         Least and largest value, SI or text with a unit.
     firings : int, optional
@@ -67,7 +67,7 @@ def continuation(
         Maximum number of steps in each direction.
     steps : Steps, optional
         Step sizes instead of `most`, in half-widths of the strobe window and fifths of the range of the
-        constant.
+        parameter.
     **firing
         How the hammer is fired, as for `printhammer.Regime.of`; for an orbit only its phase may be given.
 

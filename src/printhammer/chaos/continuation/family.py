@@ -104,13 +104,13 @@ class Course(Declared):
 
 
 class RegimeFamily:
-    """Strobe map of a regime, iterated `firings` times, with the constant `name` as parameter."""
+    """Strobe map of a regime, iterated `firings` times, as a function of state and parameter `name`."""
 
     def __init__(self, regime: Regime, name: str, firings: int, tolerance: float) -> None:
         self.regime, self.name, self.firings, self.tolerance = regime, name, firings, tolerance
 
     def __call__(self, state: FloatArray, parameter: float) -> MapValue:
-        """Evaluate the map at a state, m and m/s, and a value of the constant, SI."""
+        """Evaluate the map at a state, m and m/s, and a value of the parameter, SI."""
         try:
             regime = self.regime.with_(self.name, parameter)
             problem, end = self._problem(regime, state)

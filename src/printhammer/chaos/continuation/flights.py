@@ -158,24 +158,24 @@ def touch_at(
     tolerance: float,
     width: float,
 ) -> tuple[float, float] | None:
-    """Find phase of the touch and value of a constant for the orbit that leaves a surface with a speed.
+    """Find phase of the touch and value of a parameter for the orbit that leaves a surface with a speed.
 
     Parameters
     ----------
     regime : Regime
-        Regime with a value of the constant near the solution.
+        Regime with a value of the parameter near the solution.
     name : str
-        Name of the constant.
+        Name of the parameter.
     surface : str
         "pack" or "backstop".
     guess : tuple of float
-        Phase of the touch, as a fraction of the period, and value of the constant, SI.
+        Phase of the touch, as a fraction of the period, and value of the parameter, SI.
     speed : float
         Speed with which the orbit leaves a rigid backstop, m/s; 0 for a grazing.
     firings, tolerance
         Firings after which the orbit repeats; error allowed in one step.
     width : float
-        Scale of the constant, SI.
+        Scale of the parameter, SI.
 
     Returns
     -------
@@ -216,7 +216,7 @@ def touch_at(
 def fading(
     regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
 ) -> list[tuple[float, float, float]] | None:
-    """Continue an impact to its grazing: phase, speed and value of the constant for falling speeds.
+    """Continue an impact to its grazing: phase, speed and value of the parameter for falling speeds.
 
     A branch of orbits is smooth in these variables up to the grazing, which is the last entry. In the state
     at a section its curvature diverges, since the derivative of the strobe map grows as the inverse of the

@@ -24,7 +24,7 @@ from printhammer.support.arrays import FloatArray
 _GENTLE: Final = 1e-2
 """Largest distance from a grazing, in half-widths of the window, of a touch that may be at its end."""
 _NEAR: Final = 1e-2
-"""Largest distance, in scales of the constant, from an orbit to the grazing in which it ends."""
+"""Largest distance, in scales of the parameter, from an orbit to the grazing in which it ends."""
 _STEEP: Final = 10.0
 """Smallest multiplier of an orbit whose impact fades: no multiplier crosses the unit circle beyond it."""
 _CLOSER: Final = 0.7
@@ -36,7 +36,7 @@ _ON_CURVE: Final = 1e-5
 def grazing_end(
     family: RegimeFamily, scales: FloatArray, node: Node, *, impacts: bool = False
 ) -> tuple[list[Node], float] | None:
-    """Compute the last orbits of a branch before the grazing in which it ends, and the constant there.
+    """Compute the last orbits of a branch before the grazing in which it ends, and the parameter there.
 
     `node` is the last known orbit; with `impacts` its turning points are ignored. None if no grazing is
     close.
@@ -64,7 +64,7 @@ def _orbits(
     node: Node,
     way: list[tuple[float, float, float]],
 ) -> list[Node] | None:
-    """Convert orbits, as phase and speed of an impact and constant, to nodes behind another node."""
+    """Convert orbits, as phase and speed of an impact and parameter, to nodes behind another node."""
     nodes = [node]
     place = family.regime.hammer.position
     for phase, speed, value in way:
@@ -81,7 +81,7 @@ def _orbits(
         if residual > _ON_CURVE or not length > 0.0 or chord[-1] == 0.0:
             return None
         tangent = chord / length
-        # Finite differences in the constant cross the grazing; differences along the curve do not.
+        # Finite differences in the parameter cross the grazing; differences along the curve do not.
         along = tangent * scales
         slope = -(image.jacobian - np.eye(2)) @ along[:-1] / along[-1]
         nodes.append(Node(state, value, tangent, last.arc + length, replace(image, slope=slope), residual))

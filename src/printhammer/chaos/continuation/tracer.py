@@ -35,14 +35,14 @@ PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit has converged; see `arclength`."""
 
 _PARTS: Final = 5.0
-"""The range of the constant divided by this is its scale, as half-widths are those of the state."""
+"""The range of the parameter divided by this is its scale, as half-widths are those of the state."""
 _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
 _SHORTER: Final = 1e-6
 """Scaled closing error after a fraction of the firings, below which an orbit has that shorter period."""
 _DIGITS: Final = ".9g"
-_MOST_SECTIONS: Final = 8  # Maximum number of pieces of a branch at different sections
+_MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections
 _SAME_PHASE: Final = 1e-3
 """Phases of sections, as fractions of the period, within this distance are the same."""
 _CLEAR: Final = 1e-3
@@ -55,7 +55,7 @@ _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
-    """Parse the ends of a range of a constant, SI; InputError unless they are two ascending numbers."""
+    """Parse the ends of a range of a parameter, SI; InputError unless they are two ascending numbers."""
     unit = regime.quantity(parameter).si
     try:
         low, high = bounds
@@ -69,7 +69,7 @@ def read_bounds(
 
 @dataclass
 class Tracer:
-    """Tracer of all branches along one constant of one regime."""
+    """Tracer of all branches in one parameter of one regime."""
 
     regime: Regime
     parameter: str
@@ -107,10 +107,10 @@ class Tracer:
     def resumed(
         self, family: RegimeFamily, nodes: list[Node], stop: Stop, steps: Steps, *, backward: bool
     ) -> tuple[list[tuple[RegimeFamily, list[Node]]], Stop]:
-        """Continue a branch past a section change; return the new pieces and the reason for stopping.
+        """Continue a branch past a section change; return the new segments and the reason for stopping.
 
-        A branch is lost where an impact meets its section. Each piece begins or ends with the last orbit of
-        the piece before it, at the phase where that is farthest from its contacts. Orbits too close to the
+        A branch is lost where an impact meets its section. Each segment begins or ends with the last orbit of
+        the segment before it, at the phase where that is farthest from its contacts. Orbits too close to the
         end are removed from `nodes`.
         """
         pieces: list[tuple[RegimeFamily, list[Node]]] = []
@@ -164,7 +164,7 @@ class Tracer:
 
         `nodes` begin with the last orbit, which is at the state `quiet` there. The direction is that of the
         chord from an earlier orbit: a contact on the section leaves no derivative there, and at a fold the
-        sign of the constant is ambiguous. None if no orbit is far enough away, or if a run ends early.
+        sign of the parameter is ambiguous. None if no orbit is far enough away, or if a run ends early.
         """
         last = nodes[0]
         end = np.append(quiet[1], last.parameter) / self.scales
@@ -249,13 +249,13 @@ class Tracer:
         return self.described([(family, nodes)], (born, curve.stops[1]), steps, threads)
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
-        """Find the orbit near a state at one value of the constant; None if not found."""
+        """Find the orbit near a state at one value of the parameter; None if not found."""
         follower = Corrector(self.family(firings), self.scales, PRECISION)
         node = follower.at_parameter(follower.scaled(state, value))
         return None if node is None else np.asarray(node.state)
 
     def at_value(self, value: float) -> str:
-        """Format a value of the constant with name and unit."""
+        """Format a value of the parameter with name and unit."""
         return f"{self.parameter} = {value:{_DIGITS}} {self.regime.quantity(self.parameter).si}"
 
     def watch(self, firings: int, steps: Steps, effort: Effort) -> Any:
@@ -319,9 +319,9 @@ class Tracer:
         steps: Steps,
         threads: int | None,
     ) -> Branch:
-        """Build the branch, with the properties of all orbits, from pieces at their own sections."""
+        """Build the branch, with the properties of all orbits, from segments at their own sections."""
         family = pieces[0][0]
-        # A piece begins with the last orbit of the piece before it.
+        # A segment begins with the last orbit of the segment before it.
         owned = [
             (own, node) for k, (own, part) in enumerate(pieces) for node in (part if k == 0 else part[1:])
         ]
@@ -403,7 +403,7 @@ class Tracer:
         return "symmetric" if apart < _SHORTER else "asymmetric"
 
     def in_words(self, stop: Stop) -> Stop:
-        """Return a stop whose sentence names the constant and its unit."""
+        """Return a stop whose sentence names the parameter and its unit."""
         at = self.at_value(stop.parameter)
         why = stop.sentence.rpartition(": ")[2]
         sentences = {

@@ -1,4 +1,4 @@
-"""Bifurcation curves in the plane of two constants, from an event of a branch or a saved curve.
+"""Bifurcation curves in the plane of two parameters, from an event of a branch or a saved curve.
 
 `BifurcationCurve` holds the points at which an orbit bifurcates, and the points of codimension two.
 
@@ -46,7 +46,7 @@ SAME: Final = 1e-3
 
 
 class BifurcationCurve(Result, rows="point"):
-    """A curve in the plane of two constants on which a periodic orbit bifurcates.
+    """A curve in the plane of two parameters on which a periodic orbit bifurcates.
 
     Every array has a row for each point, in order along the curve.
     """
@@ -174,12 +174,12 @@ class BifurcationCurve(Result, rows="point"):
         )
 
     def at(self, name: str, value: float | str) -> list[tuple[float, float]]:
-        """Find both constants where the curve passes a value of one of them.
+        """Find both parameters where the curve passes a value of one of them.
 
         Parameters
         ----------
         name : str
-            Name of one of the two constants.
+            Name of one of the two parameters.
         value : float or str
             Value in SI, or text with a unit.
         """
@@ -235,9 +235,9 @@ def settled_plane(
     grid: tuple[int, int],
     threads: int | None,
 ) -> tuple[tuple[FloatArray, FloatArray], IntArray]:
-    """Compute the periods, in firings, of trains from rest over a grid of both constants.
+    """Compute the periods, in firings, of trains from rest over a grid of both parameters.
 
-    Returns the values of the first constant, (m,), of the second, (n,), and the periods, (n, m): 0 without a
+    Returns the values of the first parameter, (m,), of the second, (n,), and the periods, (n, m): 0 without a
     period, -1 where the run ended early. InputError if the numbers of values are negative.
     """
     if min(grid) < 0:
@@ -279,16 +279,16 @@ def bifurcation_curve(
     most: SupportsIndex = MOST,
     threads: int | None = None,
 ) -> BifurcationCurve:
-    """Follow a fold, a period doubling, a Neimark-Sacker point or a grazing through a second constant.
+    """Follow a fold, a period doubling, a Neimark-Sacker point or a grazing in a second parameter.
 
     Parameters
     ----------
     source : Branch, Reopened or path
         A branch from `printhammer.continuation`, or a file. Of a file with several branches the first is
-        used; a curve in a file is followed anew from one of its points. The constant of the source is the
-        first constant.
+        used; a curve in a file is followed anew from one of its points. The parameter of the source is the
+        first parameter.
     second : str
-        The second constant, such as "backstop.damping" or "waveform.amplitude".
+        The second parameter, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
         Its least and largest value, SI or text with a unit.
     event : BranchEvent, int or str, optional
@@ -298,9 +298,9 @@ def bifurcation_curve(
     regime : Regime, optional
         For a file: the hammer and how it is fired.
     first : tuple, optional
-        Least and largest value of the first constant, by default those of the branch.
+        Least and largest value of the first parameter, by default those of the branch.
     grid : tuple of int, optional
-        Numbers of values of the two constants at which trains from rest are judged (default: none).
+        Numbers of values of the two parameters at which trains from rest are judged (default: none).
     most : int, optional
         Maximum number of steps in each direction.
     threads : int, optional

@@ -41,7 +41,7 @@ RESONANCES: Final = 3
 """Largest number of passages of a grazing orbit that is tested for a resonance."""
 
 _LEVEL: Final = 1e-3
-"""Component of a unit tangent below which a curve is stationary in a constant."""
+"""Component of a unit tangent below which a curve is stationary in a parameter."""
 _VANISHES: Final = 0.1
 """Component of a tangent at a cusp, relative to that beside it, below which it vanishes."""
 _ROUNDS: Final = 20  # Iteration limit of Newton's method
@@ -170,9 +170,9 @@ def points_along(
 
 
 def _is_stationary(node: Node, here: Node, ahead: Node) -> bool:
-    """Whether a curve is stationary in both constants at a node between two others.
+    """Whether a curve is stationary in both parameters at a node between two others.
 
-    Each component of the tangent is compared with its value beside the node, since a constant with a wide
+    Each component of the tangent is compared with its value beside the node, since a parameter with a wide
     range has small components everywhere.
     """
     components = np.abs([each.tangent[-2:] for each in (node, here, ahead)])
@@ -191,11 +191,11 @@ def meeting(
     Parameters
     ----------
     plane : Plane
-        Plane of the two constants, with the period of the grazing orbit in firings.
+        Plane of the two parameters, with the period of the grazing orbit in firings.
     surface : str
         Surface that is touched.
     guess : array, shape (3,)
-        Initial guess: phase of the touch, first and second constant.
+        Initial guess: phase of the touch, first and second parameter.
     test : callable
         Test function of the derivative of the strobe map without the touch.
     """

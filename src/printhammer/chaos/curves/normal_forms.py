@@ -97,13 +97,13 @@ def root_coefficient(plane: Plane, place: Place) -> float:
 
 
 def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
-    """Determine the sides of a grazing of a rigid backstop, along the first constant, on which orbits exist.
+    """Determine the sides of a grazing of a rigid backstop, in the first parameter, on which orbits exist.
 
     Returns
     -------
     tuple of int
         Side of the orbit without the touch, then of the orbits with one touch in 1, 2, 3 and 4 of its
-        periods: 1 for larger values of the constant, -1 for smaller values, 0 for neither side.
+        periods: 1 for larger values of the parameter, -1 for smaller values, 0 for neither side.
     """
     matrix, root = place.jacobian, root_coefficient(plane, place)
     if place.slope is None or not math.isfinite(root):
@@ -117,7 +117,7 @@ def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
 def _touching_side(matrix: FloatArray, slope: FloatArray, kick: FloatArray, periods: int) -> int:
     """Determine the side on which an orbit with one touch in `periods` periods exists.
 
-    In units of the square root of the depth, u_0 = (0, v) and the shift of the constant solve
+    In units of the square root of the depth, u_0 = (0, v) and the shift of the parameter solve
     """
     power = np.linalg.matrix_power(matrix, periods)
     summed = sum((np.linalg.matrix_power(matrix, k) for k in range(periods)), np.zeros((2, 2))) @ slope

@@ -1,11 +1,11 @@
-"""Stability chart: the region of two constants where an orbit is stable, and its boundaries.
+"""Stability chart: the region of two parameters where an orbit is stable, and its boundaries.
 
 An orbit loses its stability at a fold, a period doubling or a Neimark-Sacker point, each a curve in the plane
 (`printhammer.chaos.curves.systems`). The chart also shows, on a grid, the periods that trains from rest
 settle to; a stable orbit need not be reached from rest.
 
-Curves start where the branch along the first constant meets a stability limit, and where branches along the
-second constant, from orbits of the former, do. A closed curve that none of these branches meets is missed.
+Curves start where the branch in the first parameter meets a stability limit, and where branches along the
+second parameter, from orbits of the former, do. A closed curve that none of these branches meets is missed.
 """
 
 from __future__ import annotations
@@ -45,14 +45,14 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch import BranchEvent
 
 GRID: Final = (48, 32)
-"""Default numbers of values of the two constants at which trains from rest are judged."""
+"""Default numbers of values of the two parameters at which trains from rest are judged."""
 
 _ACROSS: Final = (0.02, 0.98)
-"""Fractions of the range of the first constant at which branches along the second constant start."""
+"""Fractions of the range of the first parameter at which branches in the second parameter start."""
 
 
 class StabilityChart(Result):
-    """Region in the plane of two constants where an orbit is stable, and its boundaries."""
+    """Region in the plane of two parameters where an orbit is stable, and its boundaries."""
 
     regime: Regime = part("hammer and periodic drive of the branch it came from")
     names: tuple[str, str] = scalar("", "the two constants")
@@ -150,22 +150,22 @@ def stability_chart(
     effort: Effort = DEFAULT,
     **firing: Unpack[FiredAtFixedTolerance],
 ) -> StabilityChart:
-    """Compute the stability chart of a branch in the plane of its constant and a second constant.
+    """Compute the stability chart of a branch in the plane of its parameter and a second parameter.
 
     Parameters
     ----------
     branch : Branch, Regime or Hammer
-        Branch from `printhammer.continuation`, usually along the rate; its constant is the first constant, in
-        its bounds. For a regime, or a hammer with the keywords `firing`, the branch along `first` is
+        Branch from `printhammer.continuation`, usually along the rate; its parameter is the first parameter,
+        in its bounds. For a regime, or a hammer with the keywords `firing`, the branch along `first` is
         computed.
     second : str
-        The second constant, such as "backstop.damping" or "waveform.amplitude".
+        The second parameter, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
-        Least and largest value of the second constant, SI or text with a unit.
+        Least and largest value of the second parameter, SI or text with a unit.
     first : tuple, optional
-        For a regime or hammer: the first constant, its least and its largest value.
+        For a regime or hammer: the first parameter, its least and its largest value.
     grid : tuple of int, optional
-        Numbers of values of the two constants at which trains from rest are judged; (0, 0) for none.
+        Numbers of values of the two parameters at which trains from rest are judged; (0, 0) for none.
     most : int, optional
         Maximum number of steps of a curve in each direction.
 
@@ -174,7 +174,7 @@ def stability_chart(
     StabilityChart
         Curves on which the orbit of the branch loses its stability, one through each limit that lies on no
         other curve, and the periods of trains from rest. Limits are sought along the branch, and along the
-        second constant from two of its orbits; a curve that meets neither is missed.
+        second parameter from two of its orbits; a curve that meets neither is missed.
     """
     if isinstance(branch, Branch):
         if first is not None or firing:
@@ -256,7 +256,7 @@ class _Chart:
         return effort.quiet.mapped(along, list(numbers), length=1)
 
     def second(self, start: Start) -> float:
-        """Return the value of the second constant at a start."""
+        """Return the value of the second parameter at a start."""
         return self.value if start.other is None else start.other
 
     def curves(self, starts: list[Start], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:

@@ -34,14 +34,14 @@ class Start:
     regime: Regime
     """Regime with the phase at which the state is known."""
     first: str
-    """Name of the constant along which the bifurcation was found."""
+    """Name of the parameter along which the bifurcation was found."""
     bounds: tuple[float, float]
     firings: int
     tolerance: float
     state: FloatArray
     value: float
     other: float | None = None
-    """Value of the second constant, unless it is that of the regime."""
+    """Value of the second parameter, unless it is that of the regime."""
 
 
 def start_of(

@@ -1,11 +1,11 @@
-"""Bifurcations of codimension one as fixed points of extended maps, for continuation in two constants.
+"""Bifurcations of codimension one as fixed points of extended maps, for continuation in two parameters.
 
-An orbit of the strobe map G with two constants p and r loses its stability where
+An orbit of the strobe map G with two parameters p and r loses its stability where
 
     G(u, p, r) = u,   f(J(u, p, r)) = 0,   f = det(J - I), det(J + I) or det(J) - 1.
 
 These are the fixed points of the map (u, p) -> (G, p + f) with the parameter r: beside the state at the
-section the constant p is unknown, and the curve is followed by `printhammer.chaos.continuation.arclength`
+section the parameter p is unknown, and the curve is followed by `printhammer.chaos.continuation.arclength`
 (Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer 2004, section 10.3).
 
 Grazings, and orbits with impacts on a rigid backstop, use the touch as the section.
@@ -75,7 +75,7 @@ _PARTS: Final = 5.0
 
 @dataclass(frozen=True)
 class Plane:
-    """Plane of two constants, with the orbits above it."""
+    """Plane of two parameters, with the orbits above it."""
 
     regime: Regime
     names: tuple[str, str]
@@ -85,17 +85,17 @@ class Plane:
 
     @cached_property
     def scales(self) -> FloatArray:
-        """Scales of displacement, velocity and both constants, shape (4,)."""
+        """Scales of displacement, velocity and both parameters, shape (4,)."""
         widths = [(high - low) / _PARTS for low, high in self.bounds]
         return np.array([*self.regime.window.half_widths, *widths])
 
     def at(self, first: float, second: float) -> Regime:
-        """Return the regime with these constants; InputError if they are impossible."""
+        """Return the regime with these parameters; InputError if they are impossible."""
         return self.regime.with_(self.names[1], float(second)).with_(self.names[0], float(first))
 
 
 def check_two(first: str, second: str) -> None:
-    """Check that two constants differ; a rate is the same constant as its period."""
+    """Check that two parameters differ; a rate is the same parameter as its period."""
     if second == first or {first, second} == {PERIOD, RATE}:
         raise InputError.of("second", second, f"another constant than that of the branch, {first}")
 
@@ -124,14 +124,14 @@ class Place(Declared):
 
 
 class MultiplierSystem:
-    """Extended map of orbits with a critical multiplier; unknowns are the state and the first constant."""
+    """Extended map of orbits with a critical multiplier; unknowns are the state and the first parameter."""
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind, self.test = plane, kind, TESTS[kind]
         self.scales = plane.scales
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the map of state and first constant at a value of the second constant."""
+        """Evaluate the map of state and first parameter at a value of the second parameter."""
         plane, scales = self.plane, self.scales
         moves = SPACING * scales
         point = np.append(whole, other)
@@ -194,7 +194,7 @@ def _flight(
 
 
 class GrazingSystem:
-    """Extended map of orbits that graze a surface; unknowns are phase of the touch and first constant."""
+    """Extended map of orbits that graze a surface; unknowns are phase of the touch and first parameter."""
 
     def __init__(self, plane: Plane, surface: Surface) -> None:
         self.plane, self.kind, self.surface = plane, GRAZING, surface
@@ -203,7 +203,7 @@ class GrazingSystem:
     def at(self, phase: float, first: float, second: float) -> tuple[Place, FloatArray] | str:
         """Compute the orbit that leaves a touch, and its miss at the next touch; text if it ends early.
 
-        The miss distance is in scales of the state; InputError if the constants are impossible.
+        The miss distance is in scales of the state; InputError if the parameters are impossible.
         """
         flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
         if flight.trouble:

@@ -74,7 +74,7 @@ class Traced:
         return [place_of(node) for node in self.nodes]
 
     def crossings(self, which: int, value: float) -> list[Place]:
-        """Find the points where the curve passes a value of the first constant (0) or the second (1)."""
+        """Find the points where the curve passes a value of the first parameter (0) or the second (1)."""
         places: list[Place] = []
         for system, nodes in self.pieces:
             corrector = Corrector(system, system.scales, PRECISION)
@@ -234,7 +234,7 @@ class CurveTracer:
     def resumed(
         self, nodes: list[Node], stop: Stop, *, first: bool
     ) -> tuple[list[tuple[System, list[Node]]], Stop]:
-        """Continue a curve past a section change; return the new pieces and the reason for stopping."""
+        """Continue a curve past a section change; return the new segments and the reason for stopping."""
         pieces: list[tuple[System, list[Node]]] = []
         for _ in range(_TURNS):
             if stop.reason not in ("lost", "jump", "no value"):
@@ -343,12 +343,12 @@ class CurveTracer:
         return None if met is None else point_of(f"{self.short} meets grazing", met, after)
 
     def at_value(self, which: int, value: float) -> str:
-        """Format a value of one of the constants with its name and unit."""
+        """Format a value of one of the parameters with its name and unit."""
         name = self.plane.names[which]
         return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}".removesuffix(" 1")
 
     def in_words(self, stop: Stop, points: list[CodimensionTwo], end: int) -> Stop:
-        """Return a stop whose sentence names the constants and, if there is one, the point at the end."""
+        """Return a stop whose sentence names the parameters and, if there is one, the point at the end."""
         at = self.at_value(1, stop.parameter)
         if stop.reason == "grazing" and points:
             point = points[-1 if end else 0]

@@ -82,7 +82,7 @@ class LyapunovChart(Result, rows="period"):
         return f"Lyapunov exponents of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate exponents and verdicts, a row for each train, and how often both tests agree."""
+        """Tabulate exponents and classifications, a row for each train, and how often both tests agree."""
         from printhammer.chaos.exponents.lyapunov import dimension_text, verdict_text
 
         pairs = list(zip(self.growth, self.zero_one, strict=True))

@@ -68,12 +68,12 @@ def dimension_text(value: float, error: float) -> str:
 
 
 def verdict_text(verdict: str) -> str:
-    """Format a verdict for a summary."""
+    """Format a classification for a summary."""
     return judged(verdict != "undecided", verdict.replace("period-", "period "))
 
 
 class Lyapunov(Result, rows="firing exponent"):
-    """Lyapunov exponents of one train, and two verdicts on the kind of motion."""
+    """Lyapunov exponents of one train, and two classifications of the motion."""
 
     points: Strobe = part(
         "the states at the firings between which growth counts, and the verdict on them",
@@ -163,7 +163,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict on the points, with its evidence."""
+        """The classification of the points, with its evidence."""
         if self.points.verdict is None:
             raise ValueError("the points have not been judged")
         return self.points.verdict
@@ -228,7 +228,7 @@ class Lyapunov(Result, rows="firing exponent"):
         return self.points.provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return the verdicts, for the attributes of the Dataset."""
+        """Return the classifications, for the attributes of the Dataset."""
         second = {} if self.zero_one is None else {"k": self.zero_one.k, "zero_one": self.zero_one.verdict}
         return {**second, "phase": self.points.phase, **self.points.notes()}
 

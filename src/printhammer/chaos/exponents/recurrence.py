@@ -104,7 +104,7 @@ def recurrence(
     rate : float, optional
         Recurrence rate from which the threshold follows, instead of `threshold`; 0.05 if neither is given.
         Where many distances are equal, the rate comes out larger; so it does for strobe points that agree as
-        closely as a verdict requires.
+        closely as a classification requires.
     scales : array, optional
         Scales of the components; by default the half-widths of the window of a strobe, and 1 for other
         states.

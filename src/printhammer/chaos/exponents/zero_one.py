@@ -155,7 +155,8 @@ def zero_one(
         the keywords `firing`, for which a thousand points are computed, after a thousand firings.
     resolution : float, optional
         Amplitude below which changes are ignored, in the unit of the series. By default 1e-12 of the largest
-        absolute value; for strobe points the agreement of a verdict, 1e-6 of the half-width of the window.
+        absolute value; for strobe points the agreement of a classification, 1e-6 of the half-width of the
+        window.
     angles : int, optional
         Number of random angles.
     seed : int, optional
@@ -166,7 +167,7 @@ def zero_one(
     Returns
     -------
     ZeroOne
-        With a verdict; "undecided" for a strobe whose run ended early.
+        With a classification; "undecided" for a strobe whose run ended early.
 
     Raises
     ------
@@ -229,7 +230,7 @@ def zero_one(
 
 
 def _judged(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
-    """Return the verdict and, if it is "undecided", the reason."""
+    """Return the classification and, if it is "undecided", the reason."""
     if k <= REGULAR:
         return "regular", ""
     quarter = rest.size // 4

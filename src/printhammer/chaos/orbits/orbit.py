@@ -209,7 +209,7 @@ class Orbit(Result):
     def entries(self) -> dict[str, tuple[Column, Any]]:
         """Return states over `firing`, multipliers over `multiplier`, and scalars of the whole orbit."""
         own = super().entries()
-        # Under an endless force there are firings but no dots.
+        # Under a continuous periodic force there are firings but no dots.
         for name in ("flight_time", "peak_force"):
             note, values = own[name]
             own[name] = note, values if len(values) else np.full(self.firings, np.nan)
@@ -365,7 +365,7 @@ def _contacts_and_dots(
     skipped = 0 if regime.phase == 0.0 or regime.drive is not None else 1
     run = _Run(regime, start, firings + skipped + 1, tolerance)
     motion, period = run.motion, firings * regime.period
-    # Under an endless force no firing marks the period; it begins at the section.
+    # Under a continuous periodic force no firing marks the period; it begins at the section.
     begin = run.fired_at + skipped * regime.period if regime.drive is None else float(run.sections[0])
     before = regime.memory
     contacts = []

@@ -4,13 +4,13 @@ A train of firings is an iterated map, the stroboscopic map, in the plane of dis
 the state at one firing to the state at the next. If a firing falls inside a pack contact, the state also
 includes the branch of the pack's law and its memory, the latest local maximum.
 
-*The integrators of 1983.* Strobe points and verdicts as computed by the two integrators of the paper, with
-its schedule of steps.
+*The integrators of 1983.* Strobe points and classifications as computed by the two integrators of the paper,
+with its schedule of steps.
 
 The panels of Fig. 11 were judged by eye from such points. Fixed steps that locate no contact do not compute
 the motion: every touch adds an error, and the errors define a map of their own, which jumps where a step just
-reaches a contact or just misses it. It has no tangent, so that no exponent supports a verdict: here a train
-is strange if no period up to 64 is found, the criterion of a reader of such a plot.
+reaches a contact or just misses it. It has no tangent, so that no exponent supports a classification: here a
+train is strange if no period up to 64 is found, the criterion of a reader of such a plot.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class Strobe(Result):
         return f"strobe points of {self.hammer.name}, every {self.period:.9g} s"
 
     def summary(self) -> Summary:
-        """Summarise points and verdict."""
+        """Summarise points and classification."""
         known = np.isfinite(self.x)
         at = f", {self.phase:g} of a period later" if self.phase else ""
         rows: list[FactRow] = [
@@ -134,7 +134,7 @@ class Strobe(Result):
         return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
 
     def notes(self) -> dict[str, Any]:
-        """Return the verdict, for the attributes of the Dataset."""
+        """Return the classification, for the attributes of the Dataset."""
         judged = {} if self.verdict is None else self.verdict.as_dict()
         return {name: value for name, value in judged.items() if name != "tolerance"}
 
@@ -222,7 +222,7 @@ def strobes(
         First and last firing that is judged; the very first firing is number 1.
     every_exponent : bool, optional
         Whether to compute the exponent of periodic trains too, which takes several times as long as their
-        points and does not change the verdict.
+        points and does not change the classification.
 
     Returns
     -------
@@ -267,7 +267,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 def strobe_of(
     train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
-    """Build the strobe points of a train from its states at some firings and its verdict."""
+    """Build the strobe points of a train from its states at some firings and its classification."""
     return Strobe(
         hammer=train.hammer,
         drive=train.drive,
@@ -309,7 +309,7 @@ def scheme_strobes(
     Returns
     -------
     list of Strobe
-        One for each train, with its verdict: a period, "strange" where no period up to 64 is found, or
+        One for each train, with its classification: a period, "strange" where no period up to 64 is found, or
         "undecided" where the scheme failed on the way.
 
     Raises

@@ -1,18 +1,18 @@
-"""Verdicts on very many trains, with an early test for periodic trains.
+"""Classification of very many trains, with an early test for periodic trains.
 
 Most trains settle within a few firings, and need not be followed to firing 2000 to know their period. A train
 is periodic as soon as
 
-- its states q firings apart agree a hundred times closer than the verdict requires, over a window of at least
-  2 q firings, no smaller number of firings does as closely as the verdict requires, and the distance of
-  states a divisor of q apart does not shrink; and
+- its states q firings apart agree a hundred times closer than the classification requires, over a window of
+  at least 2 q firings, no smaller number of firings does as closely as the classification requires, and the
+  distance of states a divisor of q apart does not shrink; and
 - a small perturbation decays: the derivative of the state after q firings with respect to the state before
   them has no eigenvalue beyond 0.99 in absolute value.
 
 A remaining difference d then accumulates to at most d / (1 - 0.99), which is within the tolerance of the
-verdict. All other trains are followed to firing 2000. Aperiodic trains are strange if the exponent over three
-hundred firings on the attractor, from the state at firing 1001 on, is positive by five standard errors, more
-than the verdict requires; otherwise it is computed over firings 1001 to 2000.
+classification. All other trains are followed to firing 2000. Aperiodic trains are strange if the exponent
+over three hundred firings on the attractor, from the state at firing 1001 on, is positive by five standard
+errors, more than the classification requires; otherwise it is computed over firings 1001 to 2000.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ STAGES: Final = (32, 128)
 """Numbers of firings after which periodicity is tested."""
 
 CLOSER: Final = 1e-2
-"""Agreement of an early periodic train, as a fraction of the agreement of the verdict."""
+"""Agreement of an early periodic train, as a fraction of the agreement of the classification."""
 
 LARGEST_MULTIPLIER: Final = 0.99
 """Largest absolute eigenvalue of an early periodic train."""
@@ -67,8 +67,8 @@ def scan(
     Returns
     -------
     list of Verdict
-        A verdict names the firings that it rests on: fewer than 1001 to 2000 for trains decided early, see
-        the head of this module.
+        A classification names the firings that it rests on: fewer than 1001 to 2000 for trains decided early,
+        see the head of this module.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Trains from rest to their last strobe point, run in parallel, and verdicts on them.
+"""Trains from rest to their last strobe point, run in parallel, and classification of them.
 
-States that continue a train where another ended, and trains that may be run piece by piece.
+States that continue a train where another ended, and trains that may be run segment by segment.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LONG_CYCLE: Final = 5
 """Shortest cycle, in firings, that is tested for rests on the backstop. Arbitrary."""
 
 STRETCH: Final = 1
-"""Number of firings in a run, for trains that may be run piece by piece.
+"""Number of firings in a run, for trains that may be run segment by segment.
 
 Rounding of the time, and so of the phase of a force, is proportional to the time; a ball that comes to rest
 on a table and leaves it again amplifies it by 1e8. Runs of one period each have the same rounding, so that a
@@ -67,7 +67,7 @@ def handed_on(
 def is_memoryless(regime: Regime) -> bool:
     """Whether (x, v) at a firing determines the motion that follows, for every firing phase.
 
-    True under an endless force, with a rigid backstop and no pack.
+    True under a continuous periodic force, with a rigid backstop and no pack.
     """
     backstop = regime.hammer.backstop
     rigid = backstop is not None and backstop.law == "rigid"
@@ -178,10 +178,10 @@ def run_trains(
     *,
     every_exponent: bool = False,
 ) -> tuple[list[States], list[Verdict | None]]:
-    """Compute the states of trains at chosen firings, at the phases of their regimes, and verdicts.
+    """Compute the states of trains at chosen firings, at the phases of their regimes, and classifications.
 
-    A verdict covers the firings from the first to the last of `judged`; None for no verdict. Exponents of
-    periodic trains are computed only with `every_exponent`.
+    A classification covers the firings from the first to the last of `judged`; None for no classification.
+    Exponents of periodic trains are computed only with `every_exponent`.
     """
     if not trains:
         return [], []

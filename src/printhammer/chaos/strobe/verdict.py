@@ -1,4 +1,4 @@
-"""Verdict on strobe points, periodic or strange, with its evidence.
+"""Classification of strobe points, periodic or strange, with its evidence.
 
 A train of period T has the period q if its states q firings apart agree, and q is the smallest such number;
 if they agree but still move, Newton's method has to confirm the period, see
@@ -32,7 +32,7 @@ SIGNIFICANT: Final = 3.0
 """Number of standard errors by which the exponent of a strange train has to be positive."""
 
 SUPERSTABLE: Final = "superstable"
-"""Verdict on a motion that repeatedly comes to rest on its backstop, without a period up to 64."""
+"""Classification of a motion that repeatedly comes to rest on its backstop, without a period up to 64."""
 
 FORGETS: Final = "no exponent: the motion comes to rest on the backstop and forgets its past"
 
@@ -86,7 +86,7 @@ class Verdict(Declared):
 
     @property
     def strange(self) -> bool:
-        """Whether the verdict is "strange"."""
+        """Whether the classification is "strange"."""
         return self.name == "strange"
 
     @property
@@ -96,7 +96,7 @@ class Verdict(Declared):
 
     @property
     def superstable(self) -> bool:
-        """Whether the verdict is "superstable"."""
+        """Whether the classification is "superstable"."""
         return self.name == SUPERSTABLE
 
     @property
@@ -135,7 +135,7 @@ class Verdict(Declared):
         return "; ".join(self.phrases)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return verdict and evidence by name, for JSON; None for unknown values."""
+        """Return classification and evidence by name, for JSON; None for unknown values."""
         return {
             "verdict": self.name,
             "nearest_period": self.nearest,
@@ -252,7 +252,7 @@ def is_positive(exponent: Exponent) -> bool:
 
 
 def _without_period(exponent: Exponent | None) -> tuple[str, str]:
-    """Return the verdict on an aperiodic train, with the reason if it is undecided."""
+    """Return the classification of an aperiodic train, with the reason if it is undecided."""
     name = "undecided"
     if exponent is None:
         return name, "no period, and the exponent was not computed"

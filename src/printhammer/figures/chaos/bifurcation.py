@@ -31,7 +31,7 @@ SHADES: Final = {
     "undecided": "#c4c4c4",
     "run ended early": "#7a1f1f",
 }
-"""Colour of the band of a verdict."""
+"""Colour of the band of a classification."""
 
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
 """Colours of points reached from one direction only; distinct from those of the bands."""
@@ -55,7 +55,7 @@ def plot(
     """Draw a bifurcation diagram.
 
     Black points are reached from all directions, orange and violet ones by rising or falling values only. The
-    bands below show the verdicts.
+    bands below show the classifications.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def _crossed(
 
 
 def _bands(strip: Axes, diagram: Bifurcation, across: Scale) -> None:
-    """Draw a band of verdicts for each direction."""
+    """Draw a band with the classification of the motion for each direction."""
     starts = np.concatenate([[0.0], np.cumsum(cells(diagram.values))]) + diagram.values[0]
     for way, name in enumerate(diagram.directions):
         place = 0

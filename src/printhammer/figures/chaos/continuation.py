@@ -1,4 +1,4 @@
-"""Branches of periodic orbits against a constant: stable solid, unstable dashed, branch points marked."""
+"""Branches of periodic orbits against a parameter: stable solid, unstable dashed, branch points marked."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> N
 
 
 def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, list[bool]]:
-    """Return parameter and quantity with the branch points inserted, and the stability of each line piece."""
+    """Return parameter and quantity with branch points inserted, and the stability of each line segment."""
     table = getattr(branch, show)
     values, rows, stable = [branch.values[0]], [table[0]], []
     inside: dict[int, list[Any]] = {}

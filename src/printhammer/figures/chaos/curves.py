@@ -1,4 +1,4 @@
-"""Bifurcation curves in the plane of two constants, over the attractors of trains from rest.
+"""Bifurcation curves in the plane of two parameters, over the attractors of trains from rest.
 
 `plot_chart` is the designer's chart: stability limits of an orbit, and attractors of trains from rest.
 """
@@ -37,7 +37,7 @@ _REGION: Final = "#cfe3f1"
 def plot_chart(chart: StabilityChart) -> Figure:
     """Draw a stability chart.
 
-    Horizontal: first constant; vertical: second. Shaded: the train from rest settles to the orbit's period;
+    Horizontal: first parameter; vertical: second. Shaded: the train from rest settles to the orbit's period;
     grey: its run stopped early.
     """
     from matplotlib.lines import Line2D
@@ -96,7 +96,7 @@ _NONE: Final = "#f1f1f1"
 
 @styled
 def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
-    """Draw a bifurcation curve, the first constant horizontal, the second vertical.
+    """Draw a bifurcation curve, the first parameter horizontal, the second vertical.
 
     The curve is heavy where stability is lost, and dashed where a period doubling is subcritical; points of
     codimension two are marked and named.

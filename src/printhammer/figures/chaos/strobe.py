@@ -61,7 +61,7 @@ RING: Final[dict[str, Any]] = {
 
 @styled
 def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
-    """Draw strobe points: velocity against displacement, the backstop, and the verdict.
+    """Draw strobe points: velocity against displacement, the backstop, and the classification.
 
     Rings mark the last points of a periodic train. With `fit`, the axes limits follow the points instead of
     the window of Fig. 11.
@@ -112,8 +112,8 @@ def panel(
 ) -> None:
     """Draw the points of a train into axes limited by a window; a corner states the number outside.
 
-    `size` is the diameter of a point, points; `named` writes strobe time and verdict inside; `printed`, the
-    verdict of the paper, is added if it differs.
+    `size` is the diameter of a point, points; `named` writes strobe time and classification inside;
+    `printed`, the classification of the paper, is added if it differs.
     """
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))

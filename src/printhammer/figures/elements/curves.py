@@ -20,7 +20,7 @@ SETTLED: Final = 0.01
 """Fraction of the stroke within which the armature counts as settled in a figure; arbitrary."""
 
 _POINTS: Final = 2400  # Uniform points of a curve: more than a picture resolves
-_PER_PIECE: Final = 60  # Points of a smooth piece; arbitrary
+_PER_PIECE: Final = 60  # Points of a smooth segment; arbitrary
 
 
 def waveform_of(hammer: Hammer) -> Waveform:

@@ -1,4 +1,4 @@
-"""Figure 11: Poincaré plots at gradually increasing rates, with the verdict on each."""
+"""Figure 11: Poincaré plots at gradually increasing rates, with the classification of each."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def poincare(
         Points in each panel, from the first firing on.
     printed : mapping, optional
         Verdicts printed in the paper, such as "period-2", by strobe time, s; each is written in its panel if
-        it differs from the computed verdict.
+        it differs from the computed classification.
     scheme : str, optional
         "runge-kutta-4" or "trapezoid": the points as that scheme computes them on the schedule of the paper,
         see `printhammer.chaos.strobe.points`.

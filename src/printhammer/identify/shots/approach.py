@@ -1,7 +1,7 @@
-"""Approach phase of the motion fit: multiple shooting with penalised gaps between stretches.
+"""Approach phase of the motion fit: multiple shooting with penalised gaps between segments.
 
-Gaps between the stretches are allowed, with a penalty that rises from step to step. A wrong constant is thus
-corrected by what each stretch shows by itself, before errors can grow from contact to contact.
+Gaps between the segments are allowed, with a penalty that rises from step to step. A wrong constant is thus
+corrected by what each segment shows by itself, before errors can grow from contact to contact.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Constrained Gauss-Newton iteration on chains of stretches, and its diagnostics.
+"""Constrained Gauss-Newton iteration on chains of segments, and its diagnostics.
 
-Every step solves the linearised problem in which all gaps between stretches are closed; it is shortened until
+Every step solves the linearised problem in which all gaps between segments are closed; it is shortened until
 the data misfit or the gap is smaller than at all earlier steps (a filter method: R. Fletcher and S. Leyffer,
 Math. Program. 91 (2002) 239). While the constants are far off, only spikes of the records are excluded; near
 the solution, outliers are excluded by their residuals.

@@ -177,8 +177,8 @@ def fit_motion(
 ) -> Fit:
     """Fit the mass and other constants to displacement records of single shots.
 
-    Every record is cut in free flight between its contacts. Each stretch is integrated separately from a
-    state of its own; the constants are common, and at the solution each stretch begins where the preceding
+    Every record is cut in free flight between its contacts. Each segment is integrated separately from a
+    state of its own; the constants are common, and at the solution each segment begins where the preceding
     one ends (`printhammer.identify.shots.shooting`). The sensor is a first-order low-pass with additive
     noise.
 

@@ -1,7 +1,7 @@
-"""Multiple shooting: each stretch of a single shot has its own initial state; gaps close at the solution.
+"""Multiple shooting: each segment of a single shot has its own initial state; gaps close at the solution.
 
-The model of a record is a chain of stretches. The first begins at rest at the firing, each other one in free
-flight with displacement and velocity as additional unknowns; at the solution each stretch begins where the
+The model of a record is a chain of segments. The first begins at rest at the firing, each other one in free
+flight with displacement and velocity as additional unknowns; at the solution each segment begins where the
 preceding one ends. Gaps are allowed while the constants are wrong, so that no error grows through more than
 one contact. The unknown states are eliminated from the linearised conditions ("condensing": H. G. Bock, in:
 Modelling of Chemical Reaction Systems, Springer 1981, 102), so that a step costs no more than one for the
@@ -59,20 +59,20 @@ class Chain:
     motion: FloatArray
     """Displacement, m, and velocity, m/s, at the grid times. Shape (g, 2)."""
     gaps: FloatArray
-    """End of each stretch minus the beginning of the next, shape (j, 2)."""
+    """End of each segment minus the beginning of the next, shape (j, 2)."""
     by_parameter: FloatArray
     """Derivatives of the motion with respect to the parameters in their scales; p = 0 if not requested. Shape
     (g, 2, p)."""
     by_state: FloatArray
-    """Derivatives of the motion with respect to the initial state of the stretch. Shape (g, 2, 2)."""
+    """Derivatives of the motion with respect to the initial state of the segment. Shape (g, 2, 2)."""
     end_by_parameter: FloatArray
     end_by_state: FloatArray
-    """Derivatives of the final state of each stretch but the last, shape (j, 2, p) and (j, 2, 2)."""
+    """Derivatives of the final state of each segment but the last, shape (j, 2, p) and (j, 2, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Time grid of a shot, indices of the samples in it, and indices at which stretches begin."""
+    """Time grid of a shot, indices of the samples in it, and indices at which segments begin."""
 
     grid: FloatArray
     samples: IntArray
@@ -82,7 +82,7 @@ class _Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One member of the ensemble: a stretch with hammer, drive, initial state and output times."""
+    """One member of the ensemble: a segment with hammer, drive, initial state and output times."""
 
     hammer: Hammer
     drive: PulseTrain
@@ -91,7 +91,7 @@ class _Run:
 
 
 class Shooting:
-    """Chains of stretches for several shots, integrated together.
+    """Chains of segments for several shots, integrated together.
 
     Constants of the hammer that are not fitted stay fixed; where a pulse is None, the hammer's own waveform
     is fired.
@@ -152,7 +152,7 @@ class Shooting:
     def chains(
         self, values: FloatArray, states: Sequence[FloatArray], *, derivatives: bool
     ) -> list[Chain] | None:
-        """Integrate all stretches; return None for an invalid hammer or a failed simulation.
+        """Integrate all segments; return None for an invalid hammer or a failed simulation.
 
         The arguments are parameter values, SI, and displacement, m, and velocity, m/s, at the joints of each
         shot, shape (j, 2).
@@ -197,7 +197,7 @@ class Shooting:
         return [self._chain(shot, states[shot], table, where, count) for shot in range(len(self.shots))]
 
     def _acts(self, variant: int, shot: int, start: float) -> bool:
-        """Whether a perturbed parameter affects a stretch that begins at a time, s."""
+        """Whether a perturbed parameter affects a segment that begins at a time, s."""
         number = variant - 1 - len(self.parameters.keys)
         return number < 0 or (self.parameters.owners[number] == shot and start <= self.lasting[shot])
 
@@ -231,7 +231,7 @@ class Shooting:
                 run = where.get((shot, stretch, -1 - which))
                 change = 0.0 if run is None else (table[run, :long] - base) / self.steps[which]
                 by_state[span, :, which] = change
-            # The joint itself belongs to the next stretch.
+            # The joint itself belongs to the next segment.
             ends[stretch] = motion[span][-1]
             ends_p[stretch], ends_s[stretch] = by_parameter[span][-1], by_state[span][-1]
         return Chain(motion, ends[:-1] - states, by_parameter, by_state, ends_p[:-1], ends_s[:-1])
@@ -249,7 +249,7 @@ class Shooting:
         return out[rows].reshape(len(rows), *motion.shape[2:])
 
     def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
-        """Return readings and derivatives of a shot with independent stretches.
+        """Return readings and derivatives of a shot with independent segments.
 
         The readings have the shape (n,), the derivatives with respect to the parameters, in their scales, and
         to the states at the joints, in `units`, the shape (n, p + 2 j).

@@ -1,8 +1,8 @@
 """Simulation of a hammer whose pack changes from firing to firing, as on paper that varies along the line.
 
-The motion is integrated piece by piece. A piece ends at the next firing; if the armature is then inside the
-pack of this piece or of the next one, the piece is extended until the armature is inside neither, so that a
-contact meets a single pack.
+The motion is integrated segment by segment. A segment ends at the next firing; if the armature is then inside
+the pack of this segment or of the next one, the segment is extended until the armature is inside neither, so
+that a contact meets a single pack.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from printhammer.run.motion import Motion
 from printhammer.run.problem import Problem
 from printhammer.run.start import initial_state
 
-_LATER: Final = 5e-6  # Step by which a piece is extended while the armature is inside a pack, s; arbitrary
+_LATER: Final = 5e-6  # Step by which a segment is extended while the armature is inside a pack, s; arbitrary
 
 
 class PiecewiseMotion:
@@ -35,7 +35,7 @@ class PiecewiseMotion:
 
     @property
     def status(self) -> str:
-        """Status of the last piece."""
+        """Status of the last segment."""
         return self._pieces[-1].status
 
     @property
@@ -77,7 +77,7 @@ class PiecewiseMotion:
 
     @property
     def energy(self) -> Ledger:
-        """The energy ledger of the whole run: the sums over its pieces."""
+        """The energy ledger of the whole run: the sums over its segments."""
         ledgers = [motion.energy for motion in self._pieces]
         names = [field.name for field in fields(Ledger)]
         return Ledger(**{name: sum(getattr(ledger, name) for ledger in ledgers) for name in names})
@@ -141,7 +141,7 @@ def simulate_pieces(
 
 
 def _joined(first: Contact, then: Contact) -> Contact:
-    """Merge two pieces of one contact."""
+    """Join the two segments of one contact."""
     higher = then if then.depth > first.depth else first
     return replace(
         first,
