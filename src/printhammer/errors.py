@@ -81,7 +81,7 @@ class InputError(PrinthammerError, ValueError):
         return cls(f"{where}{key} = {text}", file=file, key=key, value=value, expected=expected)
 
     def within(self, where: object, *, file: object = None, key: str | None = None) -> InputError:
-        """Return the error with a prefix to its message, and its place in its fields.
+        """Return the error with a prefix to its message, and the location in its fields.
 
         Parameters
         ----------

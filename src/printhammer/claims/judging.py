@@ -116,7 +116,7 @@ def judge_all(
     progress: Callable[[str], None] | None = None,
     context: Context | None = None,
 ) -> list[JudgedClaim]:
-    """Judge the claims of the paper for one hammer.
+    """Evaluate the claims of the paper for one hammer.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def judge_all(
 
 
 def judge(context: Context, claim: Claim) -> JudgedClaim:
-    """Judge one claim."""
+    """Evaluate one claim."""
     if claim.name in PENDING:
         return JudgedClaim(claim, None, "not yet", f"Not judged yet: it takes {PENDING[claim.name]}.")
     start = perf_counter()

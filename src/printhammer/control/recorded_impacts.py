@@ -29,7 +29,7 @@ _BITS: Final = 24
 _UNITS: Final = 20  # Number of simulated units behind an uncertainty; arbitrary
 
 VAGUE: Final = "vague"
-"""Flag of an estimate whose uncertainty is no smaller than that of the nominal flight time."""
+"""Flag of an estimate that is at least as uncertain as the nominal flight time."""
 
 _QUIET: Final = 1e-4
 """Smallest noise of a sample, as a fraction of the largest value."""

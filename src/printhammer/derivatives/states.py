@@ -1,8 +1,8 @@
 """Tangent flow of the state through all contacts, and the Lyapunov exponents of a train.
 
-A neighbouring motion meets every switch slightly earlier or later; docs/tangent.md derives the resulting
-jumps (saltation matrices). The flow is integrated in a second pass over the record of a run, so that other
-runs do not pay for it.
+A neighbouring motion meets every discontinuity slightly earlier or later; docs/tangent.md derives the jumps
+(saltation matrices) that result. The flow is integrated in a second pass over the record of a run, so that
+other runs do not pay for it.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def tangent_map(
     drive : Drive
         The drive.
     start, end : float
-        Times, s, in a run from time 0. At the instant of a switch, the state after the switch.
+        Times, s, in a run from time 0. At a discontinuity, the state after it.
     state : sequence of float, optional
         Displacement, m, velocity, m/s, and any further components at time 0, as for `printhammer.simulate`;
         by default the rest state.

@@ -1,4 +1,4 @@
-"""Drive with a waveform of its own for each firing: harder, softer, longer, with a brake pulse."""
+"""Drive with a separate waveform for each firing: harder, softer, longer, with a brake pulse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Printed page: the dots on paper, the requested dots, placement errors, and the worst place.
+"""Printed page: the dots on paper, the requested dots, placement errors, and the region of largest error.
 
 Ink on paper is rendered into an array: round dots of given optical densities.
 
@@ -108,10 +108,10 @@ def coloured(density: npt.ArrayLike) -> npt.NDArray[np.uint8]:
 
 View = Literal["page", "zoom", "sheet"]
 VIEWS: Final = get_args(View)
-"""Views: the full page, its worst place, or the sheet of paper at true size."""
+"""Views: the full page, the region of largest error, or the sheet of paper at true size."""
 
 ZOOM_SHAPE: Final = 3.5
-"""Width of the worst place in units of the height of the wires."""
+"""Width of the region of largest error in units of the height of the wires."""
 
 _WIDTH: Final = 7.6  # Width of the figure, in
 _SIDE: Final = 0.2  # Margin at either side, in
@@ -197,12 +197,12 @@ def whole_sheet(page: Page) -> Sheet:
 
 
 def zoom_slots(page: Page) -> int:
-    """Return the number of slots shown of the worst place."""
+    """Return the number of slots shown of the region of largest error."""
     return max(1, round(ZOOM_SHAPE * page.head.wires * page.head.wire_pitch / page.head.pitch))
 
 
 def zoomed_sheet(page: Page) -> Sheet:
-    """Return the paper around the worst place of a page."""
+    """Return the paper around the region of largest error of a page."""
     head, slots = page.head, zoom_slots(page)
     line, first = page.worst_place(slots)
     top = line * head.line_pitch

@@ -1,4 +1,4 @@
-"""First-order low-pass of a motion and of a waveform, solved exactly, for sensors of limited bandwidth.
+"""Exact first-order low-pass filter of a motion or a waveform, for sensors of limited bandwidth.
 
 The output y of a sensor of bandwidth f (-3 dB) obeys tau y' = u - y with tau = 1 / (2 pi f). If u is a
 polynomial p, a particular solution is p - tau p' + tau^2 p'' - ..., and the transient decays as exp(-t /

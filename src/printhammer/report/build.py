@@ -125,7 +125,7 @@ def write_report(
     reconstruction: Results | None = None,
     pdf: bool = False,
 ) -> Report:
-    """Judge the claims, draw the figures, and write the report of a hammer.
+    """Evaluate the claims, draw the figures, and write the report of a hammer.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Provenance of results: one set of keys, composed in one place.
+"""Provenance of results: the common set of keys.
 
 | key | |
 |---|---|

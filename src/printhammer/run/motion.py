@@ -122,7 +122,7 @@ class Motion(Result, fields=False):
 
     @property
     def step_times(self) -> FloatArray:
-        """Times of the ends of all steps, s, shape (n,); every switch of the force law is among them."""
+        """Times of the ends of all steps, s, shape (n,); every discontinuity of the force is among them."""
         return self._record.nodes[:, 0].copy()
 
     @property
@@ -175,7 +175,7 @@ class Motion(Result, fields=False):
     def curves_at(
         self, t: npt.ArrayLike
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, Mapping[str, FloatArray]]:
-        """Return all curves of a picture at any times of the run, s, in one pass.
+        """Return all curves of a plot at the given times of the run, s, in one pass.
 
         Displacement, m, velocity, m/s, current in the coil, A, or force of the drive, N, voltage across the
         coil, V (zero unless one drives it), and the forces by name, N.

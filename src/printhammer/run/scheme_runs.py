@@ -1,8 +1,8 @@
-"""Runs of the paper's two integrators, recorded like those of the default integrator.
+"""Runs of the paper's two integrators, recorded in the format of the default integrator.
 
 Between the ends of fixed steps such a run has no defined motion; the cubic through position and velocity at
 both ends replaces it. A touch is recorded at the first step end inside a contact, since the schemes locate no
-switches.
+discontinuity.
 """
 
 from __future__ import annotations

@@ -349,7 +349,7 @@ def basins(
         Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, the
         two ends among them; by default the window of `printhammer.run.regime` and 128.
     firings : int, optional
-        Firings of a round, at least 4; the last ones, half of them and at most 128, are judged.
+        Firings of a round, at least 4; the last ones, half of them and at most 128, are classified.
     rounds : int, optional
         Rounds that a cell is given, at most.
 

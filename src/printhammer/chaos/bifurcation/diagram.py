@@ -55,7 +55,7 @@ class Window(Declared):
 
 
 class Route(Declared):
-    """The windows on the way to the first strange train."""
+    """Windows between one end of the range and the first strange train."""
 
     way: Literal["rising", "falling"] = part("sense of the values of the parameter")
     before: tuple[Window, ...] = part(

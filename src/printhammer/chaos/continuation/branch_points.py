@@ -175,7 +175,7 @@ def points_of(
 
 
 def _without_folds_at_crossings(points: list[BranchPoint], curve: Curve) -> list[BranchPoint]:
-    """Remove folds at crossings: a curve that turns back at a pitchfork has no fold of its own there."""
+    """Remove folds at crossings: a curve that turns back at a pitchfork has no separate fold there."""
     crossings = [point for point in points if point.kind in CROSSINGS]
 
     def is_at(point: BranchPoint, crossing: BranchPoint) -> bool:
@@ -206,7 +206,7 @@ def _has_pair(node: Node) -> bool:
 def zero_between(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Locate the zero of a test function between two nodes: fraction of the way, and the node there.
+    """Locate the zero of a test function between two nodes: fraction of the distance, and the node there.
 
     Alternates bisection and the Illinois variant of regula falsi; None if a fixed point on the way is not
     found.
@@ -243,7 +243,7 @@ def zero_between(
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Locate the places between two nodes at which the label changes."""
+    """Locate the points between two nodes at which the label changes."""
     changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
     while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
@@ -269,7 +269,7 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Locate the first change of the label: fraction of the way, nodes on both sides, sharpness."""
+    """Locate the first change of the label: fraction of the distance, nodes on both sides, sharpness."""
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan

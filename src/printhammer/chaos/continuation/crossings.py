@@ -49,7 +49,7 @@ _ASIDE: Final = 0.5
 def locate_crossing(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Locate a crossing between two nodes: its fraction of the way, and the node there; None if not found.
+    """Locate a crossing between two nodes: fraction of the distance, and the node there; None if not found.
 
     Newton's method fails at the crossing itself: it is bracketed ever closer and interpolated.
     """

@@ -175,7 +175,7 @@ class Corrector:
 
 
 def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node | None:
-    """Find the point of a curve at a fraction of the way between two nodes; None if not found.
+    """Find the point of a curve at a fraction of the distance between two nodes; None if not found.
 
     The way is measured along the tangent of the first node; the initial guess is the cubic through both
     nodes.
@@ -195,7 +195,7 @@ def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node 
 
 
 def on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
-    """Return the place at a share of the straight way between two nodes."""
+    """Return the point at a fraction of the chord between two nodes."""
     state = begin.state + share * (end.state - begin.state)
     return replace(
         begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc

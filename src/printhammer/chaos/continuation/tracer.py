@@ -35,7 +35,7 @@ PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit has converged; see `arclength`."""
 
 _PARTS: Final = 5.0
-"""The range of the parameter divided by this is its scale, as half-widths are those of the state."""
+"""Ratio of the range of the parameter to its scale; the scales of the state are half-widths."""
 _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
@@ -211,7 +211,7 @@ class Tracer:
         return way(firings, event, most, threads)
 
     def crossed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Return the branch that crosses that of an orbit of so many firings."""
+        """Return the branch that crosses the branch of an orbit with `firings` firings, at an event."""
         family, steps = self.family(firings), Steps(most=most, precision=PRECISION)
         curve = follow_crossing(
             family,

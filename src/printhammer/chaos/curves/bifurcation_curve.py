@@ -225,7 +225,7 @@ GRID_TOLERANCE: Final = 1e-9
 """Tolerance of the trains from rest."""
 
 _FIRINGS: Final = 300  # Number of firings of a train from rest
-_JUDGED: Final = 64  # Number of last firings that are judged
+_JUDGED: Final = 64  # Number of last firings that are classified
 
 
 def settled_plane(
@@ -300,7 +300,7 @@ def bifurcation_curve(
     first : tuple, optional
         Least and largest value of the first parameter, by default those of the branch.
     grid : tuple of int, optional
-        Numbers of values of the two parameters at which trains from rest are judged (default: none).
+        Numbers of values of the two parameters at which trains from rest are classified (default: none).
     most : int, optional
         Maximum number of steps in each direction.
     threads : int, optional

@@ -43,7 +43,7 @@ RESONANCES: Final = 3
 _LEVEL: Final = 1e-3
 """Component of a unit tangent below which a curve is stationary in a parameter."""
 _VANISHES: Final = 0.1
-"""Component of a tangent at a cusp, relative to that beside it, below which it vanishes."""
+"""Component of a tangent, relative to its neighbours, below which it vanishes at a cusp."""
 _ROUNDS: Final = 20  # Iteration limit of Newton's method
 _MOVE: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
 _PRECISION: Final = 1e-11  # Scaled residual below which Newton's method has converged
@@ -71,7 +71,7 @@ class CodimensionTwo(Declared):
 
 
 def point_of(kind: str, place: Place, after: int, passages: int = 1) -> CodimensionTwo:
-    """Build the point of codimension two at a place of a curve."""
+    """Build the point of codimension two at a node of a curve."""
     multipliers = place.multipliers
     return CodimensionTwo(
         kind, place.first, place.second, place.state, place.phase, multipliers, after, passages

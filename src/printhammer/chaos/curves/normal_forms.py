@@ -1,4 +1,4 @@
-"""What a bifurcation does to the orbits beside it: coefficients of normal forms.
+"""Effect of a bifurcation on the neighbouring orbits: coefficients of normal forms.
 
 *Period doubling.* With A = J, A q = -q, p A = -p, p . q = 1, and the second and third derivatives B and C of
 the strobe map

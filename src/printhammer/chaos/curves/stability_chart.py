@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from printhammer.chaos.continuation.branch import BranchEvent
 
 GRID: Final = (48, 32)
-"""Default numbers of values of the two parameters at which trains from rest are judged."""
+"""Default numbers of values of the two parameters at which trains from rest are classified."""
 
 _ACROSS: Final = (0.02, 0.98)
 """Fractions of the range of the first parameter at which branches in the second parameter start."""
@@ -165,7 +165,7 @@ def stability_chart(
     first : tuple, optional
         For a regime or hammer: the first parameter, its least and its largest value.
     grid : tuple of int, optional
-        Numbers of values of the two parameters at which trains from rest are judged; (0, 0) for none.
+        Numbers of values of the two parameters at which trains from rest are classified; (0, 0) for none.
     most : int, optional
         Maximum number of steps of a curve in each direction.
 

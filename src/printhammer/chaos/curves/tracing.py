@@ -298,7 +298,7 @@ class CurveTracer:
         return self.kind.removeprefix("period ")
 
     def distance(self, one: Place, other: Place) -> float:
-        """Compute the distance of two places in the plane, in scales."""
+        """Compute the scaled distance of two points in the plane."""
         away = np.array([one.first - other.first, one.second - other.second]) / self.plane.scales[2:]
         return float(np.linalg.norm(away))
 
@@ -328,7 +328,7 @@ class CurveTracer:
         return points
 
     def end_at(self, place: Place, after: int) -> CodimensionTwo | None:
-        """Find the point of codimension two at which a curve ends beside a place."""
+        """Find the point of codimension two at which a curve ends, near another point."""
         speed = float(place.state[1]) / float(self.plane.scales[1])
         if self.rigid and 0.0 < speed < _SLOW:
             guess = np.array([place.phase, place.first, place.second])

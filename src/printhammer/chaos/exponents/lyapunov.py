@@ -379,7 +379,7 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
 
 
 def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: float) -> Strobe:
-    """Judge the states that the tangent flow passed."""
+    """Classify the states that the tangent flow passed."""
     firing = np.arange(first, last + 1)
     x, v, mode, memory, *electric = exponent.states.T
     branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)

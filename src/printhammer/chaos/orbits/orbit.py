@@ -341,7 +341,7 @@ class _Run:
 
     @property
     def motion(self) -> Motion:
-        """The motion, on a time grid of its own."""
+        """Motion along the orbit, on its own time grid."""
         end = float(self.sections[-1])
         times = np.linspace(float(self.sections[0]), float(self.record.nodes[-1, 0]), _POINTS)
         return Motion(self.problem, self.record, end, times, "default")

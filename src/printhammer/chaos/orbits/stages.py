@@ -407,7 +407,7 @@ def _doubled(first: int, below: int) -> list[int]:
 
 
 def _steps(ladder: Sequence[int], most: int) -> list[int]:
-    """List the rungs of a ladder, doubled on from its last, up to the first that is at least `most`."""
+    """List the rungs of a ladder, continued by doubling, up to the first that is at least `most`."""
     rungs = list(ladder)
     while rungs[-1] < most:
         rungs.append(2 * rungs[-1])

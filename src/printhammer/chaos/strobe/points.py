@@ -150,7 +150,7 @@ def strobe(
     verdict: bool = True,
     **firing: Unpack[Firing],
 ) -> Strobe:
-    """Compute the state of a hammer once a period of its drive, and judge the kind of motion.
+    """Compute the state of a hammer once a period of its drive, and classify the motion.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def scan(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> list[Verdict]:
-    """Judge the trains of a hammer from rest, one for each period.
+    """Classify the trains of a hammer from rest, one for each period.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def scan(
 def _settled(
     trains: Sequence[Train], states: Sequence[States], firings: tuple[int, int], effort: Effort
 ) -> list[Verdict | None]:
-    """Judge the trains that have settled; None for the others."""
+    """Classify the trains that have settled; None for the others."""
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
     periods: dict[int, int] = {}
     for i, row in enumerate(distances):
@@ -142,7 +142,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
 
 
 def _followed(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
-    """Judge trains that are followed to the end."""
+    """Classify trains that are followed to the end."""
     judged, tolerance = (FIRST, LAST), effort.tolerance
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), None, effort)
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]

@@ -198,7 +198,7 @@ def verdict(
     settled: Settled | None = None,
     resting: tuple[int, int] | None = None,
 ) -> Verdict:
-    """Judge a train by the distances from `repeats` over a range of firings.
+    """Classify a train by the distances from `repeats` over a range of firings.
 
     `exponent` is the largest exponent over these firings, None if it was not computed; `stopped` is the
     status of a run that ended before the last of them. `settled` is the result of confirming the number of

@@ -48,7 +48,7 @@ class FeedbackStrategy(Declared):
     )
 
     def along(self, places: tuple[Hammer, ...]) -> FeedbackStrategy:
-        """Return a copy that drives a different hammer at each slot, see `places`."""
+        """Return a copy that drives a different hammer in each slot, see `places`."""
         return replace(self, places=places)
 
     def __call__(

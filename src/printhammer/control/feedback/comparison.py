@@ -166,7 +166,7 @@ def feedback(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> Feedback:
-    """Drive a hammer with feedback, and compare the dots with those of the open loop.
+    """Drive a hammer with feedback, and compare its dots with open-loop dots.
 
     Parameters
     ----------

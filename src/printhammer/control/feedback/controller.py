@@ -63,7 +63,7 @@ _POLICIES: Final = 8  # Size of the policy cache
 
 
 class Ahead(NamedTuple):
-    """Consequences of a way.
+    """Consequences of an action.
 
     Times after a touch, s, of the throw, of departure from the pack and of the next touch; width of the push,
     s; kind and speed, m/s, of the next touch.
@@ -267,7 +267,7 @@ class Controller:
             self._throw(loop, float(touch[k]), ahead[k])
 
     def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
-        """Return the consequences of the chosen ways."""
+        """Return the consequences of the chosen actions."""
         table, rows = self.fronts.table, np.arange(len(way))
         columns = (
             table.fire[way],

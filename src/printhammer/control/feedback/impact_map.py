@@ -1,9 +1,9 @@
-"""The Poincaré map from one touch of the pack to the next, for every way to switch the coil.
+"""The Poincaré map from one touch of the pack to the next, for every switching action of the coil.
 
 At the touch the armature has a speed, and the coil is either on (a *pushed* touch) or off (a *free* touch:
-the armature was released before impact). A way then holds the coil at the push current until `release`, at
-the return current until `fire`, and at the push current again: either beyond the next touch, or for a width
-after which the armature flies freely. The printed force and the time and speed of the next touch do not
+the armature was released before impact). An action then holds the coil at the push current until `release`,
+at the return current until `fire`, and at the push current again: either beyond the next touch, or for a
+width after which the armature flies freely. The printed force and the time and speed of the next touch do not
 depend on the slot rate, so one map serves all rates.
 
 The tables are interpolated linearly, vectorised over touches.
@@ -33,8 +33,8 @@ _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
 _RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, as fractions of the largest current
 
 FORCES: Final = (0.95, 1.0, 1.05)
-"""Forces for which ways are computed, relative to the single pulse. In the order of the ways, only the return
-current varies more slowly."""
+"""Forces for which actions are computed, relative to the single pulse. In the order of actions, only the
+return current varies more slowly."""
 
 # Widths of the pushes that end before the touch, as fractions of the launch width
 _WIDTHS: Final = (0.85, 1.0, 1.2)
@@ -45,7 +45,7 @@ _LATE: Final = np.linspace(1.1, 2.9, 48)
 _WATCHED, _WAIT = 3.0, 1.7  # Length of the force simulations, and of the others after the throw, likewise
 # Time after which a change of the current has decayed, in time constants of the driver
 _FADED: Final = 2.5
-_LARGEST_FORCE: Final = 1.15  # Force above which a way is inadmissible, relative to the single pulse
+_LARGEST_FORCE: Final = 1.15  # Force above which an action is inadmissible, relative to the single pulse
 
 
 @dataclass(frozen=True)
@@ -89,13 +89,13 @@ class ForceMap:
 
 @dataclass(frozen=True)
 class ImpactMap:
-    """Outcome of each way to switch the coil (A,) from each touch of a force map (T,)."""
+    """Outcome of each switching action of the coil (A,) from each touch of a force map (T,)."""
 
     back: FloatArray  # Return current, A, (A,)
     fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)
     width: FloatArray  # Width of that push, s; `ALWAYS` if it lasts to the next touch, (A,)
     release: FloatArray  # Time after the touch at which the push ends, s, (T, A)
-    # Peak force relative to the single pulse; NaN for an inadmissible way, (T, A)
+    # Peak force relative to the single pulse; NaN for an inadmissible action, (T, A)
     force: FloatArray
     # Time from this touch to the next, s, and speed of the next touch, m/s; NaN likewise, (T, A)
     next_touch: FloatArray
@@ -141,7 +141,7 @@ def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float,
 def impact_map(
     plant: Plant, forces: ForceMap, launched: float, progress: Progress | None = None
 ) -> ImpactMap:
-    """Simulate all ways to switch the coil from all touches; `launched` is the launch width, s."""
+    """Simulate all switching actions of the coil from all touches; `launched` is the launch width, s."""
     single, driver = plant.single, plant.driver
     scale = single.flight_time
     fires = np.concatenate([_EARLY, _LATE]) * scale

@@ -1,11 +1,11 @@
-"""The control policy: the way of least present and future cost, by dynamic programming.
+"""The control policy: the action of least present and future cost, by dynamic programming.
 
 The cost of a dot is a² (1 + k a⁴) + b² (1 + k b⁴), with a and b its deviations of force and arrival as
 fractions of the limits, so that deviations near a limit cost much more than small ones. Return current has a
-small cost, and so has a way whose next touch depends strongly on the speed of this one, which is uncertain.
-The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number of dots before
-the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). It is computed by
-backward induction from the last dot before a rest.
+small cost, and so has an action whose next touch depends strongly on the speed of this one, which is
+uncertain. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number of
+dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). It is
+computed by backward induction from the last dot before a rest.
 
 The maps are computed for packs at several distances and interpolated to the estimated distance, which is gain
 scheduling with the distance as scheduling variable. The contact itself depends only on the distance from the
@@ -55,7 +55,7 @@ MIDDLE: Final = 1  # Index of the nominal distance
 class Fronts:
     """Impact maps and landings for packs at several distances."""
 
-    # One impact map for each of `OFFSETS`, with the same touches and the same ways
+    # One impact map for each of `OFFSETS`, with the same touches and the same actions
     maps: tuple[ImpactMap, ...]
     landings: tuple[Landing, ...]  # One set of landings for each of `OFFSETS`
     # Derivative of the force with respect to the distance of the front, with unchanged switching: in
@@ -118,7 +118,7 @@ def between_fronts(front: FloatArray) -> tuple[IntArray, FloatArray]:
     return place_of(np.clip(front, OFFSETS[0], OFFSETS[-1]), np.array(OFFSETS))
 
 
-NEVER: Final = 50.0  # Cost of an inadmissible way
+NEVER: Final = 50.0  # Cost of an inadmissible action
 # Standard deviation of the front, as a fraction of the stroke, above which its uncertainty is penalised
 KNOWN: Final = 0.01
 _DISCOUNT: Final = 0.9  # Discount factor per dot
@@ -145,7 +145,7 @@ class Committed(NamedTuple):
 
 
 class Policy:
-    """Cost-to-go of all ways at one rate, for a period in s; limits normalise the deviations."""
+    """Cost-to-go of all actions at one rate, for a period in s; limits normalise the deviations."""
 
     def __init__(self, fronts: Fronts, period: float, limits: Limits) -> None:
         self.fronts = fronts
@@ -200,7 +200,7 @@ class Policy:
         front_error: FloatArray,
         done: Committed | None = None,
     ) -> tuple[IntArray, FloatArray, Choice]:
-        """Choose the best way for touches (M,); return its index, its cost, and the outcomes of all ways.
+        """Choose the best action for touches (M,); return its index, cost, and the outcomes of all actions.
 
         The touches have a `kind`, a lateness `late`, s, and a `speed`, m/s. The next dot is due after `wait`,
         s, and `after` dots follow between the next dot and a rest. The pack is `front` farther away than
@@ -228,13 +228,13 @@ class Policy:
             open_ways = self.table.back == done.back[:, np.newaxis]
             open_ways &= self.table.fire > done.time[:, np.newaxis]
             cost = np.where(open_ways, cost, np.inf)
-        # A way that is inadmissible after the actions taken may still have a known force.
+        # An action that is inadmissible after the actions taken may still have a known force.
         cost = np.where(np.isnan(cost) | np.isnan(choice.next_touch), np.inf, cost)
         way = np.argmin(cost, axis=1)
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
 
     def _doubts(self) -> FloatArray:
-        """Return the cost of the uncertainty of a touch's speed, for all ways, (T, A).
+        """Return the cost of the uncertainty of a touch's speed, for all actions, (T, A).
 
         The steepest slope in the neighbourhood counts: near a discontinuity, where the number of bounces
         changes, the table between two speeds is meaningless.
@@ -292,7 +292,7 @@ class Policy:
 
 
 class Choice:
-    """Outcomes of all ways from touches (M,), interpolated in speed and in the distance of the front."""
+    """Outcomes of all actions from touches (M,), interpolated in speed and in the distance of the front."""
 
     def __init__(self, fronts: Fronts, kind: IntArray, speed: FloatArray, front: FloatArray) -> None:
         self._fronts = fronts
@@ -322,13 +322,13 @@ class Choice:
             setattr(self, name, settled.reshape(self.force.shape))
 
     def by_speed(self, values: FloatArray, way: IntArray | None = None) -> FloatArray:
-        """Interpolate an array (T, A) of the nominal hammer to (M, A), or to (M,) for one way each."""
+        """Interpolate an array (T, A) of the nominal hammer to (M, A), or to (M,) for one action each."""
         every: Any = slice(None) if way is None else way
         share = self.share[:, np.newaxis] if way is None else self.share
         return blend(values[self.below, every], values[self.below + 1, every], share)
 
     def of(self, name: str, way: IntArray | None = None) -> FloatArray:
-        """Interpolate arrays (T, A) of all maps to (M, A), or to (M,) for one way each."""
+        """Interpolate arrays (T, A) of all maps to (M, A), or to (M,) for one action each."""
         tables = [getattr(table, name) for table in self._fronts.maps]
         shape = (len(self.below), tables[MIDDLE].shape[1]) if way is None else (len(self.below),)
         values = np.empty(shape)

@@ -182,7 +182,7 @@ PRINTED: Final = _judged_slots()
 """Slots on which tables are judged: the cycle with its lead-in, and rows of 200 slots, each from rest."""
 
 JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
-"""Mask of the dots that count, (dots,): all but those of the lead-in."""
+"""Mask of the dots that count, (dots,): all except the lead-in."""
 
 IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
 """Mask of the dots of the cycle among the dots that count, (counted dots,)."""

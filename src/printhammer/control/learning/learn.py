@@ -49,7 +49,7 @@ class Progress(NamedTuple):
 
     @property
     def good(self) -> BoolArray:
-        """Mask of the dots within limits, without those of the lead-in, (units, dots)."""
+        """Mask of the dots within limits, without the lead-in, (units, dots)."""
         return np.asarray(self.cycle.good[:, JUDGED])
 
 
@@ -62,7 +62,7 @@ def calibrate(
     sensor: ImpactSensor,
     report: Callable[[], None] = lambda: None,
 ) -> tuple[list[Learner], list[Progress]]:
-    """Calibrate units, each with a learner of its own; all units are fired with the pulse of the task.
+    """Calibrate units, each with its own learner; all units are fired with the pulse of the task.
 
     The simulation is deterministic: the runs of a stage print identical dots, so each stage is simulated
     once, and only the noise of the readings differs. `report` is called after each stage.

@@ -267,7 +267,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def between(table: CompensationTable) -> list[float]:
-    """Return rates at which to judge a table: its own or, for a long table, five halfway between them."""
+    """Return rates for validating a table: its own or, for a long table, five halfway between them."""
     rates = table.rates
     if rates.size < _LONG:
         return [float(rate) for rate in rates]

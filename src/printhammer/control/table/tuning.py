@@ -1,4 +1,4 @@
-"""Tune a compensation table, so that every dot equals a dot from rest whatever was printed before it.
+"""Tune a compensation table, so that every dot equals a dot from rest, independent of the dots before it.
 
 Where interpolation between two rates is poor, the grid of rates is refined.
 """

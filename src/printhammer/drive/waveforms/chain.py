@@ -1,4 +1,4 @@
-"""Waveform composed of consecutive ones, such as a print pulse and a later brake pulse."""
+"""Waveform composed of consecutive waveforms, such as a print pulse and a later brake pulse."""
 
 from __future__ import annotations
 

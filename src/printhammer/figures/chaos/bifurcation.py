@@ -34,7 +34,7 @@ SHADES: Final = {
 """Colour of the band of a classification."""
 
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
-"""Colours of points reached from one direction only; distinct from those of the bands."""
+"""Colours of points reached from one direction only; distinct from the band colours."""
 
 _POINT: Final = 0.7  # Size of a point, points
 _MOST: Final = 3_000_000

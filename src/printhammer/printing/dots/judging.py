@@ -19,7 +19,7 @@ FAULTS: Final = ("not run", "lost", "extra contacts", "force", "arrival")
 
 
 class Judgement(Declared):
-    """Deviations of dots from the single-pulse dot, and the limits that judge them."""
+    """Deviations of dots from the single-pulse dot, compared with the limits."""
 
     wanted: BoolArray = column(
         "1", "where a dot is judged; elsewhere the other columns are False or NaN", "member firing"
@@ -73,7 +73,7 @@ def judge(
     limits: Limits,
     ok: BoolArray | None = None,
 ) -> Judgement:
-    """Judge the dots of an ensemble, one firing per dot.
+    """Compare the dots of an ensemble, one firing per dot, with the limits.
 
     `wanted` (members, firings) is the mask of dots to judge; the dots of a lead-in, for instance, are
     excluded. `slot_times` (members, firings), s, may differ from the firing times, and are ignored where no

@@ -1,4 +1,4 @@
-"""Trial printing: simulate patterns under a strategy as one ensemble, and judge the dots."""
+"""Trial printing: simulate patterns under a strategy as one ensemble, and compare the dots with limits."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 
 class Case(NamedTuple):
-    """A hammer, the single-pulse dot that judges it, and a slot rate, Hz."""
+    """A hammer, the single-pulse dot to which its dots are compared, and a slot rate, Hz."""
 
     hammer: Hammer
     nominal: SinglePulse
@@ -68,7 +68,7 @@ def attempt(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> Trial:
-    """Simulate all patterns in all cases from rest, and judge the dots.
+    """Simulate all patterns in all cases from rest, and compare the dots with the limits.
 
     A pattern lists the indices of its slots with a dot, at least one. Slots before `judged_from`, one index
     for all patterns or one for each, are a lead-in. With `extra`, every extra contact is recorded.

@@ -179,7 +179,7 @@ def tolerance_yield(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> ToleranceYield:
-    """Draw hammers whose constants vary about those of a design, and find which print within limits.
+    """Draw hammers whose constants vary about a design, and determine which of them print within limits.
 
     Every constant is uniform within its spread, drawn by a scrambled Sobol sequence.
 
@@ -307,7 +307,7 @@ def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
 
 
 def _changes(hammer: Hammer, spreads: Iterable[str], factors: FloatArray) -> list[dict[str, float]]:
-    """Return the constants of each drawn hammer, SI, from the factors on those of the design."""
+    """Return the constants of each drawn hammer, SI, from factors on the constants of the design."""
     zero = {key: hammer.origin if key == GAP else 0.0 for key in spreads}
     values = {key: hammer.constants[key].si for key in zero}
     return [
