@@ -90,7 +90,7 @@ class Section(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the run came to its end."""
+        """Whether the run was completed."""
         return self.status == "ok"
 
     @property

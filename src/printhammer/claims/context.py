@@ -98,7 +98,7 @@ class Context:
         state: tuple[float, float] | None = None,
         **options: Any,
     ) -> Motion:
-        """Run the hammer, or another one, under a drive; repeated runs come from the cache."""
+        """Run the hammer, or another hammer, under a drive; cache the result."""
         which = self.hammer if hammer is None else hammer
         options = {"tolerance": self.tolerance, "scheme": self.scheme, **options}
         key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))

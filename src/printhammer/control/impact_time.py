@@ -266,7 +266,7 @@ def impact_time(
 
 
 def _is_clear(hammer: Hammer, probe: Sampling) -> bool:
-    """Whether the estimator can tell the impact of a hammer in samples of a probe."""
+    """Whether the estimator can detect the impact of a hammer in samples of a probe."""
     try:
         ImpactEstimator(hammer, probe)
     except InputError:
@@ -318,6 +318,6 @@ def flight_deviation(estimator: ImpactEstimator, records: Sequence[Any]) -> floa
 
 
 def root_mean_square(errors: FloatArray) -> float:
-    """Return the root mean square of the errors that are numbers; NaN if none is."""
+    """Return the RMS of the errors that are not NaN; NaN if all are."""
     known = errors[np.isfinite(errors)]
     return float(np.sqrt(np.mean(known**2))) if known.size else np.nan

@@ -143,12 +143,12 @@ class Hammer:
 
     @property
     def note(self) -> str:
-        """Remarks on the constants that every reader should know; may be empty."""
+        """Important remarks on the constants; may be empty."""
         return self._contents.note
 
     @property
     def strike(self) -> str:
-        """Noun for what a pulse makes, such as "closing" of a relay; "dot" by default."""
+        """Noun for the result of a pulse, such as "closing" of a relay; "dot" by default."""
         return self._contents.strike or "dot"
 
     @property

@@ -1,4 +1,4 @@
-"""Parts of a hammer, one law a file.
+"""Parts of a hammer, one law per file.
 
 Every module of this package and its folders whose name does not start with an underscore is imported and
 registers its part; a part from elsewhere enters with `register`. A module holds, for its role, plain scalar

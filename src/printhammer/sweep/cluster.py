@@ -256,6 +256,6 @@ def _quiet() -> Iterator[None]:
 
 
 async def _knock(distributed: Any, address: str) -> None:
-    """Fail early if no scheduler answers; a client without connection gives up slowly."""
+    """Fail early if no scheduler answers; a client without a connection waits long before it fails."""
     comm = await distributed.comm.connect(address, timeout=ANSWER)
     await comm.close()

@@ -218,7 +218,7 @@ class DiagramBuilder:
         carry(self.table, strands, self.begin, self.run, self.trial)
 
     def refine(self, level: int) -> None:
-        """Run trains between neighbours that differ; the state comes from the neighbour before."""
+        """Run trains between neighbours that differ, from the final state of the neighbour before."""
         order = np.argsort(self.values, kind="stable").tolist()
         pairs = [pair for pair in itertools.pairwise(order) if self.is_different(*pair)]
         middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]

@@ -236,7 +236,7 @@ def _half(
 
 
 def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
-    """Return whether a corrected point lies on the same curve, as far as its distance and tangent tell."""
+    """Whether a corrected point lies on the same curve, judged by its distance and tangent."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)

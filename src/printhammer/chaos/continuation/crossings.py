@@ -26,7 +26,7 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 
 Crossing = Literal["pitchfork", "transcritical", "branching"]
-"""Kind of a crossing; "branching" where the second derivatives do not tell."""
+"""Kind of a crossing; "branching" where the second derivatives do not decide."""
 CROSSINGS: Final[tuple[Crossing, ...]] = get_args(Crossing)
 
 _ROUNDS: Final = 60

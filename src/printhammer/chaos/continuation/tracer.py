@@ -204,7 +204,7 @@ class Tracer:
         return Curve(nodes, (stops[0], stops[1]))
 
     def followed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Return the branch that begins at a period doubling, or crosses, one of so many firings."""
+        """Return the branch that begins at a period doubling, or crosses at a branch point."""
         if event.phase != self.regime.phase:
             return self.at_phase(event.phase).followed(firings, event, most, threads)
         way = self.doubled if event.kind == "period doubling" else self.crossed

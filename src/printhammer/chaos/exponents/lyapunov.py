@@ -158,7 +158,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def ok(self) -> bool:
-        """Whether the run came to its end."""
+        """Whether the run was completed."""
         return self.points.ok
 
     @property

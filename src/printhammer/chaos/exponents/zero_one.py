@@ -56,7 +56,7 @@ LONGEST_CYCLE: Final = 64
 """Largest cycle length q of a series; at most a quarter of its length."""
 
 CYCLES: Final = 5
-"""Number of cycles q over which growth has to be seen to count as chaos; within one, any path may grow."""
+"""Number of cycles q over which growth must occur to count as chaos; within one cycle, any path may grow."""
 
 FOLLOWS: Final = 0.7
 """A series is deterministic if images of neighbours are closer than this fraction of any two images."""

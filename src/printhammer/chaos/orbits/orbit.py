@@ -134,7 +134,7 @@ class Orbit(Result):
     @property
     @derived("1", "part of the drive's period from the first firing to the section", kind="column")
     def phase(self) -> float:
-        """Part of the period of the drive from the first of the firings to the section."""
+        """Phase of the section after the first firing, as a fraction of the drive period."""
         return self.regime.phase
 
     @property
@@ -175,13 +175,13 @@ class Orbit(Result):
     @property
     @derived("1", "dots that the firings of a period make", kind="column", dtype=np.int32)
     def printed(self) -> int:
-        """Number of dots that the firings of a period make."""
+        """Number of dots that the firings of a period print."""
         return sum(dot.struck for dot in self.dots)
 
     @property
     @derived("1", "firings of a period that make no dot", kind="column", dtype=np.int32)
     def lost(self) -> int:
-        """Number of firings of a period that make no dot."""
+        """Number of firings of a period that print no dot."""
         return len(self.dots) - self.printed
 
     @property

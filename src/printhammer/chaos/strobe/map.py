@@ -94,7 +94,7 @@ class Image(Declared):
 
     @property
     def ok(self) -> bool:
-        """Whether the run came to its end."""
+        """Whether the run was completed."""
         return self.status == _OK
 
 

@@ -121,7 +121,7 @@ class Strobe(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the run came to its end."""
+        """Whether the run was completed."""
         return self.status == "ok"
 
     @property

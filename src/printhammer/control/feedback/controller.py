@@ -1,4 +1,4 @@
-"""The feedback controller: it knows the nominal hammer, observes the driven one, and switches the coil.
+"""Feedback controller: model of the nominal hammer, observer of the driven hammer, and control of the coil.
 
 Before each touch it chooses the pulses that follow, from the estimated time and speed of the touch. It
 releases the armature before a first impact and adds the missing energy with a push into the pack; it catches

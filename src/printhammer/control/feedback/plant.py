@@ -94,7 +94,7 @@ class Driver(Declared):
         return self.switched((0.0, width), (self.current, 0.0))
 
     def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:
-        """Return the drive that fires pulses at given times, s."""
+        """Return the drive that fires pulses at the times `at`, s."""
         return BoundedSequence(pulses, at, self.current)
 
 

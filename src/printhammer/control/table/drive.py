@@ -268,8 +268,8 @@ as fast as that of the hammer falls; an H-bridge, which switches off against the
 # is zero at ln 2; an exponential decay with this constant carries the same charge.
 _REVERSED: Final = 1.0 - float(np.log(2.0))
 
-_EDGE: Final = 20e-6  # Time constant of a switch if the hammer's waveform has no decay, s; arbitrary
-_LEAST_EDGE: Final = 1e-6  # Smallest time constant of a switch, s; arbitrary
+_EDGE: Final = 20e-6  # Time constant of a driver if the hammer's waveform has no decay, s; arbitrary
+_LEAST_EDGE: Final = 1e-6  # Smallest time constant of a driver, s; arbitrary
 _GRID: Final = 33  # Widths per round of the grid search
 _ROUNDS: Final = 7  # Rounds; each subdivides the bracketing interval of the previous round
 

@@ -181,7 +181,7 @@ def fits(task: Task, ways: Ways) -> BoolArray:
 
 
 def solved(task: Task, ways: Ways) -> Ways:
-    """Solve for firing times and widths that make the second dot right; see `solve`.
+    """Solve for firing times and widths with which the second dot meets its target; see `solve`.
 
     A candidate that does not converge keeps its best iterate.
     """

@@ -109,7 +109,7 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
 def would_be_found(
     design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
 ) -> list[tuple[str, float, float]]:
-    """Estimate what the records would say of further constants, one at a time, if they were free too.
+    """Estimate the best changes of additional constants, if each in turn were free as well.
 
     `design`, shape (m, p), `residuals`, and `columns`, shape (m, q), the derivatives per relative change of
     the further constants, are whitened by the standard errors of the data. Returned are, for each constant,

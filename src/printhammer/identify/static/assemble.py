@@ -304,7 +304,7 @@ def assemble(
 
 
 def _unseen(constant: FittedConstant) -> str:
-    """Say of a constant that has to be positive where it came out."""
+    """Describe the fitted value of a constant that must be positive."""
     if constant.interval[1] < 0.0:
         return f"came out negative, {constant.value:.3g} {constant.unit}"
     return "cannot be distinguished from zero"

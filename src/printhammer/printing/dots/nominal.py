@@ -19,7 +19,7 @@ from printhammer.run.window import wait_of
 
 
 class SinglePulse(Declared):
-    """Reference values of the dot that one pulse from rest makes."""
+    """Reference values of the dot of a single pulse from rest."""
 
     force: float = scalar("N", "largest pack force")
     flight_time: float = scalar("s", "time from firing to touch")
@@ -29,7 +29,7 @@ class SinglePulse(Declared):
 
 
 class Nominal(SinglePulse):
-    """The dot that one pulse from rest makes, with its speed, indentation and energies."""
+    """Dot of a single pulse from rest, with its speed, indentation and energies."""
 
     impact_speed: float = scalar("m/s", "speed at touch")
     indentation: float = scalar("m", "largest indentation")

@@ -43,7 +43,7 @@ def eight_slot_patterns() -> BoolArray:
 
 @cache
 def de_bruijn(order: int = SLOTS) -> BoolArray:
-    """Return a binary de Bruijn cycle: read around, it holds every word of `order` slots exactly once.
+    """Return a binary de Bruijn cycle: read cyclically, it contains every word of `order` slots exactly once.
 
     The cycle is the lexicographically smallest one: the concatenation of the Lyndon words whose length
     divides the order (H. Fredricksen and J. Maiorana, Discrete Math. 23 (1978) 207). The order is 1 to 16,

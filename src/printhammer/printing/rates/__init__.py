@@ -1,1 +1,1 @@
-"""Rates: how well dots come out at one, up to which they do, and what tolerances and materials change."""
+"""Rates: print quality at a rate, the safe rate, and the effects of tolerances and materials."""

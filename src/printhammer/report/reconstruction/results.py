@@ -105,7 +105,7 @@ class Searched(_Table):
 
 
 class BestFor(_Table):
-    """Hammer that comes closest to one claim."""
+    """Hammer that satisfies one claim most closely."""
 
     value: dict[str, Any] = Field(description="what was measured with it")
     holds: bool = Field(description="whether the claim holds for it")

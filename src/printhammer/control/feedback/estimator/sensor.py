@@ -87,7 +87,7 @@ class PositionSensor(Declared):
         return np.where(latest >= np.maximum(first, 0)[:, np.newaxis], latest, -1)
 
     def read(self, x: FloatArray, numbers: IntArray, runs: Words, stroke: float) -> FloatArray:
-        """Return the readings of true displacements (M, N), m, at samples with the given indices (M, N).
+        """Return the readings of true displacements (M, N), m, at samples with indices (M, N).
 
         `runs` (M,) are the noise keys of the runs; `stroke` is the distance from backstop to pack, m.
         """
