@@ -42,7 +42,7 @@ _MOST_RATES: Final = 200  # Largest number of rates; each takes seconds to minut
         ),
         "tolerance": opt.TOLERANCE,
     },
-    out=opt.results("the burst, with .csv its current as a sampled waveform"),
+    out=opt.results("the burst or, with .csv, its current as a sampled waveform"),
 )
 def energy(
     job: Job,
@@ -134,7 +134,7 @@ def feedback(
     noise: float | None = opt.number(
         "Standard deviation of a sensor sample, as a fraction of the travel to the pack (default: 0.01)."
     ),
-    delay: float | None = opt.quantity("s", "TIME", "Delay of the sensor (default: 20 us)."),
+    delay: float | None = opt.quantity("s", "TIME", "Delay of the position sensor (default: 20 us)."),
     interval: float | None = opt.quantity(
         "s", "TIME", "Sampling interval of the sensor (default: 2 us).", positive=True
     ),

@@ -33,9 +33,9 @@ _FILES: Final = {
         ".toml",
         panel=_RESULTS,
     ),
-    "covariance": opt.file("Output file for the covariance matrix of the constants (.csv).", panel=_RESULTS),
+    "covariance": opt.file("Output file for the covariance matrix of the constants (CSV).", panel=_RESULTS),
     "into": opt.file(
-        "Output hammer file (.toml): the hammer of --hammer with the fitted constants.", panel=_RESULTS
+        "Output hammer file (TOML): the hammer of --hammer with the fitted constants.", panel=_RESULTS
     ),
 }
 _measured = partial(opt.source, argument=True)

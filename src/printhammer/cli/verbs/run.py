@@ -39,7 +39,7 @@ _record = partial(opt.file, panel=_FILES)
         ),
         "points": opt.whole("Number of time points of the saved motion."),
     },
-    out=opt.results("the motion, with .json its dots, contacts and energies", panel=_FILES),
+    out=opt.results("the motion or, with .json, its dots, contacts and energies", panel=_FILES),
     dots=_record("Output file for the table of dots (.csv, .parquet).", ".csv", ".parquet"),
     contacts=_record("Output file for the table of contacts (.csv, .parquet).", ".csv", ".parquet"),
 )
