@@ -18,7 +18,7 @@ LaneKinds = tuple[int, bool, bool]
 
 def suits(laws: Laws) -> bool:
     """Whether members with these laws can run in lanes."""
-    choices = bindings_of(laws).choices
+    choices = _choices(laws)
     return bool(
         not is_interpreted()
         and choices["HAS_BACKSTOP"]
@@ -28,6 +28,12 @@ def suits(laws: Laws) -> bool:
         and laws.pack_pulls
         and laws.backstop_pulls
     )
+
+
+@functools.cache
+def _choices(laws: Laws) -> dict[str, bool]:
+    """Return the choices of laws; cached, since each run of an ensemble asks for them."""
+    return bindings_of(laws).choices
 
 
 def specialise_lanes(laws: Laws, kinds: LaneKinds) -> Kernel:
