@@ -6,6 +6,7 @@ import atexit
 import lzma
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -25,27 +26,26 @@ class LoweredModules(BuildHookInterface[Any]):
         from numba import TypingError
 
         from printhammer.kernel.compile.bindings import bindings_of
-        from printhammer.kernel.compile.modules import every_template, laws_of
+        from printhammer.kernel.compile.modules import Module, every_template, laws_of
         from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
         from printhammer.parts import PARTS
 
-        modules = list(every_template())
-        for role in LAW_FUNCTIONS:
-            for name in (
-                "",
-                *sorted({part.__module__ for (known, _), part in PARTS.items() if known == role}),
-            ):
-                bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
-                modules += [laws_of(role, bindings, for_lanes) for for_lanes in (False, True)]
         folder = tempfile.TemporaryDirectory()
         atexit.register(folder.cleanup)
-        for module in modules:
+
+        def ship(module: Module) -> None:
             path = Path(folder.name, module.shipped.name)
-            try:
-                content = module.bitcode()
-            except TypingError:
-                # A law of more constants than a lane has room for, which never runs in lanes.
-                continue
-            path.write_bytes(lzma.compress(content, preset=9))
+            path.write_bytes(lzma.compress(module.bitcode(), preset=9))
             place = module.shipped.relative_to(Path(self.root, "src"))
             build_data["force_include"][str(path)] = place.as_posix()
+
+        for template in every_template():
+            ship(template)
+        for role in LAW_FUNCTIONS:
+            parts = {part.__module__ for (known, _), part in PARTS.items() if known == role}
+            for name in ("", *sorted(parts)):
+                bindings = bindings_of(Laws(**{**_ABSENT, role: name}))
+                ship(laws_of(role, bindings, False))
+                # A law of more constants than a lane has room for never runs in lanes.
+                with suppress(TypingError):
+                    ship(laws_of(role, bindings, True))

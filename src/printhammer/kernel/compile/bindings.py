@@ -1,4 +1,4 @@
-"""What a kernel is bound to: law functions, choices, and digests of the sources that they come from."""
+"""Bindings of a kernel to a hammer: law functions, choices, and digests of the sources of the laws."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ class Bindings(NamedTuple):
 
 
 def bindings_of(laws: Laws) -> Bindings:
-    """Return what laws stand for. ImportError if a module named in `laws` cannot be imported."""
+    """Return the law functions, choices and source digests of `laws`.
+
+    Raises ImportError if a module named in `laws` cannot be imported.
+    """
     absent = importlib.import_module(laws.absent)
     names: dict[str, Any] = {}
     digests: dict[str, str] = {}

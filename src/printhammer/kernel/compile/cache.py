@@ -1,4 +1,4 @@
-"""Where machine code and modules are kept, and what is said while they are made.
+"""The cache of machine code and lowered modules on disk, and the messages while they are made.
 
 They lie in a folder: that of NUMBA_CACHE_DIR, `__pycache__` beside the kernel, numba's folder of the user,
 or a temporary one of the user. In a container there may be none that can be written to, the disk may be full,
@@ -101,7 +101,7 @@ def _can_be_written(folder: Path) -> bool:
 
 
 def _content(path: Path) -> bytes | None:
-    """Return what a file holds; None if there is none, or not all of it."""
+    """Return the payload of a file; None if the file is missing, cut short or damaged."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -149,10 +149,10 @@ def _alone(path: Path) -> Iterator[None]:
 
 
 class File:
-    """A file that holds what was made once, under a name that says from what; trouble with it is nobody's.
+    """A file of the cache, named after the digest of its sources.
 
-    It is read from the folders that can only be read, up to the first one that can be written to, and kept in
-    that one.
+    It is read from the read-only folders and from the first folder that can be written to, and written to
+    that one. Errors of reading or writing never stop the program: the content is then made again.
     """
 
     def __init__(self, name: str) -> None:
@@ -204,7 +204,7 @@ class File:
         return content
 
     def _alone(self) -> AbstractContextManager[None]:
-        """Have no other process make the same; the file may be there when the context begins."""
+        """Lock the file against other processes; one of them may have made it when the lock is obtained."""
         return nullcontext() if self._written is None else _alone(self._written / self.name)
 
 
@@ -218,7 +218,7 @@ class Code(File):
         super().__init__(name)
         self.kind, self.label = kind, label
         self.with_it: tuple[Code, ...] = ()
-        """What is often needed after it."""
+        """Machine code that is often needed after this one."""
         self.is_begun = False
 
     def exists(self) -> bool:

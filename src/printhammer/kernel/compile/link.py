@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 ENTRY, CALL = "entry", "call"
 """Symbols of an entry point in its template, and of the function that calls it with a block of arguments."""
 LAW, CHOICE = "law.", "choice."
-"""How the symbols of laws and of choices begin; those of choices that are integers end with `.int`."""
+"""Prefixes of the symbols of laws and of choices; symbols of integer choices end with `.int`."""
 INTEGER: Final = ".int"
 
 _OURS: Final = (ENTRY, LAW, CHOICE, "_ZN")
-"""How symbols begin that must not stay open; numba's begin with the last."""
+"""Prefixes of the symbols that linking must define; the last one is that of numba's functions."""
 
 
 def law_symbol(name: str, for_lanes: bool) -> str:
@@ -48,7 +48,7 @@ def _machine() -> Any:
 
 @cache
 def processor() -> tuple[str, str, str]:
-    """Return what machine code made here is for: system, processor and its features."""
+    """Return the target of the machine code: triple of the system, name and features of the processor."""
     return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
@@ -110,7 +110,7 @@ def emit(module: Any) -> bytes:
 
 
 _engines: list[Any] = []
-"""What holds the machine code that is loaded."""
+"""Engines that own the loaded machine code, kept as long as the process runs."""
 
 
 def load(code: bytes) -> int:

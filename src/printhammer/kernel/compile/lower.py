@@ -87,7 +87,8 @@ def _lowered(function: Any, arguments: tuple[Any, ...]) -> tuple[Any, str, Any]:
     """Return the library of a function for types of arguments, its symbol, and the type of its result."""
     function.compile(arguments)
     result = function.overloads[arguments]
-    return result.library, result.fndesc.llvm_func_name, result.signature.return_type
+    fields = result._asdict()
+    return fields["library"], fields["fndesc"].llvm_func_name, fields["signature"].return_type
 
 
 def _types(signature: Any) -> Any:
@@ -179,7 +180,7 @@ def _execute_lanes(plain: dict[str, Any], vector: dict[str, Any]) -> dict[str, A
 
 
 def _with_lane_layout(module: ModuleType) -> ModuleType:
-    """Have a template look for the constants of a hammer where lanes have them."""
+    """Replace the indices of the constants of a hammer in a template by those of the layout of lanes."""
     for name in _LAYOUT:
         if hasattr(module, name):
             setattr(module, name, getattr(lane_layout, name))

@@ -71,7 +71,7 @@ def _digest_of(places: tuple[str, ...]) -> str:
 
 @cache
 def _lowering() -> str:
-    """Return what lowers here, and may do so in its own way: versions of numba and of LLVM."""
+    """Return the versions of numba and llvmlite, on which lowered modules depend, as part of a file name."""
     versions = []
     for name in ("numba", "llvmlite"):
         try:
@@ -94,7 +94,7 @@ class Module:
         return SHIPPED / f"{self.name}.bc.xz"
 
     def identity(self) -> str:
-        """Return what tells this module from others, without reading it."""
+        """Return a name that is unique to the content of the module, without reading it."""
         return self.name if self.shipped.exists() else f"{self.name}_{_lowering()}"
 
     def bitcode(self) -> bytes:

@@ -27,10 +27,10 @@ _OPTIONS: Final[dict[str, Any]] = {
     "nogil": True,
     "_nrt": False,
 }
-"""Those of the kernel, see :mod:`printhammer.kernel.compile.compiling`."""
+"""Options of the kernel, see :mod:`printhammer.kernel.compile.compiling`."""
 
 _FOR_C: Final = "cfunc."
-"""How the symbol of the wrapper for C begins; it goes on with that of the function for compiled callers."""
+"""Prefix of the symbol of the wrapper for C; the symbol of the function for compiled callers follows."""
 
 
 def laws(role: str, functions: Mapping[str, Callable[..., Any]], for_lanes: bool) -> bytes:

@@ -47,7 +47,7 @@ VARIATIONAL = tuple(
     f"variational.{name}"
     for name in ("slopes", "circuit", "forcing", "supply", "columns", "steps", "switches", "flow")
 )
-"""Those of variational equations, which follow."""
+"""Template modules of the variational equations, which use those of the kernel."""
 
 
 def source_file(name: str) -> Path:
