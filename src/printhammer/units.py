@@ -68,7 +68,9 @@ _FACTOR = re.compile(
     r"(?:\s*(?:\^|\*\*)\s*(?P<power>[+-]?\d{1,2}(?:\.\d{1,4})?|\(\s*[+-]?\d{1,2}(?:/[1-9]\d?)?\s*\)))?"
     r"\s*(?P<operator>[*/]?)"
 )
-_SIGNS = str.maketrans({"·": "*", "⋅": "*", "²": "^2", "³": "^3"})
+_SIGNS = str.maketrans(
+    {"·": "*", "⋅": "*", "²": "^2", "³": "^3", "°": "deg", "℃": "degC", "℉": "degF", "\N{OHM SIGN}": "Ω"}
+)
 
 
 def to_si(value: float, unit: str, si_unit: str) -> float:
@@ -119,7 +121,7 @@ def all_to_si(values: Sequence[float], unit: str, si_unit: str) -> list[float]:
 
 def from_si(value: float, si_unit: str, unit: str) -> float:
     """Convert a number in `si_unit` to `unit`; arguments and errors otherwise as for `to_si`."""
-    return _scaled(value, 1 / _factor(unit, si_unit), si_unit) + _ZEROS.get(unit, 0)
+    return _scaled(value, 1 / _factor(unit, si_unit), si_unit) + _zero(unit)
 
 
 def factor_of(unit: str, si_unit: str) -> float:
@@ -130,7 +132,7 @@ def factor_of(unit: str, si_unit: str) -> float:
     InputError
         Also for a unit whose zero is not that of the SI unit, such as "degF".
     """
-    if unit in _ZEROS:
+    if _zero(unit):
         raise InputError.of("unit", unit, f"a multiple of {si_unit}")
     return to_si(1.0, unit, si_unit)
 
@@ -199,6 +201,10 @@ def describe(si_unit: str) -> str:
     return f"{DIMENSIONS[si_unit]} ({si_unit})" if si_unit in DIMENSIONS else f"a quantity in {si_unit}"
 
 
+def _zero(unit: str) -> int:
+    return _ZEROS.get(unit.translate(_SIGNS).strip(), 0)
+
+
 def _scaled(value: object, factor: Fraction, unit: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"{value!r} {unit} is not a number", value=value)
@@ -206,7 +212,7 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
         number = float(value)
         if math.isfinite(number):
             # What is in SI already needs no exact product.
-            zero = _ZEROS.get(unit.strip(), 0)
+            zero = _zero(unit)
             return number + 0.0 if factor == 1 else float((Fraction(repr(number)) - zero) * factor)
     except OverflowError:
         pass

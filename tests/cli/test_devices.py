@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from tests import hammers
 from tests.errors import refused
 
@@ -15,6 +16,7 @@ import printhammer as ph
 from printhammer.control.least_work.burst import least_work
 from printhammer.control.pulses import LARGEST_CURRENT, current_bound
 from printhammer.drive.waveforms.drivers import Rail
+from printhammer.figures import FIGURES
 from printhammer.maps.frequency import HIGHEST, LOWEST, default_rates
 from printhammer.printing.dots.judging import Limits, judge
 from printhammer.printing.dots.nominal import SinglePulse
@@ -97,6 +99,18 @@ def test_answers_about_a_relay_speak_of_closings(cli: Callable[..., Any], words:
     assert done.status == 0
     assert not re.search(r"\b(dots?|print(s|ed)?|paper|engraved)\b", done.out + done.err)
     assert words[0] == "strobe" or "closing" in done.out
+
+
+def test_pictures_and_pages_of_a_relay_speak_of_closings() -> None:
+    relay = ph.load("relay-5v")
+    report = ph.quality(relay, 10.0, pattern="11")
+    page = ph.print_page(relay, "I", 10.0)
+    chart = ph.frequency_map(relay, [10.0], pulses=2, times=8)
+    figures = [report.plot(), page.plot(), page.plot(view="zoom"), FIGURES[9].draw(relay, chart=chart)]
+    texts = [text.get_text() for figure in figures for text in figure.findobj(Text)]
+    said = "\n".join([*texts, repr(page), page._repr_html_(), repr(report)])
+    assert not re.search(r"\b([Dd]ots?|[Pp]rint(s|ed))\b(?!</td>)", said)
+    assert said.count("closing") > 10
 
 
 def test_refusals_of_a_relay_speak_of_closings(cli: Callable[..., Any]) -> None:

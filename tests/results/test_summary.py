@@ -5,7 +5,7 @@ import pytest
 
 import printhammer as ph
 from printhammer.results import Cells, Facts, Grid, Result, Summary, column, scalar
-from printhammer.results.summary import interval, judged, quantity, rendered, styled
+from printhammer.results.summary import interval, judged, quantity, rendered, styled, worded
 from printhammer.support.arrays import FloatArray
 
 
@@ -45,6 +45,15 @@ SUMMARY = Summary(
         ),
     ]
 )
+
+
+def test_the_noun_of_a_device_stands_for_dot() -> None:
+    said = SUMMARY.worded("closing").text()
+    assert said == SUMMARY.text().replace("two dots", "two closings").replace("Dots", "Closings")
+    assert SUMMARY.worded("dot") == SUMMARY
+    assert worded("2 of 3 dots printed, no dot matrix, dot-peen", "hit") == (
+        "2 of 3 hits made, no dot matrix, dot-peen"
+    )
 
 
 def test_units_are_chosen_when_a_summary_is_rendered() -> None:

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,16 @@ import pytest
 from tests import hammers
 
 import printhammer as ph
+from printhammer.control.learning.lines import Press, Rung
+from printhammer.control.table.task import Task, single_of
 from printhammer.drive.waveforms.shapes import HalfSine
 from printhammer.parts.backstop.rigid import RigidBackstop
 from printhammer.parts.pack.dashpot import DashpotPack
 from printhammer.parts.spring.linear import PreloadSpring
 from printhammer.printing.dots.nominal import nominal, single_pulses
 from printhammer.printing.dots.trial import Case, attempt
+from printhammer.printing.page.pattern import Pattern
+from printhammer.run.effort import Effort
 from printhammer.run.waits import waits_of
 from printhammer.run.window import CYCLE, Single, is_enough, least_wait, wait_of
 from printhammer.sweep.members import Base, Maker
@@ -90,6 +95,22 @@ def test_a_device_that_does_not_strike_or_settle_is_not_waited_for_without_end()
     assert wait_of(hammers.made_of(spring=PreloadSpring(preload=0.0, stiffness=100.0)), push) == CYCLE
 
 
+def press(hammer: ph.Hammer, rate: float) -> Press:
+    """The prints of a learner."""
+    single = single_of(hammer, hammer.waveform, 1e-7)
+    asked = {"gaps": 1, "reach": 1, "spread": [], "largest": 2.0, "widest": 1.0, "wait": 0.0, "brake": False}
+    task = Task(
+        hammers=[hammer],
+        pulse=hammer.waveform,
+        single=single,
+        limits=ph.Limits(),
+        effort=Effort(tolerance=1e-7, threads=1),
+        report=lambda: None,
+        **asked,  # type: ignore[arg-type]
+    )
+    return Press(task, rate, [hammer])
+
+
 def struck_everywhere(hammer: ph.Hammer) -> dict[str, list[int]]:
     """The dots of three firings, far apart, as every verb has them."""
     rate = 1.0 / (3.0 * wait_of(hammer))
@@ -112,6 +133,12 @@ def struck_everywhere(hammer: ph.Hammer) -> dict[str, list[int]]:
     assert members.ends[0] == Maker(base).member([]).end
     swept = ph.Ensemble(members.hammers, members.drives, members.ends).run(dots=True, threads=1).dots
     assert swept is not None
+    page = ph.print_page(hammer, Pattern("row", np.ones((1, 3), bool)), rate, threads=1)
+    learner = press(hammer, rate)
+    entries = np.zeros((4, 2))
+    entries[1] = hammer.waveform.width  # type: ignore[union-attr]
+    line, _judged = learner.line([entries], (0, 1, 2))
+    ladder, _force = learner.ladder([Rung(1.0), Rung(1.0, 1.0 / rate)])
     return {
         "run": [int(dot.struck) for dot in ph.simulate(hammer, train, points=2).dots],
         "print": trial.dots.struck[0].astype(int).tolist(),
@@ -119,29 +146,57 @@ def struck_everywhere(hammer: ph.Hammer) -> dict[str, list[int]]:
         "map": chart["struck"].values[0].astype(int).tolist(),
         "sweep": swept.struck[0].astype(int).tolist(),
         "safe rate": [1, 1, 1 - int(safe.lost.sum())],
+        "page": [1 - int(lost) for lost in page.lost],
+        "line of a learner": line.struck[0].astype(int).tolist(),
+        "ladder of a learner": np.isfinite(ladder[0]).astype(int).tolist(),
     }
 
 
-def devices(count: int, seed: int = 33) -> list[ph.Hammer]:
-    """Random devices with flights from 0.1 to 60 ms, evenly over the logarithm."""
+def devices(count: int, seed: int = 33) -> Iterator[ph.Hammer]:
+    """Random devices with flights from 0.1 to 60 ms: thrown by a force, or shipped ones in other times."""
     random = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> float:
         return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
-    return [
-        device(between(1e-4, 60e-3), between(1e-4, 1e-2), between(0.1, 20.0), between(0.05, 1.6))
-        for _ in range(count)
-    ]
+    for number in range(count):
+        if number % 2:
+            yield device(between(1e-4, 60e-3), between(1e-4, 1e-2), between(0.1, 20.0), between(0.05, 1.6))
+            continue
+        name = str(random.choice(["dot-peen", "braille-embosser", "relay-5v", "pinball-coil"]))
+        shipped = ph.load(name)
+        slow = between(1e-4, 60e-3) / nominal(shipped).flight_time
+        # Times of all that moves, currents that rise and contacts that last are multiplied by `slow`.
+        powers = {
+            "mass": 2,
+            "waveform.width": 1,
+            "pack.damping": 1,
+            "coil.resistance": -1,
+            "waveform.voltage": -1,
+        }
+        changed = {key: slow**power * shipped.constants[key].si for key, power in powers.items()}
+        changed["backstop.restitution"] = random.uniform(0.1, 0.6)
+        changed["spring.preload"] = random.uniform(0.8, 1.2) * shipped.constants["spring.preload"].si
+        yield shipped.replace(changed)
+
+
+def strikes_everywhere(hammer: ph.Hammer) -> None:
+    struck = struck_everywhere(hammer)
+    assert all(all(each) for each in struck.values()), (hammer.name, struck)
+
+
+def test_a_fast_and_a_slow_device_strike_the_same_dots_everywhere() -> None:
+    for flight in (1e-4, 60e-3):
+        strikes_everywhere(device(flight))
 
 
 @pytest.mark.slow
 def test_random_devices_strike_the_same_dots_everywhere() -> None:
-    flights = []
-    begun = time.perf_counter()
+    # 300 were tried once; a minute on a slow machine holds some of them.
+    begun, count = time.perf_counter(), 0
     for hammer in devices(300):
-        flights.append(nominal(hammer).flight_time)
-        assert all(struck == [1, 1, 1] for struck in struck_everywhere(hammer).values())
+        strikes_everywhere(hammer)
+        count += 1
         if time.perf_counter() - begun > 60.0:
             break
-    assert len(flights) >= 20
+    assert count >= 10

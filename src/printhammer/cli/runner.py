@@ -155,7 +155,7 @@ class Job:
 
     def progress_bar(self, name: str, *, remaining: bool = True) -> AbstractContextManager[terminal.Counted]:
         """Show a progress bar and record the duration; see `terminal.progress_bar`."""
-        return self._timed(terminal.progress_bar(name, remaining=remaining))
+        return self._timed(terminal.progress_bar(self.worded(name), remaining=remaining))
 
     def status_line(self, first: str = "…") -> AbstractContextManager[Callable[[str], None]]:
         """Show a status line and record the duration; see `terminal.status_line`."""
@@ -181,6 +181,13 @@ class Job:
         for part in parts:
             self.screen.print(part, soft_wrap=isinstance(part, str))
 
+    def worded(self, said: Shown) -> Shown:
+        """Name what a pulse of the hammer makes, a dot or a closing, in a text, texts or a summary."""
+        from printhammer.results.summary import worded
+
+        named: Shown = said if self.hammer is None else worded(said, self.hammer.strike)
+        return named
+
     def wrote(self, path: Path | str) -> None:
         """Print the name of a file that was written."""
         self.screen.print(f"[dim]wrote[/dim] {escape(str(path))}", soft_wrap=True)
@@ -188,15 +195,13 @@ class Job:
     def end(self, answer: Answer) -> int:
         """Show the answer, write its files, print its complaints; return the exit status."""
         if answer.shown or answer.note:
-            self.show(*answer.shown, note=answer.note)
-        from printhammer.results.summary import worded
-
+            self.show(*self.worded(list(answer.shown)), note=self.worded(answer.note))
         for name, content in answer.files.items():
             for path in self.wanted.get(name, []):
                 content.write(path)
                 self.wrote(path)
         for complaint in answer.complaints:
-            complain(complaint if self.hammer is None else worded(complaint, self.hammer.strike))
+            complain(self.worded(complaint))
         if answer.interrupted:
             return INTERRUPTED
         return int(bool(answer.complaints) or answer.failed)
@@ -255,10 +260,7 @@ def verb(
             try:
                 answer = function(**words)
             except PrinthammerError as error:
-                if job.hammer is not None:
-                    from printhammer.results.summary import worded
-
-                    error.args = (worded(str(error), job.hammer.strike),)
+                error.args = (job.worded(str(error)),)
                 raise
             return job.end(answer)
 

@@ -62,6 +62,8 @@ class DotHeat:
     """One of `FEEDS`: the law by which the heat is extrapolated and interpolated."""
     on_time: float = 0.0
     """On-time of the driver per dot, s; 0 if unknown."""
+    strike: str = "dot"
+    """Noun for a dot of the hammer, see `Hammer.strike`."""
 
     @property
     def most(self) -> float:
@@ -165,6 +167,11 @@ class ThermalDuty(Result, rows="ambient burst"):
     def title(self) -> str:
         """Title in one line."""
         return f"thermal duty of a coil up to {self.limit:g} degC"
+
+    @property
+    def strike(self) -> str:
+        """Noun for a dot of the hammer that the heat is of."""
+        return self.heat.strike
 
     def summary(self) -> Summary:
         """Tabulate the largest rates and the allowed bursts, one row per ambient temperature."""
@@ -373,9 +380,9 @@ def heat_of(hammer: Hammer) -> DotHeat:
     drive = PulseTrain(waveform, at=[0.0])
     if waveform.quantity == "current":
         heat = hammer.coil_resistance * squared_current(drive, 0.0, waveform.support)
-        return DotHeat((REFERENCE,), (heat,), "current")
+        return DotHeat((REFERENCE,), (heat,), "current", strike=hammer.strike)
     heats = [_copper_loss(hammer.replace("coil.temperature", warm), drive) for warm in TEMPERATURES]
-    return DotHeat(TEMPERATURES, tuple(heats), "voltage", waveform.support)
+    return DotHeat(TEMPERATURES, tuple(heats), "voltage", waveform.support, hammer.strike)
 
 
 def _copper_loss(hammer: Hammer, drive: PulseTrain) -> float:

@@ -265,7 +265,7 @@ class ImpactEstimator:
             f"{self.hammer.path}: a single pulse makes no dot",
             file=self.hammer.path,
             key="waveform",
-            expected="a hammer that prints",
+            expected="a pulse that throws the armature into the pack",
         )
 
     def _without_pack(self, fine: FloatArray) -> FloatArray:

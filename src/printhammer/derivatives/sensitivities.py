@@ -200,7 +200,7 @@ class Sensitivities(Result):
             ("constants", ", ".join(self.constants)),
             ("status", self.status),
         ]
-        return Summary([Facts(rows)]).worded(self.hammer.strike)
+        return Summary([Facts(rows)])
 
 
 class Spread(Result):

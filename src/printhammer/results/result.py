@@ -17,8 +17,9 @@ and arrays that are no fields, come from a class's own `entries`; further attrib
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, dataclass, replace
+from functools import wraps
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
@@ -40,7 +41,7 @@ from printhammer.results.declare import (
     with_attributes,
 )
 from printhammer.results.provenance import provenance
-from printhammer.results.summary import Cells, Facts, Summary
+from printhammer.results.summary import Cells, Facts, Summary, worded
 from printhammer.support.html import html_table, titled
 
 if TYPE_CHECKING:
@@ -85,6 +86,8 @@ class Result:
         if fields:
             dataclass(frozen=True, eq=False, repr=False)(cls)
         cls.COLUMNS = columns_of(cls)
+        if "summary" in vars(cls):
+            cls.summary = _worded(cls.summary)  # type: ignore[method-assign]
         if fields:
             cls.__doc__ = with_attributes(cls.__doc__ or "", cls, cls.COLUMNS)
 
@@ -92,6 +95,12 @@ class Result:
     def title(self) -> str:
         """Title of the result, one line."""
         return type(self).__name__
+
+    @property
+    def strike(self) -> str:
+        """Noun for what a pulse of the hammer makes, "dot" unless its file has another one."""
+        hammer = getattr(self, "hammer", None) or getattr(getattr(self, "regime", None), "hammer", None)
+        return str(getattr(hammer, "strike", "dot"))
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -187,7 +196,8 @@ class Result:
     def summary(self) -> Summary:
         """Summarise the result; by default the range and meaning of each declared column.
 
-        The terminal, `print` and the notebook show the summary. Classes override the method.
+        The terminal, `print` and the notebook show the summary. Classes override the method and write "dot";
+        what they return names the `strike` of the hammer.
         """
         rows = []
         for name, note in self.COLUMNS.items():
@@ -206,18 +216,19 @@ class Result:
         return Cells(heading or name.replace("_", " "), np.ravel(getattr(self, name)), unit, format)
 
     def __repr__(self) -> str:
-        return f"{self.title}\n{self.summary().text()}"
+        return f"{worded(self.title, self.strike)}\n{self.summary().text()}"
 
     def _repr_html_(self) -> str:
         """Return the HTML repr: title, summary, and collapsible lists of columns and attributes."""
         columns = [
-            (note.heading(name), extent(values), ", ".join(note.dims), span(values), note.meaning)
+            (note.heading(name), extent(values), ", ".join(note.dims), span(values), meaning)
             for name, (note, values) in self.entries().items()
+            for meaning in [worded(note.meaning, self.strike)]
         ]
         attributes = [(key, str(value)) for key, value in files.plain(self.attributes).items()]
         heads = ("", "shape", "dimensions", "values", "meaning")
         return titled(
-            self.title,
+            worded(self.title, self.strike),
             self.summary()._repr_html_(),
             f"<details><summary>columns</summary>{html_table(columns, heads)}</details>",
             f"<details><summary>attributes</summary>{html_table(attributes)}</details>",
@@ -226,6 +237,16 @@ class Result:
     def __dir__(self) -> list[str]:
         """Return the names for completion: public fields, properties and methods."""
         return public_names(super().__dir__())
+
+
+def _worded(summary: Callable[..., Summary]) -> Callable[..., Summary]:
+    """Let a summary name the strike of the hammer."""
+
+    @wraps(summary)
+    def said(self: Result, *args: Any, **options: Any) -> Summary:
+        return summary(self, *args, **options).worded(self.strike)
+
+    return said
 
 
 def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:

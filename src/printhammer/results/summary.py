@@ -37,7 +37,9 @@ SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
 """Unit shown and number format in either unit system, by SI unit."""
 _SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
 
-_DOT: Final = re.compile(r"(?<![-\w])dot(?=s?(?![-\w]| matrix))")
+_DOT: Final = re.compile(r"(?<![-\w])([Dd])ot(?=s?(?![-\w]| matrix))")
+_MADE: Final = {"printed": "made", "Printed": "Made", "prints": "makes"}
+_PRINTED: Final = re.compile(rf"\b({'|'.join(_MADE)})\b")
 _QUANTITY: Final = re.compile("⟦([^ ⟧]*) ([^⟧!]*)(!?)⟧")
 _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
@@ -170,7 +172,7 @@ class Summary(tuple[str | Facts | Grid, ...]):
 
     def worded(self, strike: str) -> Summary:
         """Return the summary with another noun for a dot, such as "closing"."""
-        return self if strike == "dot" else Summary(worded(each, strike) for each in self)
+        return Summary(worded(each, strike) for each in self)
 
     def text(self, system: System = "si") -> str:
         """Return the summary as plain text."""
@@ -194,9 +196,12 @@ class Summary(tuple[str | Facts | Grid, ...]):
 
 
 def worded(each: Any, strike: str) -> Any:
-    """Replace the noun "dot" in texts, and in the texts of facts, tables, sequences and other objects."""
+    """Replace "dot" and "printed" in texts, also those of facts, tables and sequences."""
+    if strike == "dot":
+        return each
     if isinstance(each, str):
-        return _DOT.sub(strike, each)
+        text = _DOT.sub(lambda found: strike.capitalize() if found[1] == "D" else strike, each)
+        return _PRINTED.sub(lambda found: _MADE[found[1]], text)
     if isinstance(each, Facts):
         return Facts(worded(each.rows, strike), worded(each.title, strike))
     if isinstance(each, Grid):

@@ -376,7 +376,7 @@ class Motion(Result, fields=False):
             ),
             Cells("", [_remark(dot) for dot in self.dots], left=True),
         ]
-        return Summary([Grid(columns, most=MOST_DOTS), "", energies]).worded(self.hammer.strike)
+        return Summary([Grid(columns, most=MOST_DOTS), "", energies])
 
     def _energy_facts(self) -> list[FactRow]:
         """Return the energies of the run and the residual of the ledger, for the summary."""

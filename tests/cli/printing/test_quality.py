@@ -95,7 +95,7 @@ def test_the_yield(cli: Callable, tmp_path: Path) -> None:
         "quality", CRUDE, "--yield", "2", "--limits", "dot-matrix", *GRID, "--out", tmp_path / "r.png"
     )
     assert rates.status == 0
-    assert "print well" in rates.out
+    assert "keep to the limits" in rates.out
 
 
 def test_the_damping_study(cli: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -105,7 +105,7 @@ class QuenchMap(Result):
             ratio = self.force_ratio[struck]
             rows.append(("force ratio", f"{ratio.min():.3f} to {ratio.max():.3f}"))
             rows.append(("flies shorter by", interval(self.flight_gain[struck], "s")))
-        return Summary([Facts(rows)]).worded(self.hammer.strike)
+        return Summary([Facts(rows)])
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -109,7 +109,7 @@ class Orbits(Result):
                 for name in energies_of(self.regime)
             ),
         ]
-        return Summary([Grid(columns), "", self.message]).worded(self.regime.hammer.strike)
+        return Summary([Grid(columns), "", self.message])
 
     def __len__(self) -> int:
         return len(self.found)

@@ -209,8 +209,7 @@ def duty(
     fired = None if hammer is None else load_hammer(hammer, fired=True)
     source: Any = heat if fired is None else _heat(fired, passed)
     made = thermal_duty(source, **passed)
-    said = made.summary().worded("dot" if fired is None else fired.strike)
-    return Answer(render(said), files={"out": Content.of(made)})
+    return Answer(render(made.summary()), files={"out": Content.of(made)})
 
 
 def _heat(hammer: Hammer, passed: dict[str, Any]) -> Any:

@@ -92,7 +92,7 @@ def energy(
         result = least_work(hammer, rate or rate_text(hammer, 1000.0), progress=tell, **passed)
     shown = render(result.summary(), units)
     if supply:
-        shown += ["", *render(result.under_supply().summary(result.count), units)]
+        shown += ["", *render(job.worded(result.under_supply().summary(result.count)), units)]
     else:
         less, more = result.under_supply((-_OFF, _OFF)).adequate.tolist()
         shown.append(

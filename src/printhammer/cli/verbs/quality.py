@@ -174,7 +174,7 @@ def quality(
         from printhammer.printing.dots.paper import Paper
         from printhammer.printing.rates.quality import quality as report
 
-        with job.status_line("printing"):
+        with job.status_line("patterns"):
             slots = pattern if pulses is None else pulses
             varied = None if paper is None else Paper.load(paper)
             result = report(hammer, rate or 0.0, slots, **common, **opt.given(pitch=pitch, paper=varied))

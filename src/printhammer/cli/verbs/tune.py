@@ -48,7 +48,7 @@ def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None,
     made = made.quantised(header["tick"]) if header else made
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
-    job.show(*render(made.summary(), units), note=f"tuned in {job.seconds:.2g} s{size}")
+    job.show(*render(job.worded(made.summary()), units), note=f"tuned in {job.seconds:.2g} s{size}")
     return made
 
 

@@ -118,7 +118,7 @@ class TableReport(Result, rows=_AXES):
             Cells("multiplier\nof rows", growth, "", ".2f"),
         ]
         said = f"On patterns it was not tuned on, {span}"
-        return Summary([Grid(columns, said)]).worded(self.hammer.strike)
+        return Summary([Grid(columns, said)])
 
     def notes(self) -> dict[str, Any]:
         """Return the limits."""

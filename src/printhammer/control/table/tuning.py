@@ -383,6 +383,8 @@ def _usable(draft: Draft) -> int:
     bad = np.flatnonzero(~(draft.worst <= _USABLE))
     if bad.size and bad[0] == 0:
         raise InputError(
-            "the table does not keep to the limits at any rate", key="rates", expected="a hammer that prints"
+            "the table does not keep to the limits at any rate",
+            key="rates",
+            expected="lower rates",
         )
     return int(bad[0]) if bad.size else draft.rates.size

@@ -23,6 +23,7 @@ from printhammer.support.tables.readings import read_table
 
 _UNITS: Final[dict[str, str]] = {name: si for si, name in QUANTITY_UNITS.items()}
 _HEADINGS: Final = "'time [us],current [A]' or 'time [us],force [N]'"
+_EDGE: Final = 1e-9  # Length of the edges of a record of levels, s; arbitrary, below any driver's
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,8 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
 def read_csv(path: Path) -> Samples:
     """Read a record from a table of time and current or force.
 
-    The firing is at time 0 of the record. What the record has before is cut off; nothing is driven there.
+    The firing is at time 0 of the record. What the record has before is cut off; nothing is driven there. A
+    level that a logic analyser wrote at its edges holds from one edge to the next.
 
     Raises
     ------
@@ -107,8 +109,17 @@ def read_csv(path: Path) -> Samples:
         )
     quantity: QuantityName = driven[0]  # type: ignore[assignment]
     times, values = table.values["time"], table.values[quantity]
+    if quantity in table.levels:
+        times, values = _held(times, values)
     table.check_before(times, quantity)
     return checked(times[times >= 0.0], values[times >= 0.0], quantity, what)
+
+
+def _held(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Hold each level until the next row: insert it again, by the length of an edge, before that row."""
+    before = times[1:] - min(_EDGE, 0.5 * float(np.diff(times).min()))
+    order = np.argsort(times := np.concatenate([times, before]))
+    return times[order], np.concatenate([values, values[:-1]])[order]
 
 
 Interpolation = Literal["pchip", "linear"]

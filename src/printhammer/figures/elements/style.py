@@ -13,6 +13,8 @@ from functools import wraps
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Final, Literal, ParamSpec
 
+from printhammer.results.summary import worded
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -94,14 +96,31 @@ def in_style() -> AbstractContextManager[None]:
 
 
 def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Decorate a function to build its figure in the style."""
+    """Decorate a function to build its figure in the style, with the noun of the hammer for a dot.
+
+    The noun is the attribute `strike` of an argument: a hammer, a result or a frequency-time map.
+    """
 
     @wraps(function)
     def wrapped(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
         with in_style():
-            return function(*args, **kwargs)
+            figure = function(*args, **kwargs)
+        for each in (*args, *kwargs.values()):
+            if (strike := getattr(each, "strike", "dot")) != "dot":
+                _name_strikes(figure, strike)
+                break
+        return figure
 
     return wrapped
+
+
+def _name_strikes(figure: Figure, strike: str) -> None:
+    """Replace the noun "dot" in all texts of a figure."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if (said := worded(text.get_text(), strike)) != text.get_text():
+            text.set_text(said)
 
 
 def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:

@@ -71,7 +71,7 @@ def nominal(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: floa
             f"{hammer.path}: a single pulse makes no dot",
             file=hammer.path,
             key="pulse",
-            expected="a hammer that prints",
+            expected="a pulse that throws the armature into the pack",
         )
     return Nominal(*known, extra_contacts=dot.extra_contacts)
 

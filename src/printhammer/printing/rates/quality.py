@@ -160,7 +160,7 @@ class Quality(Result):
             ),
             ("coil", f"{quantity(self.work, 'J')} a dot, {self.mean_power:.3f} W in the mean{heat}"),
         ]
-        return Summary([Facts(rows)]).worded(self.hammer.strike)
+        return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
         """Return the figures of the report, by names that end in their units."""

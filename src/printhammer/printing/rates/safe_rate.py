@@ -168,7 +168,7 @@ class SafeRate(Result):
             ("because", "the grid ends" if self.failure is None else self.failure.text),
             ("grid", f"{first:g} to {last:g} Hz, every {self.step:g} Hz"),
         ]
-        return Summary([Facts(rows)]).worded(self.hammer.strike)
+        return Summary([Facts(rows)])
 
     @property
     def at_least(self) -> bool:

@@ -122,11 +122,11 @@ class ToleranceYield(Result):
         for part_of_all in _SHARES:
             rates = [rate for rate in self.grid.tolist() if self.share_at(rate) >= part_of_all]
             reached = f"up to {rates[-1]:g} Hz" if rates else "at no rate tried"
-            rows.append((f"{100.0 * part_of_all:g} % print well", reached))
+            rows.append((f"{100.0 * part_of_all:g} % keep to the limits", reached))
         known = self.safe_rates[~np.isnan(self.safe_rates)]
         if known.size:
             rows.append(("safe rates", f"{known.min():g} to {known.max():g} Hz"))
-        return Summary([Facts(rows)]).worded(self.hammer.strike)
+        return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
         """Return the limits, the spreads, the rate grid, and the rate of the test if there is one."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from operator import ne
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -53,6 +54,8 @@ class Readings:
     """Line of the file of each row, counted from 1; shape (rows,)."""
     comments: dict[str, str]
     """Comments of the form ``# key: value``; for a repeated key, the last."""
+    levels: frozenset[str] = frozenset()
+    """Columns of 0 and 1 where a line of a logic analyser changes; a level holds until the next row."""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -183,7 +186,8 @@ def readings_of(
     lines = np.array(table.lines, dtype=np.int64)
     if columns and columns.delays:
         values, lines = _in_time(values, lines, columns, table.where)
-    return Readings(Path(table.where), values, cells, lines, table.comments)
+    levels = {name for name, source in sources.items() if source.place - 1 in _levels(table)}
+    return Readings(Path(table.where), values, cells, lines, table.comments, frozenset(levels))
 
 
 def assigned(
@@ -236,6 +240,20 @@ def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
         if name in numbers and name not in known and len(same) == 1:
             known[same[0]] = name
     return known
+
+
+def _levels(table: Table) -> set[int]:
+    """Return the indices of columns of levels, some of which change in every row.
+
+    A column of levels has cells 0 and 1, and neither a unit nor the name of a quantity.
+    """
+    columns = {
+        place: table.cells(place)
+        for place, heading in enumerate(table.columns)
+        if not (heading.unit or heading.quantity) and {"0", "1"} >= set(table.cells(place))
+    }
+    rows = list(zip(*columns.values(), strict=True))
+    return set(columns) if all(map(ne, rows, rows[1:])) else set()
 
 
 def _by_heading(
