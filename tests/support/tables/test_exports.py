@@ -73,7 +73,8 @@ def right(found: Curves, name: str) -> None:
         late = np.searchsorted(found["time"], [0.0, 10e-6, 20e-6 - 1e-12, 30e-6], side="right") - 1
         np.testing.assert_allclose(found["current"][late], [1.0, 1.0, 1.0, 0.0])
         if found["time"][0] == 0.0:
-            np.testing.assert_allclose(np.interp([1e-9, 19e-6, 20e-6], **found), [1.0, 1.0, 0.0])
+            late = np.interp([1e-9, 19e-6, 20e-6], found["time"], found["current"])
+            np.testing.assert_allclose(late, [1.0, 1.0, 0.0])
         return
     rows = AFTER if len(found["time"]) == AFTER.sum() else slice(None)
     np.testing.assert_allclose(found["time"], exports.TIMES[rows], rtol=1e-6, atol=1e-15)

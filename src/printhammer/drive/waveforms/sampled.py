@@ -109,9 +109,9 @@ def read_csv(path: Path) -> Samples:
         )
     quantity: QuantityName = driven[0]  # type: ignore[assignment]
     times, values = table.values["time"], table.values[quantity]
+    table.check_before(times, quantity)
     if quantity in table.levels:
         times, values = _held(times, values)
-    table.check_before(times, quantity)
     return checked(times[times >= 0.0], values[times >= 0.0], quantity, what)
 
 
