@@ -30,6 +30,8 @@ def made(hammer: Any = None, drives: Any = None, ends: Any = END, **options: Any
         (lambda: made([hammers.crude()] * 2, [drive()] * 3), "hammers"),
         (lambda: made(drives=[drive()] * 2, ends=[END] * 3), "drives"),
         (lambda: made(ends=[END] * 3, states=[[6e-5, 0.0]] * 2), "states"),
+        (lambda: made("hendriks-1983"), "hammers"),
+        (lambda: made(drives=[hammers.crude().waveform]), "drives"),
         (lambda: made(ends=0.0), "ends"),
         (lambda: made(ends=[END, -1.0]), "ends"),
         (lambda: made(ends=np.inf), "ends"),

@@ -34,7 +34,7 @@ class Drive:
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap = "add", period: float | None = None
     ) -> None:
         if not isinstance(waveform, Waveform):
-            raise InputError.of("waveform", waveform, "a waveform, the drive has none")
+            raise InputError.of("waveform", waveform, "a waveform, such as hammer.waveform")
         if overlap not in OVERLAPS:
             raise InputError.of("overlap", overlap, "'add' or 'replace'")
         self._waveform = waveform

@@ -190,6 +190,9 @@ class Ensemble:
             many_drives = list(drives)
         else:
             many_drives = drives if isinstance(drives, PulseTrains) else [drives]  # type: ignore[list-item]
+        _check_kind("hammers", many_hammers, Hammer, "hammers, as load('hendriks-1983') gives one")
+        if not isinstance(many_drives, PulseTrains):
+            _check_kind("drives", many_drives, Drive, "drives, such as PulseTrain(hammer.waveform)")
         moments, begun = _each(ends, "ends"), _each(starts, "starts")
         rows = None if states is None else read_array(states, "states")
         counts = {
@@ -449,6 +452,13 @@ def _integrate(jobs: Sequence[Job], engine: Engine, threads: int, progress: Prog
             works.append(job.piece)
             lengths.append(max(1, size // (PIECES_A_THREAD * threads)))
     in_threads(works, sizes, threads, progress, lengths)
+
+
+def _check_kind(name: str, members: Sequence[Any], kind: type, expected: str) -> None:
+    """Raise InputError for the first member of another class."""
+    for member in members:
+        if not isinstance(member, kind):
+            raise InputError.of(name, member, expected)
 
 
 def _each(values: npt.ArrayLike, name: str) -> FloatArray:
