@@ -24,7 +24,7 @@ from printhammer.errors import PrinthammerError
 
 BAD_INPUT: Final = 2  # Exit status, by convention of command lines
 _COLUMNS: Final = 76
-"""Largest line length of an example."""
+"""Largest line length of an example in the help."""
 
 HELP: Final = (
     "A laboratory for impact print hammers: motion, contacts, dots, and the claims of Hendriks (1983)."
@@ -45,7 +45,7 @@ def _program(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Declare the options of the program itself."""
+    """Declare the options of the program itself, such as --version."""
 
 
 def _shown(example: str | None) -> str | None:
@@ -64,7 +64,7 @@ def _shown(example: str | None) -> str | None:
 def build_program(
     name: str, text: str, example: str, verbs: Iterable[Verb], groups: Mapping[str, tuple[str, str | None]]
 ) -> typer.Typer:
-    """Build a program from verbs; `groups` holds the help and the example of each group."""
+    """Build the typer program from verbs; `groups` holds help and example of each group of verbs."""
     program = typer.Typer(
         name=name,
         help=text,
@@ -91,12 +91,12 @@ app: Final = build_program(
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the command line, by default that of the process, and exit."""
+    """Run a command line, by default the arguments of the process, and exit."""
     run_program(app, "printhammer", arguments)
 
 
 def run_program(program: typer.Typer, name: str, arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run a program of verbs on arguments, by default those of the process, and exit with its status."""
+    """Run a program of verbs on arguments, by default those of the process; exit with its status."""
     allow_any_text()
     try:
         status = program(

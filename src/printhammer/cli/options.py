@@ -1,8 +1,9 @@
 """Declarations of command-line options: flag, help text, and parser of the value.
 
-A verb declares its options as defaults of its parameters, ``points: int = whole("Number of points.",
-default=200)``, and receives the parsed value. Options that several verbs share are declared once, below.
-`Units` names the two unit systems in which the command line shows quantities.
+A verb declares its options as default values of its parameters,
+``points: int = whole("Number of points.", default=200)``, and receives the parsed value. Options that several
+verbs share are declared once, below. `Units` names the two unit systems in which the command line shows
+quantities.
 """
 
 from __future__ import annotations
@@ -19,24 +20,24 @@ from printhammer.errors import InputError
 
 
 class Units(StrEnum):
-    """Unit system of displayed quantities."""
+    """Unit system in which quantities are displayed."""
 
     SI = "si"
     INCH = "inch"
 
 
 DATA: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
-"""Endings of the files of every result, those of `printhammer.results.ENDINGS`."""
+"""File endings in which every result can be saved, as in `printhammer.results.ENDINGS`."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """An option or argument of a verb."""
+    """Declaration of an option or argument of a verb."""
 
     help: str
-    """Help text: begins with the field's noun or a verb; names unit and default."""
+    """Help text: begins with the noun of the field or a verb; states unit and default."""
     metavar: str | None = None
-    """Placeholder of the value in the help."""
+    """Placeholder of the value in the help text."""
     default: Any = None
     """Default value; an ellipsis marks a required option."""
     flag: str | None = None
@@ -50,15 +51,15 @@ class Option:
     many: bool = False
     """Whether the option is repeatable."""
     least: float | None = None
-    """Smallest number accepted."""
+    """Smallest accepted number."""
     argument: bool = False
     """Whether the value is positional, without a flag."""
     is_input: bool = False
     """Whether the option names input files, which no output may overwrite."""
     writes: bool = False
-    """Whether the option names the place of new files."""
+    """Whether the option names a file or folder that the verb writes."""
     hammer: Literal["named", "loaded", "fired"] | None = None
-    """Role of a hammer: "named" (not loaded), "loaded" (warnings shown), "fired" (has a waveform)."""
+    """Role of a hammer: "named" (not loaded), "loaded" (warnings shown), "fired" (must have a waveform)."""
 
     def flag_of(self, name: str) -> str:
         """Return the flag of the option of a parameter."""
@@ -87,10 +88,10 @@ class Option:
 
 @dataclass(frozen=True)
 class Files(Option):
-    """An option that names output files; the runner checks them before the computation and writes them."""
+    """Option that names output files; the runner checks the files before the computation and writes them."""
 
     endings: tuple[str, ...] = ()
-    """Accepted file endings besides those of pictures; empty if any ending is accepted."""
+    """Accepted file endings besides those of pictures; if empty, every ending is accepted."""
     pictures: bool = True
     """Whether pictures are accepted."""
     continued: bool = False
@@ -103,7 +104,7 @@ def files(what: str, *endings: str, many: bool = True, **more: Any) -> Files:
 
 
 def results(what: str, *more: str, **options: Any) -> Files:
-    """Return the option `--out` for `what`: data files, pictures, and files with `more` endings."""
+    """Return the option `--out` that saves `what`: as data, as a picture, or with one of `more` endings."""
     endings = (*DATA, *more)
     kinds = f"Output file for {what} ({', '.join(endings)}; SI)"
     return files(f"{kinds} or a picture (.svg, .png, .pdf); repeatable.", *endings, **options)
@@ -129,7 +130,7 @@ def argument(metavar: str, what: str, **more: Any) -> Any:
 
 
 def bounded(least: float, what: str, *, default: float, **more: Any) -> Any:
-    """Return a numeric option, of the type of its default and at least `least`."""
+    """Return a numeric option of the type of its default, with the smallest value `least`."""
     return Option(what, more.pop("metavar", None), default, type=type(default), least=least, **more)
 
 
@@ -161,7 +162,7 @@ def number(what: str, metavar: str = "X", **more: Any) -> Any:
 
 
 def quantity(si: str, metavar: str, what: str, *, positive: bool = False, **more: Any) -> Any:
-    """Return an option for a number with a unit of the dimension of `si`; above 0 if `positive`."""
+    """Return an option for a quantity with a unit of the dimension of `si`; above 0 if `positive`."""
 
     def read(written: str, name: str) -> float:
         from printhammer.drive.input import read_number, read_positive
@@ -211,7 +212,7 @@ def source(what: str, **more: Any) -> Any:
 
 
 def folder(what: str, **more: Any) -> Any:
-    """Return an option for an output folder, or another single place to write to."""
+    """Return an option for an output folder (or, with another placeholder, a single output file)."""
     return Option(what, **{"metavar": "FOLDER", "type": Path, "writes": True, **more})
 
 
@@ -239,7 +240,7 @@ def read_share(written: str, name: str) -> float:
 
 
 def read_span(written: str, name: str) -> tuple[str, str, int]:
-    """Parse a range: two ends with units and a number of values, such as '0 um, 100 um, 64'."""
+    """Parse a range: two ends with units and the number of values, such as '0 um, 100 um, 64'."""
     parts = [part.strip() for part in written.split(",")]
     if len(parts) != 3:
         raise InputError(
@@ -267,18 +268,18 @@ def between(span: tuple[str, str, int] | None, si: str, name: str) -> list[float
 
 
 def given(**options: Any) -> dict[str, Any]:
-    """Return the options that are not None; the library supplies the other defaults."""
+    """Return the options that are not None; the library supplies the defaults of the others."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def need_one(options: Mapping[str, object], example: Callable[[], str]) -> None:
-    """Require exactly one of `period` and `rate`."""
+    """Check that exactly one of `period` and `rate` is set."""
     if (options.get("period") is None) == (options.get("rate") is None):
         raise InputError(f"--period and --rate: expected one of them, such as {example()}", key="--period")
 
 
 def refuse(options: Mapping[str, object], expected: str) -> None:
-    """Raise InputError if any of the options is set; the error says what is `expected`."""
+    """Raise InputError if any of the options is set; the message states what is `expected`."""
     for name, value in options.items():
         if value is not None:
             raise InputError(f"--{name} is given", key=f"--{name}", expected=expected)
@@ -288,7 +289,7 @@ _TRAIN: Final = "Train (one of --period and --rate)"
 
 
 def overlapping(panel: str = _TRAIN) -> Any:
-    """Return the option `--overlap`, the rule for overlapping pulses."""
+    """Return the option `--overlap`, the rule for pulses that overlap."""
     return choice(
         "add|replace",
         "Rule for overlapping pulses: add their currents, or let the latest replace the others.",

@@ -1,4 +1,4 @@
-"""The verbs of the command line, in the order of the help."""
+"""All verbs of the command line, in the order of the help."""
 
 from __future__ import annotations
 
@@ -30,4 +30,4 @@ VERBS: Final[tuple[Verb, ...]] = (
 )
 
 GROUPS: Final = {"hammer": (hammer.GROUP, None), "fit": (fit.GROUP, fit.EXAMPLE)}
-"""Help and example of each group of two-word verbs, by their first word."""
+"""Help text and example of each group of two-word verbs, by the first word of the verb."""

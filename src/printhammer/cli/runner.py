@@ -1,10 +1,10 @@
-"""Runner of the verbs: options in, `Answer` out.
+"""Runner of the verbs: parses the options, calls the verb, and outputs its `Answer`.
 
 A verb is a function of its options, and of a `Job` if it has a parameter `job`, declared with `verb`. The
-runner parses the options, checks before the computation that every output file is new and writable, loads
-the hammer, and announces compilation; the verb computes and returns an `Answer`; the runner shows the answer,
-writes the files, prints complaints, and sets the exit status. `firing_of` reads the periodic drive of the
-verbs of chaos: period or rate, or a drive file.
+runner parses the options, checks before the computation that every output file is new and writable, loads the
+hammer, and announces compilation; the verb computes and returns an `Answer`; the runner shows the answer,
+writes the files, prints complaints, and sets the exit status. `firing_of` parses the periodic drive of the
+verbs that analyse chaos: period, rate, or drive file.
 """
 
 from __future__ import annotations
@@ -37,34 +37,34 @@ Shown = TypeVar("Shown")
 INTERRUPTED: Final = 130  # Exit status 128 + SIGINT, as shells report it
 _FORCE: Final = "write_over"
 _WITH_PARTS: Final = ("HAMMER", "SPEC")
-"""Placeholders of the files that may use laws registered with --part."""
+"""Placeholders of arguments whose files may use laws registered with --part."""
 PICTURES: Final = (".svg", ".png", ".pdf")
 """File endings of pictures."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """Content of an output file: a picture if its ending says so, else whatever `save` writes."""
+    """Content of an output file: a picture for the file endings of pictures, else the output of `save`."""
 
     save: Callable[[Path], Any] | None = None
-    """Writer of any file that is not a picture; None if the computation has written the file."""
+    """Function that writes any other file than a picture; None if the computation has written the file."""
     plot: Callable[[], Any] | None = None
     """Function that returns a matplotlib figure."""
 
     @classmethod
     def text(cls, content: Callable[[], str]) -> Content:
-        """Return text content, composed when the file is written."""
+        """Return text content that is composed only when the file is written."""
         from printhammer.support.files import write_file
 
         return cls(lambda path: write_file(path, content()))
 
     @classmethod
     def of(cls, result: Any, **options: Any) -> Content:
-        """Return the data and the picture of a result to write; `options` are passed to its `plot`."""
+        """Return data and picture of a result as content of a file; `options` are passed to `result.plot`."""
         return cls(result.save, lambda: result.plot(**options))
 
     def write(self, path: Path) -> None:
-        """Write the file; raise InputError if that is impossible."""
+        """Write the content to a file; raise InputError if the file cannot be written."""
         from printhammer.support.files import write_file
 
         ending = path.suffix.lower()
@@ -78,49 +78,49 @@ class Content:
 
 @dataclass(frozen=True)
 class Answer:
-    """Answer of a verb: text, files and exit status."""
+    """Answer of a verb: text for the terminal, content of files, and exit status."""
 
     shown: Sequence[RenderableType] = ()
-    """Renderables to show; text is rich markup."""
+    """Rich renderables to show on the terminal; text is parsed as Rich markup."""
     note: str = ""
-    """Line below the name of the hammer."""
+    """Remark shown in a line below the name of the hammer."""
     files: Mapping[str, Content] = field(default_factory=dict)
-    """Content of the output files, by the name of their option."""
+    """Content of the output files, by option name."""
     complaints: Sequence[str] = ()
     """Reasons for exit status 1, printed on the standard error."""
     failed: bool = False
-    """Whether the exit status is 1 without a complaint."""
+    """Whether the exit status is 1 even without a complaint."""
     interrupted: bool = False
-    """Whether Ctrl-C stopped the computation; the answer holds the finished part."""
+    """Whether Ctrl-C stopped the computation; the answer then holds the finished part."""
 
 
 class Job:
-    """One call of a verb."""
+    """State of one call of a verb: hammer, files and console."""
 
     def __init__(
         self, declared: Mapping[str, Files], wanted: Mapping[str, list[Path]], *, force: bool = False
     ) -> None:
         self.hammer: Hammer | None = None
-        """Loaded hammer, if any."""
+        """Loaded hammer; None if the verb loads no hammer."""
         self.declared, self.wanted = declared, dict(wanted)
-        """Declarations of the output options, and the files requested, by the name of the option."""
+        """Declarations of the output options, and the requested files, both by option name."""
         self.inputs: list[Path] = []
-        """Input files."""
+        """Input files, which no output may overwrite."""
         self.force = force
         """Whether existing files may be overwritten."""
         self.screen = console()
-        """Console of the standard output."""
+        """Console of the standard output, for results."""
         self.seconds = 0.0
         """Duration, s, of the last computation with a progress display."""
         self._headed = False
 
     @property
     def outputs(self) -> list[Path]:
-        """All output files."""
+        """All requested output files."""
         return [path for paths in self.wanted.values() for path in paths]
 
     def check(self, *inputs: Path) -> None:
-        """Check before the computation that all output files are writable, new, and not input files.
+        """Check, before the computation, that all output files are writable, new, and not input files.
 
         Errors as for `check_endings`, `check_outputs` and `check_new`.
         """
@@ -171,7 +171,7 @@ class Job:
             self.seconds = perf_counter() - begin
 
     def show(self, *parts: RenderableType, note: str = "") -> None:
-        """Print at once, below the name of the hammer; text is rich markup."""
+        """Print renderables at once, below the name of the hammer; text is parsed as Rich markup."""
         if not self._headed and self.hammer is not None:
             self.screen.print(heading(self.hammer))
             if note:
@@ -209,7 +209,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb of the command line."""
+    """Verb of the command line: function, options, and example."""
 
     name: str
     """Name, such as "strobe" or "fit magnet"."""
@@ -289,7 +289,7 @@ def _listed(paths: Path | list[Path] | None) -> list[Path]:
 
 
 def _values(job: Job, options: Mapping[str, Option], texts: dict[str, Any]) -> dict[str, Any]:
-    """Check the files, parse the options, load the hammer; return the values by option."""
+    """Check the files, parse the options and load the hammer; return the values by parameter name."""
     job.check(
         *(
             Path(path)
@@ -335,13 +335,13 @@ def load_hammer(name: str, *, fired: bool) -> Hammer:
 
 
 def tables_beside(path: Path, *parts: object) -> list[Path]:
-    """Return the paths of tables to which parts refer by name, relative to the folder of `path`."""
+    """Return the paths of the tables that parts refer to by name, relative to the folder of `path`."""
     names = [getattr(part, "file", None) for part in parts]
     return [path.parent / name for name in names if name]
 
 
 def announce_compiling() -> None:
-    """Announce compilation on the standard error; it takes a while, once."""
+    """Announce on the standard error that code is compiled, which takes a while the first time."""
     from printhammer.run.simulate import announce_compiling as announce
 
     announce(say)
@@ -359,7 +359,7 @@ def check_endings(paths: Iterable[Path], endings: Sequence[str], option: str = "
 
 
 def ended_early(statuses: Iterable[object], total: int | None = None) -> list[str]:
-    """Return a complaint that counts the runs with a status other than ok, of `total` runs."""
+    """Return a complaint that counts the runs whose status is not ok, out of `total` runs."""
     every = [str(status) for status in statuses]
     failed = [status for status in every if status != "ok"]
     kinds = ", ".join(sorted(set(failed)))
@@ -367,14 +367,14 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 
 
 def period_text(hammer: Hammer, period: float) -> str:
-    """Return a time between firings, s, of the paper's hammer as text for a device, scaled to its pulse."""
+    """Scale a firing period of the paper's hammer, s, to the pulse width of a device; return it as text."""
     from printhammer.run.window import time_scale
 
     return f"{1e3 * period * time_scale(hammer):.4g} ms"
 
 
 def rate_text(hammer: Hammer, rate: float) -> str:
-    """Return a rate, Hz, of the paper's hammer as text for a device, scaled to its pulse."""
+    """Scale a firing rate of the paper's hammer, Hz, to the pulse width of a device; return it as text."""
     from printhammer.run.window import scaled_rate
 
     return f"{scaled_rate(hammer, rate):.4g} Hz"
@@ -389,11 +389,11 @@ def firing_of(
     *,
     timed: bool = True,
 ) -> Firing:
-    """Extract the firing options from `passed`, as keywords of `Regime.of`.
+    """Extract the firing options from `passed`; return them as keywords of `Regime.of`.
 
     If `timed`, exactly one of period and rate is required; a drive file may replace both: a continuous
-    periodic force, or pulses at a constant rate. The example in a message is a `period`, s, scaled to the
-    device. Raises InputError for a hammer without a waveform, any other drive file, or superfluous options.
+    periodic force, or pulses at a constant rate. Error messages suggest a `period`, s, scaled to the device.
+    Raises InputError for a hammer without a waveform, any other drive file, or superfluous options.
     """
     file: Path | None = passed.pop("drive", None)
     train = {name: passed.pop(name, None) for name in ("period", "rate", "overlap")}

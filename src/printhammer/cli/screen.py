@@ -1,4 +1,4 @@
-"""Summaries on the terminal: tables that wrap by columns, lists of facts, and text styles."""
+"""Summaries on the terminal: tables that wrap by columns, lists of facts, and styled text."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ STYLES: Final = {
     "strong": "bold",
     "best": "bold green",
 }
-"""Terminal styles of the summary styles whose names differ."""
+"""Rich style of each style name used in summaries."""
 
 
 @dataclass(frozen=True)
 class Column(Generic[Row]):
-    """Column of a table of row objects; `printhammer.results.Cells` is its counterpart for arrays."""
+    """Column of a table whose rows are objects; `printhammer.results.Cells` is the counterpart for arrays."""
 
     heading: str
     value: Callable[[Row], Any]
@@ -83,7 +83,7 @@ class Sheet(Table):
         return parts
 
     def _least(self, console: Console, column: TableColumn) -> int:
-        """Return the smallest width of a column: its longest number or word."""
+        """Return the smallest width of a column: the length of its longest number or word."""
         texts = [console.render_str(text) for text in (column.header, *column.cells) if isinstance(text, str)]
         lines = [line for text in texts for line in text.plain.split(None if not column.no_wrap else "\n")]
         return max(map(cell_len, lines), default=0)
@@ -96,7 +96,7 @@ def table(
     title: str = "",
     most: int | None = None,
 ) -> Table:
-    """Return a frameless table of rows; beyond `most` rows only the first and last ones."""
+    """Return a frameless table of rows; of more than `most` rows only the first and last ones are shown."""
     from printhammer.results.summary import Cells, Grid
 
     every = list(rows)
@@ -125,7 +125,7 @@ def _grid(grid: Grid, units: Units) -> Table:
 
 
 def marked(text: str, units: Units = Units.SI) -> str:
-    """Convert a text of a summary to rich markup."""
+    """Convert the marked text of a summary to Rich markup."""
     from printhammer.results.summary import rendered
 
     def shown(style: str, said: str) -> str:
@@ -135,7 +135,7 @@ def marked(text: str, units: Units = Units.SI) -> str:
 
 
 def render(summary: Summary, units: Units = Units.SI) -> list[RenderableType]:
-    """Render the blocks of a summary in a unit system."""
+    """Convert a summary to Rich renderables, with quantities in a unit system."""
     from printhammer.results.summary import Facts
 
     parts: list[RenderableType] = []
@@ -166,7 +166,7 @@ def train_line(shape: str, quantity: str, overlap: str, period: float | None = N
 
 
 def heading(hammer: Hammer) -> str:
-    """Return the headline of a hammer: its name and the status of its constants; rich markup."""
+    """Return the headline of a hammer: its name and the status of its constants, in Rich markup."""
     return f"[bold]{escape(hammer.name)}[/bold]  {honesty(hammer)}"
 
 

@@ -19,7 +19,7 @@ from rich.progress import Progress, ProgressColumn, Task
 
 _WIDTH: Final = 120  # Columns of output that is not a terminal; arbitrary
 _PLAIN: Final = {"µ": "u", "–": "-", "…": "...", "·": " ", "×": "x", "°": "deg", "→": "->"}
-"""Replacements of characters that the output encoding lacks."""
+"""Plain-text replacements of characters that the output encoding may lack."""
 
 
 def _plain(error: UnicodeError) -> tuple[str, int]:
@@ -69,7 +69,7 @@ def complain(sentence: str) -> None:
 
 
 def say(sentence: str) -> None:
-    """Print a remark on the standard error, which keeps piped output clean."""
+    """Print a remark on the standard error, so that piped output contains results only."""
     _print(f"[dim]{escape(sentence)}[/dim]")
 
 
@@ -79,7 +79,7 @@ def warn(sentence: str) -> None:
 
 
 class Counted(Protocol):
-    """Callback of a progress bar: steps done, total steps, and the current step's name."""
+    """Callback of a progress bar: steps done, total steps, and name of the current step."""
 
     def __call__(self, done: int, total: int, what: str = "", /) -> None:
         """Update the progress bar."""
@@ -87,16 +87,16 @@ class Counted(Protocol):
 
 @contextmanager
 def progress_bar(name: str, *, remaining: bool = True) -> Iterator[Counted]:
-    """Show a progress bar called `name` with count, rate and time left; yield its callback.
+    """Show a progress bar labelled `name` with count, rate and time left; yield its callback.
 
-    Without `remaining`, the elapsed time replaces the time left, which means nothing if most steps may turn
-    out to be unnecessary.
+    Without `remaining`, the bar shows the elapsed time instead of the time left, for computations in which
+    most steps may turn out to be unnecessary.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, TextColumn, TimeElapsedColumn
     from rich.text import Text
 
     class Pace(ProgressColumn):
-        """Rate, and the time left at that rate."""
+        """Progress-bar column with the rate of the steps and the time left."""
 
         def render(self, task: Task) -> Text:
             return Text(pace_of(task.completed, task.total if remaining else None, task.elapsed), style="dim")
@@ -112,7 +112,7 @@ def progress_bar(name: str, *, remaining: bool = True) -> Iterator[Counted]:
 
 
 def pace_of(done: float, total: float | None, seconds: float | None) -> str:
-    """Return rate and time left as text; empty before the first step.
+    """Return the rate of the steps and the time left as text; empty before the first step.
 
     The rate is the average since the start, because parallel steps finish in bursts.
     """

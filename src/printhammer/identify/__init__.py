@@ -1,1 +1,1 @@
-"""Constants of a hammer from measurements: tables, fits with their uncertainty, fragments of hammer files."""
+"""Identification: fit the constants of a hammer to measurements, with their uncertainty, for hammer files."""

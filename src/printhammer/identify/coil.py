@@ -1,11 +1,11 @@
 """Fit the constants of a coil circuit to records of its current under a voltage.
 
-  current(t) = solution of the equation of motion together with the coil circuit, as the probe shows it
+  current(t) = solution of the equation of motion and the coil circuit, as seen by the current probe
 
 Data: columns ``time`` and ``current``, optionally ``voltage``; one shot per file. Without a voltage column
-the hammer's own driver is the source. The final current determines the resistance, its rise the inductance,
-and the curvature of the rise a shorted turn or saturation; a moving armature adds a back-EMF. The errors of
-the current probe are declared or fitted, see `printhammer.identify.probe`.
+the hammer's own driver supplies the voltage. The final current determines the resistance, its rise the
+inductance, and the curvature of the rise a shorted turn or saturation; a moving armature adds a back-EMF. The
+errors of the current probe are declared or fitted, see `printhammer.identify.probe`.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from printhammer.identify.static.assemble import Data, assemble, enough, judge, 
 from printhammer.support.arrays import FloatArray, IntArray
 
 FREE: Final = ("coil.resistance", "coil.inductance")
-"""Constants that are fitted by default; only the resistance if the magnet has its own inductance."""
+"""Constants fitted by default; only the resistance if the magnet's law includes an inductance."""
 
 _STEP: Final = 1e-4
-"""Relative step of the finite differences: well above the errors of the integration."""
+"""Relative step size of the finite differences: well above the integration error."""
 
 _SHORT: Final = 0.05
 """Step of the finite differences with respect to times, in sampling intervals."""
@@ -52,10 +52,10 @@ _REACH: Final = 1e3
 """Largest factor between a fitted constant and its initial guess; arbitrary."""
 
 _TOLERANCE: Final = 1e-10
-"""Relative tolerance of the least-squares iterations: finite differences are no more accurate."""
+"""Relative tolerance of the least-squares iterations: no smaller than the error of the finite differences."""
 
 _SPARE: Final = 4
-"""Smallest number of rows in excess of parameters, for the standard errors; arbitrary."""
+"""Smallest number of rows in excess of parameters for which standard errors are computed; arbitrary."""
 
 _EXACT: Final = 1e-6
 """Residual, as a fraction of the current, below which integration errors dominate and no law is tested."""
@@ -105,12 +105,13 @@ def fit_coil(
     also : sequence of str, optional
         Additional constants to fit, e.g. "coil.turn_resistance", "magnet.saturation_flux".
     locked : float or str, optional
-        Displacement at which the armature was held, m; by default that of a comment ``# locked: 100 um``,
-        else the armature is free.
+        Displacement at which the armature was held, m; by default the value in a comment
+        ``# locked: 100 um``, else the armature is free.
     offset, gain, delay : float or str, optional
         Offset, A, gain, and delay, s, of the probe.
     bandwidth : float or str, optional
-        Bandwidth of the probe, Hz; by default that of a comment ``# bandwidth: 200 kHz``, else unlimited.
+        Bandwidth of the probe, Hz; by default the value in a comment ``# bandwidth: 200 kHz``, else
+        unlimited.
     resolution : float or str, optional
         Step of the readings, A; by default the largest step of which all readings are multiples.
     robust : bool, optional
@@ -197,7 +198,7 @@ class CurrentLaw:
         self._slopes: dict[bytes, FloatArray] = {}
 
     def space(self, start: FloatArray) -> Parameters:
-        """Return guess, bounds, prior and sizes of all parameters, from the guesses `start` of constants."""
+        """Return initial values, bounds, prior and sizes of all parameters; `start` holds the constants."""
         longest = max(float(trace.times[-1]) for trace in self.traces)
         peak = max(float(np.abs(trace.table.values["current"]).max()) for trace in self.traces)
         ends = [bounds_of(error, longest) for error in self.fitted]
@@ -220,7 +221,7 @@ class CurrentLaw:
         )
 
     def simulated(self, p: FloatArray, **added: float) -> FloatArray:
-        """Simulate the currents of all records as the probe shows them, with `added` probe errors."""
+        """Simulate the currents of all records as seen by the probe, including the probe errors `added`."""
         count = len(self.names)
         hammer = self.hammer.replace(dict(zip(self.names, p[:count].tolist(), strict=True)))
         probe = {error.name: error.value for error in self.errors}
@@ -243,7 +244,7 @@ class CurrentLaw:
         return np.concatenate(shown)
 
     def missing(self, p: FloatArray) -> dict[str, FloatArray]:
-        """Return the derivatives with respect to undeclared probe errors, by the advice that each implies."""
+        """Return d(current) / d(error) for every undeclared probe error, keyed by the advice for it."""
         short = _SHORT * self.step
         steps = {"offset": 1.0, "gain": 1.0, "delay": short, "time constant": short}
         unstated = [name for name in steps if name not in [error.name for error in self.errors]]
@@ -257,7 +258,7 @@ class CurrentLaw:
         return terms
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the currents; NaN if the constants are invalid."""
+        """Compute the currents of all records, A; NaN if the constants are invalid."""
 
         def made() -> FloatArray:
             try:
@@ -268,7 +269,7 @@ class CurrentLaw:
         return _kept(self._values, p, made)
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives with respect to the parameters, by central differences."""
+        """Compute the derivatives of the currents with respect to the parameters by central differences."""
 
         def made() -> FloatArray:
             sizes = {"offset": 1e-3, "gain": 1e-3, "delay": _SHORT * self.step, "time constant": 0.0}
@@ -306,7 +307,7 @@ class Averaged:
         self.share = np.minimum(np.maximum(1.0 - span / step, 0.0) ** 2 + 1.0 / self.rows**2, 1.0)
 
     def mean(self, values: FloatArray) -> FloatArray:
-        """Return the means of rows, shape (count,)."""
+        """Average rows over each quantisation plateau; the result has the shape (count,)."""
         return np.asarray(np.add.reduceat(values, self.begins, axis=0) / self.rows)
 
     def data(self, data: Data) -> Data:
@@ -320,11 +321,11 @@ class Averaged:
         )
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the means of the currents."""
+        """Compute the currents averaged over plateaus, A."""
         return self.mean(self.law.value(p))
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the means of the derivatives."""
+        """Compute the derivatives averaged over plateaus."""
         slopes = self.law.jacobian(p)
         return np.column_stack([self.mean(column) for column in slopes.T])
 
@@ -334,12 +335,12 @@ class Averaged:
 
 
 def _within(p: FloatArray, space: Parameters) -> FloatArray:
-    """Return the start of a second fit: the first result, but the prior mean where there is a prior."""
+    """Return the initial guess of a second fit: the first result; the prior mean where there is a prior."""
     return np.where(np.isfinite(space.deviation), space.start, np.clip(p, space.low, space.high))
 
 
 def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], FloatArray]) -> FloatArray:
-    """Return the cached value at parameters `p`, computing it on first use: a fit repeats requests."""
+    """Return the value at parameters `p`, cached since a fit evaluates the same point repeatedly."""
     key = p.tobytes()
     if key not in known:
         known[key] = made()
@@ -347,7 +348,7 @@ def _kept(known: dict[bytes, FloatArray], p: FloatArray, made: Callable[[], Floa
 
 
 def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, FloatArray]:
-    """Return the hammer with a resistance and an inductance, and the initial guesses."""
+    """Estimate missing resistance and inductance from a record; return the hammer and the initial guesses."""
     t, current = trace.table.values["time"], np.abs(trace.table.values["current"])
     top = int(np.argmax(current))
     if not (current[top] > 0.0 and trace.waveform.peak > 0.0):

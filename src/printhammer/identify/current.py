@@ -1,8 +1,8 @@
 """Coil current under a voltage as a current probe shows it: simulation, and reading of records.
 
 A record has the columns ``time`` and ``current``, optionally ``voltage``; one shot per file. The armature is
-free or locked. The probe is a first-order low-pass; between points at most 0.5 us apart the current is taken
-as linear.
+free or locked. The probe is a first-order low-pass; the current is interpolated linearly between points at
+most 0.5 us apart.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.tables.readings import Readings, read_table
 
 _FINEST: Final = 0.5e-6
-"""Largest time step of the current for the low-pass, s."""
+"""Largest time step of the current before low-pass filtering, s."""
 
 _MOST: Final = 2_000_000
-"""Largest number of steps in a record, which bounds the memory."""
+"""Largest number of time steps in a record; limits the memory use."""
 
 _LOCKED: Final = 1e9
-"""Mass of a locked armature, kg: in a second 100 N move it by 0.05 um."""
+"""Mass that stands for a locked armature, kg; 100 N displace it by only 0.05 um in one second."""
 
 _STEEP: Final = 0.3
-"""Change of the voltage from row to row, as a fraction of its range, that is an edge."""
+"""Voltage change between two rows, as a fraction of the voltage range, above which it counts as an edge."""
 
 _EDGES: Final = 8
 """Number of edges above which a voltage counts as continuous and is interpolated linearly; arbitrary."""
 
 _FLOWS: Final = 0.05
-"""Current at switch-on, as a fraction of the largest, above which the coil was on before; arbitrary."""
+"""Current at switch-on, as a fraction of the largest, above which the coil was already on; arbitrary."""
 
 _RAMP: Final = 1e-5
-"""Half the duration of an edge of a recorded voltage, over the time between its rows."""
+"""Half the duration of an edge of a recorded voltage, as a fraction of the time between its rows."""
 
 
 def check_driver(hammer: Hammer) -> None:
@@ -116,7 +116,7 @@ class Trace(Declared, eq=False):
         return float(np.median(np.diff(self.times)))
 
     def driven(self, shifts: FloatArray) -> Waveform:
-        """Return the voltage with its edges shifted from the middle between two rows by `shifts`, s."""
+        """Return the recorded voltage; each edge is shifted by `shifts`, s, from the middle between rows."""
         if not self.edges.size:
             return self.waveform
         t, volts = self.times, self.table.values["voltage"]

@@ -1,4 +1,4 @@
-"""Entry point of all fits: a kind of measurement, its tables, and a hammer with the known constants."""
+"""Entry point of all fits: selects the fit by kind of measurement, and supplies the known constants."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def fit(
 
 
 def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
-    """Sort two tables into the one with currents and the one without."""
+    """Sort two tables: first the one with currents, then the one without currents."""
     from printhammer.support.tables.readings import read_table
 
     columns = {"displacement": "m", "force": "N"}
@@ -104,7 +104,7 @@ def _magnet_and_spring(paths: list[Any]) -> tuple[list[Any], Any]:
 
 
 def _static(kind: str, table: Any, hammer: Hammer | None, options: dict[str, Any]) -> Fit:
-    """Fit a table; propagate the uncertainty of a known constant by central differences."""
+    """Fit a static table; propagate the uncertainty of a known constant by central differences."""
     name, key = _TAKEN[kind]
     known = None
     if options.get(name) is None:
@@ -126,11 +126,11 @@ _TAKEN: Final = {
     "pack": ("thickness", "pack.thickness"),
     "backstop": ("stiffness", "backstop.stiffness"),
 }
-"""Constant that each static fit takes as known: the name of the option, and the key in the hammer."""
+"""Known constant that each static fit requires: name of its option, and its key in the hammer."""
 
 
 def _known(hammer: Hammer | None, key: str) -> float | None:
-    """Return a known constant of a hammer, SI, or None; a stiffness may be derived from body properties."""
+    """Return a known constant of a hammer, SI, or None; the backstop stiffness may follow from its bodies."""
     if hammer is None:
         return None
     if key == "backstop.stiffness":

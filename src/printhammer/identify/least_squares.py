@@ -27,7 +27,7 @@ _FALSE_OUTLIERS: Final = 0.01
 """Expected number of good rows excluded per fit, for normal noise."""
 
 _EXACT: Final = 1e-11
-"""Residual, as a fraction of the data, below which it is rounding, not noise."""
+"""RMS residual, as a fraction of the largest datum, below which the data count as exact."""
 
 _ROUNDS: Final = 30  # Iteration limit of the fit
 
@@ -35,22 +35,22 @@ _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""
 
 _HOLDING: Final = 4.0
-"""Ratio of the variances of a parameter without and with rows above which they determine it; arbitrary."""
+"""Factor on the variance of a parameter, from omitting rows, above which the rows determine it; arbitrary."""
 
 _AT_BOUND: Final = 1e-6
 """Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""
 
 _SINGULAR: Final = 1e-12
-"""Smallest singular value of a Jacobian with normalised columns at which all parameters are determined."""
+"""Smallest singular value of the column-normalised Jacobian at which all parameters count as determined."""
 
 _TIED: Final = 0.5
-"""Component in the weakest direction, as a fraction of the largest, above which a parameter may be held."""
+"""Component in the weakest direction, as a fraction of the largest, above which a parameter may be fixed."""
 
 _RESISTS: Final = 1.0
-"""Increase of the weighted sum of squares, one standard error, up to which a parameter is held elsewhere."""
+"""Largest increase of the weighted sum of squares (one standard error) that fixing a parameter may cause."""
 
 _DIFFERENCES: Final = 1e-9
-"""Error of finite-difference derivatives, as a fraction of the largest datum."""
+"""Error of finite-difference derivatives, as a fraction of the largest datum magnitude."""
 
 
 class Law(Protocol):
@@ -138,12 +138,12 @@ class Solution(Declared, eq=False):
 
     @property
     def rows(self) -> FloatArray:
-        """Weighted Jacobian of used rows and free parameters, with a row for each prior."""
+        """Weighted Jacobian of the used rows and free parameters, with one extra row per prior."""
         return _weighted(self.jacobian, self.variance, self.used, self.parameters, self.free)
 
 
 class NoSolutionError(ArithmeticError):
-    """No parameters of a law fit the data; `row` deviates most from the initial prediction."""
+    """No parameters fit the data; `row` is the row with the largest deviation from the initial prediction."""
 
     def __init__(self, row: int) -> None:
         super().__init__(f"no parameters of the law come near the data, row {row} lies farthest off")
@@ -160,7 +160,7 @@ def solve(law: Law, data: FloatArray, start: FloatArray | Parameters, *, robust:
     Raises
     ------
     NoSolutionError
-        The parameters diverge, or the law is not finite on the way.
+        The parameters diverge, or the law becomes non-finite during the iteration.
     """
     space = start if isinstance(start, Parameters) else Parameters.of(start)
     free = np.ones(len(space.start), dtype=bool)
@@ -227,7 +227,7 @@ def _undetermined(solution: Solution, data: FloatArray) -> int | None:
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Return parameters with one held at rest, or where it is if at a bound or if the data resist."""
+    """Fix a parameter at its rest value if the data allow that, else at its value; return all parameters."""
     p, space = solution.p.copy(), solution.parameters
     if _at_bound(solution)[held]:
         return p
@@ -300,7 +300,7 @@ def _solve(
 
 
 def _keep_what_holds(rows: FloatArray, inside: BoolArray) -> BoolArray:
-    """Return a mask of rows that leaves no parameter undetermined.
+    """Return a mask of used rows that leaves no parameter undetermined.
 
     Rows determine a parameter if its variance without them is more than `_HOLDING` times as large; such rows
     are included even if they are outliers. `rows` is the weighted Jacobian, shape (m and more, n); masks have
@@ -324,7 +324,7 @@ def _keep_what_holds(rows: FloatArray, inside: BoolArray) -> BoolArray:
 def _weighted(
     jacobian: FloatArray, variance: FloatArray, used: BoolArray | None, space: Parameters, free: BoolArray
 ) -> FloatArray:
-    """Return the weighted Jacobian of the free parameters, with a row for each prior."""
+    """Return the weighted Jacobian of the free parameters, with one extra row per prior."""
     rows = jacobian[:, free] / np.sqrt(variance)[:, None]
     rows = rows if used is None else rows[used]
     known = np.isfinite(space.deviation)
@@ -410,19 +410,19 @@ def sandwich(rows: FloatArray, errors: FloatArray) -> tuple[FloatArray, FloatArr
 
 
 def leverage(rows: FloatArray) -> FloatArray:
-    """Return the leverage of each row, 0 to 1, shape (m,)."""
+    """Return the leverage of each row of a weighted Jacobian, 0 to 1, shape (m,)."""
     shares: FloatArray = np.sum(_basis(rows) ** 2, axis=1)
     return shares
 
 
 def _basis(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the column space, shape (m, rank)."""
+    """Return an orthonormal basis of the column space of a matrix, shape (m, rank)."""
     basis, singular, _ = np.linalg.svd(rows / lengths_of(rows), full_matrices=False)
     return basis[:, singular > 1e-12 * singular[0]] if singular.size else basis
 
 
 def lengths_of(rows: FloatArray) -> FloatArray:
-    """Return the Euclidean norms of the columns; 1 for a zero column."""
+    """Return the Euclidean norms of the columns of a matrix; 1 for a zero column."""
     lengths: FloatArray = np.linalg.norm(rows, axis=0)
     lengths[lengths == 0.0] = 1.0
     return lengths

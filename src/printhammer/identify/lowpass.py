@@ -1,4 +1,4 @@
-"""Exact first-order low-pass filter of a motion or a waveform, for sensors of limited bandwidth.
+"""Exact first-order low-pass filter for motions and waveforms; models sensors of limited bandwidth.
 
 The output y of a sensor of bandwidth f (-3 dB) obeys tau y' = u - y with tau = 1 / (2 pi f). If u is a
 polynomial p, a particular solution is p - tau p' + tau^2 p'' - ..., and the transient decays as exp(-t /
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 def time_constant(bandwidth: float | None) -> float:
-    """Return the time constant, s, of a sensor of a bandwidth, Hz; 0 for None (unlimited)."""
+    """Return the time constant, s, of a first-order sensor with the bandwidth, Hz; 0 for None (unlimited)."""
     return 0.0 if bandwidth is None else 1.0 / (2.0 * math.pi * bandwidth)
 
 
 def bandwidth_of(table: Readings) -> float | None:
-    """Return the bandwidth stated in a comment of a table, Hz; None without a limit."""
+    """Return the bandwidth stated in a comment of a table, Hz; None if unlimited."""
     text = table.comments.get("bandwidth", "")
     if text in ("", "none", "unlimited"):
         return None
@@ -45,7 +45,7 @@ def bandwidth_of(table: Readings) -> float | None:
 
 
 def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) -> FloatArray:
-    """Filter motions that were at rest until the first time, shape (n, columns).
+    """Low-pass filter motions that are at rest until the first time, shape (n, columns).
 
     Displacements, m, and velocities, m/s, of several motions, or their derivatives, are columns at ascending
     times, s. Between the times the displacement is the cubic Hermite interpolant.
@@ -67,9 +67,9 @@ def lowpass_motion(times: FloatArray, x: FloatArray, v: FloatArray, tau: float) 
 
 
 def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArray:
-    """Filter a piecewise linear signal given at ascending times, s, shape (n,).
+    """Low-pass filter a piecewise linear signal, sampled at ascending times, s, shape (n,).
 
-    The output is settled at the first value.
+    At the first time the output equals the input.
     """
     if tau == 0.0 or len(times) < 2:
         return values.copy()
@@ -83,7 +83,7 @@ def lowpass_lines(times: FloatArray, values: FloatArray, tau: float) -> FloatArr
 
 
 def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> FloatArray:
-    """Filter a waveform that is fired at time 0, A or N; return the output at ascending times, s.
+    """Low-pass filter a waveform, A or N, fired at time 0; return the output at ascending times, s.
 
     The waveform is a segment table, see `printhammer.drive.segments`, with finite support; the time constant
     is positive.
@@ -106,7 +106,7 @@ def lowpass_waveform(segments: FloatArray, t: npt.ArrayLike, tau: float) -> Floa
 
 
 def _settled(row: list[float], s: FloatArray, tau: float) -> FloatArray:
-    """Return the particular solution of the low-pass for one segment, without the transient."""
+    """Return the particular solution of the low-pass filter for one segment, without the transient."""
     _start, kind, p0, p1, p2, p3 = row
     if kind == POLYNOMIAL:
         value = p0 + s * (p1 + s * (p2 + s * p3))

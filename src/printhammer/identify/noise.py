@@ -1,4 +1,4 @@
-"""Noise of residuals and records: scale, outliers, autocorrelation, variance components."""
+"""Noise of residuals and records: scale, outliers, autocorrelation, and variance components."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from printhammer.support.arrays import BoolArray, FloatArray
 
 _MAD: Final = 1.482602218505602
-"""Standard deviation of a normal distribution over its median absolute deviation."""
+"""Ratio of the standard deviation of a normal distribution to its median absolute deviation."""
 _SPIKE: Final = 10.0  # Factor on the noise above which a reading is a spike
 _FAR: Final = 4.5
-"""Threshold of outliers, in standard deviations: exceeded by less than one of 100 000 normal residuals."""
+"""Outlier threshold, in standard deviations; fewer than 1 in 100 000 normal residuals exceed it."""
 _LONGEST_MEMORY: Final = 8  # Largest lag of the autocorrelation of the noise
 
 _CLIP: Final = 2.5
@@ -43,19 +43,19 @@ def running_median(values: FloatArray, width: int) -> FloatArray:
 
 
 def spikes_of(values: FloatArray, noise: float) -> BoolArray:
-    """Mask of the samples that differ from their neighbours by more than noise and slope explain."""
+    """Mask of the samples that differ from their neighbours by more than noise and slope can explain."""
     middle = running_median(values, 5)
     padded = np.pad(middle, 2, mode="edge")
     return np.abs(values - middle) > _SPIKE * noise + np.abs(padded[4:] - padded[:-4])
 
 
 def outliers_of(residuals: FloatArray, floor: float) -> BoolArray:
-    """Mask of the residuals beyond the outlier threshold, in robust standard deviations or `floor`."""
+    """Mask of the outliers: residuals above the threshold times the robust standard deviation or `floor`."""
     return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
 
 
 def memory_factor(residuals: FloatArray) -> float:
-    """Return the variance of a slow average relative to that of independent residuals.
+    """Return the ratio by which autocorrelation increases the variance of a long average of residuals.
 
     An autoregressive process is fitted (Yule-Walker equations), with its order by the Bayesian information
     criterion; the factor is its spectral density at frequency 0 over its variance, 1 for white noise.

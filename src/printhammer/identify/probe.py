@@ -33,7 +33,7 @@ SIGNS: Final = {
     "delay": "the current comes late or early, as by a delay of the probe: state it, or fit it",
     "time constant": "the current is smoother, as by the bandwidth of the probe: state it, or fit it",
 }
-"""Advice for each undeclared probe error that a record shows."""
+"""Advice for each undeclared probe error that a record reveals, by name of the error."""
 
 _WIDEST: Final = 0.2
 """Upper bound of a fitted time constant, as a fraction of the length of the longest record."""
@@ -53,21 +53,21 @@ class ProbeError(Declared):
 
     @property
     def key(self) -> str:
-        """Name in a result."""
+        """Key of the probe error in a fit result, such as "probe.gain"."""
         return f"probe.{self.name.replace(' ', '_')}"
 
     @property
     def text(self) -> str:
-        """Value with unit, and with its standard deviation unless it is exact."""
+        """Value with its unit, and with its standard deviation unless exact."""
         unit = UNITS[self.name]
         return f"{self.value!r} {unit}" + (f" +- {self.deviation:.3g} {unit}" if self.deviation else "")
 
 
 def read_probe(settings: Mapping[str, float | str | None], step: float) -> list[ProbeError]:
-    """Read the declared errors of a probe; `step` is the sampling interval, s.
+    """Parse the declared errors of a probe; `step` is the sampling interval, s.
 
     Settings are "offset", A, "gain", "delay", s, and "bandwidth", Hz: a number or a text with a unit, a value
-    with its standard deviation such as "0 us +- 5 us", or "fit". None means not declared.
+    with its standard deviation such as "0 us +- 5 us", or "fit". None stands for an undeclared error.
     """
     errors = []
     for name, written in settings.items():
@@ -103,7 +103,7 @@ def _read(name: str, written: float | str) -> tuple[float, float]:
 
 
 def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
-    """Return the bounds of a probe error, SI, for records of a duration, s."""
+    """Return the bounds of a probe error, SI, for records of a given duration, s."""
     if error.name == "gain":
         return 0.1 * error.value, 10.0 * error.value
     if error.name == "time constant":
@@ -113,7 +113,7 @@ def bounds_of(error: ProbeError, longest: float) -> tuple[float, float]:
 
 
 def resolution_of(values: FloatArray) -> float:
-    """Return the quantisation step of readings; 0 if there is none, or if too few values repeat."""
+    """Return the quantisation step of readings; 0 if they are not quantised, or if too few values repeat."""
     levels = np.unique(values)
     if len(levels) < 3 or len(levels) == len(values):
         return 0.0
@@ -123,11 +123,11 @@ def resolution_of(values: FloatArray) -> float:
 
 
 _WHOLE: Final = 0.02
-"""Largest distance of readings from multiples of the resolution, as a fraction of it; rounding in files."""
+"""Largest deviation from multiples of the resolution, as a fraction of the step; allows for file rounding."""
 
 
 def plateaus(fitted: FloatArray, series: IntArray, step: float) -> IntArray:
-    """Return plateau indices: consecutive rows whose fitted values round to the same step share one."""
+    """Return the plateau index of each row: consecutive rows with equal rounded fitted values share one."""
     code = np.rint(fitted / step)
     begins = (np.diff(code) != 0.0) | (np.diff(series) != 0)
     return np.concatenate([[0], np.cumsum(begins)]).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Result of a fit: constants with their uncertainty, and diagnostics of data and law."""
+"""Result of a fit: constants with their uncertainty, and diagnostics of the data and the law."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ CONFIDENCE: Final = 0.95
 """Confidence level of the intervals."""
 
 LAWS: Final = {"magnet": "inverse-root", "spring": "linear", "pack": "power", "backstop": "hertz"}
-"""Fitted law by role; the magnet has another one for the kind "solenoid"."""
+"""Fitted law by role; the kind "solenoid" fits another magnet law."""
 
 _BODIES: Final = (
     "radius1",
@@ -45,18 +45,18 @@ REPLACED: Final = {
     "backstop.stiffness": [f"backstop.{name}" for name in _BODIES],
     "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
-"""Constants that a stated constant, the key, replaces because they would determine it too."""
+"""Keys removed when a fitted constant, the key of the mapping, is set, because both determine one value."""
 
 
 HELD: Final = "held, the data do not determine it"
-"""Source text of a constant that was held."""
+"""Source text of a constant that was held during the fit."""
 
 _SHOWN_IN: Final = {"m": "um", "kg": "g", "s": "us"}
-"""Units of display for constants in m, kg and s."""
+"""Display units of constants in m, kg and s."""
 
 
 class FittedConstant(Declared):
-    """One fitted constant."""
+    """Fitted constant, with its standard error and interval."""
 
     key: str = part(
         'dotted key of the hammer file, such as "magnet.F0"; another name where `in_file` is false'
@@ -91,7 +91,7 @@ class FittedConstant(Declared):
         in_file: bool = True,
         how: str = "",
     ) -> Self:
-        """Create a constant with its 95 % interval of Student's t for given degrees of freedom."""
+        """Create a constant with its 95 % interval (Student's t with the given degrees of freedom)."""
         half = student(degrees_of_freedom) * float(standard_error)
         ends = float(value) - half, float(value) + half
         return cls(key, float(value), float(standard_error), ends, unit, in_file, how)
@@ -114,7 +114,7 @@ class FittedConstant(Declared):
 
 
 class Profile(Declared, eq=False):
-    """Profile of the weighted sum of squares over one constant, with the others refitted."""
+    """Profile likelihood of one constant: weighted sum of squares with the other constants refitted."""
 
     values: FloatArray = part("values at which the constant is held, SI, ascending, shape (n,)")
     increase: FloatArray = part(
@@ -196,7 +196,7 @@ class Fit(Result):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title of the fit."""
         return f"fit of the {self.kind} to {', '.join(self.source)}"
 
     def summary(self) -> Summary:
@@ -230,7 +230,7 @@ class Fit(Result):
         return f"{self.correlation[first, second]:.2f} at most, of {self.keys[first]} and {self.keys[second]}"
 
     def entries(self) -> Entries:
-        """Return the data over `datum`, the constants over `constant`, and their covariance."""
+        """Return the columns: data along `datum`, constants along `constant`, and their covariance."""
         entries = super().entries()
         for name, (meaning, unit) in zip(
             ("abscissa", "data", "fitted", "residuals"), (self.axes[0], *[self.axes[1]] * 3), strict=True
@@ -267,7 +267,7 @@ class Fit(Result):
 
     @property
     def for_file(self) -> dict[str, dict[str, str | float]]:
-        """Constants with a key in hammer files, as tables for `Hammer.replace` with status and source."""
+        """Constants with a key in hammer files, as tables with status and source for `Hammer.replace`."""
         return {
             key: {
                 "value": constant.value,
@@ -377,7 +377,7 @@ class Fit(Result):
 
     @property
     def report(self) -> list[str]:
-        """The result as lines of text."""
+        """The fit as a report, in lines of text."""
         lines = []
         for constant in self.constants.values():
             low, high = constant.interval
@@ -403,7 +403,7 @@ class Fit(Result):
         return [*lines, *self.indistinct, *self.remarks]
 
     def outlier_lines(self, most: int = 20) -> str:
-        """List the excluded rows as text, with their series if there are several files."""
+        """List the excluded rows as text; names their series if there are several files."""
         rows = [int(row) for row in np.flatnonzero(self.outliers)]
         count = f"{len(rows)} outlier{'s' if len(rows) > 1 else ''} left out"
         if not len(self.lines):

@@ -1,4 +1,4 @@
-"""The verbs `bifurcation` and `basins`: attractors against a parameter, and the states that lead to them."""
+"""The verbs `bifurcation` and `basins`: attractors against a parameter, and their basins of attraction."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def bifurcation(
     show: str = opt.choice("x|v", "Quantity on the vertical axis of the plot.", default="x"),
     **passed: Any,
 ) -> Answer:
-    """Compute a bifurcation diagram: periodic and strange (chaotic) motions against a parameter.
+    """Compute a bifurcation diagram: periodic and chaotic (strange) motions against a parameter.
 
     The exit status is 1 if a run stopped early. Ctrl-C writes the finished part.
     """
@@ -107,7 +107,7 @@ def bifurcation(
 def _axis(
     hammer: Hammer, parameter: str, ends: tuple[str | None, str | None], count: int, firing: Firing
 ) -> dict[str, Any]:
-    """Return the parameter and its values as arguments of `printhammer.bifurcation`."""
+    """Return the name and the values of the parameter, as arguments of `printhammer.bifurcation`."""
     import numpy as np
 
     from printhammer.drive.input import read_number

@@ -1,4 +1,4 @@
-"""The verbs `dead-time`, `impact-time` and `duty`: timing of the impact, and heating of the coil."""
+"""The verbs `dead-time`, `impact-time` and `duty`: timing of the impact, and heat in the coil."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def dead_time(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Tabulate the dead time, from switch-on to impact, and the pulse width of equal impact speed."""
+    """Tabulate the dead time, from switch-on to impact, and the pulse width that keeps the impact speed."""
     from printhammer.control.dead_time import dead_time as timed
 
     grid: dict[str, Any] = {
@@ -100,7 +100,7 @@ def impact_time(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Estimate impact times from samples of the coil current or voltage, and report their error."""
+    """Estimate impact times from samples of the coil current or voltage, and report the estimation error."""
     from printhammer.control.impact_estimator import UNITS
     from printhammer.control.impact_time import impact_time as studied
 
@@ -181,7 +181,7 @@ def duty(
     ),
     **passed: Any,
 ) -> Answer:
-    """Compute the highest continuous rate of a coil at an ambient temperature, and limits of bursts."""
+    """Compute the highest continuous rate of a coil at an ambient temperature, and the limits of bursts."""
     if rates is not None:
         from printhammer.control.thermal_limit import read_rates, thermal_limit
         from printhammer.errors import located
@@ -213,7 +213,7 @@ def duty(
 
 
 def _heat(hammer: Hammer, passed: dict[str, Any]) -> Any:
-    """Return the heat of one dot of a hammer, as a function of the winding temperature."""
+    """Return the coil heat per dot, J, as a function of the winding temperature."""
     from printhammer.control.duty import heat_of
 
     if "feed" in passed:

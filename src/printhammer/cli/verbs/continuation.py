@@ -1,4 +1,4 @@
-"""The verbs `continue` and `curve`: orbits in one parameter, bifurcations in two."""
+"""The verbs `continue` and `curve`: orbits followed in one parameter, bifurcations in two parameters."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def continue_(
 
 
 def both(low: str | None, high: str | None, first: str, last: str, parameter: str) -> tuple[str, str]:
-    """Return both ends of a range; raise InputError if one is missing."""
+    """Return both ends of a range; raise InputError if an end is missing."""
     if low is None or high is None:
         raise InputError(
             f"{first if low is None else last} is missing",
@@ -179,7 +179,7 @@ def _followed(
 
 
 def read_event(written: str, name: str) -> int | str:
-    """Parse the index or the kind of an event."""
+    """Parse the event of a branch: its index or its kind."""
     from printhammer.chaos.curves.starts import FIRST, LAST
     from printhammer.chaos.curves.systems import KINDS
 
@@ -240,7 +240,7 @@ def curve(
 ) -> Answer:
     """Continue a fold, period doubling or grazing of a periodic orbit in two parameters.
 
-    Reports where the curve ends, and its points of codimension two.
+    Reports where the curve ends, and the codimension-two points on it.
     """
     from printhammer.chaos.continuation.continuation import continuation
     from printhammer.chaos.curves.bifurcation_curve import bifurcation_curve

@@ -1,4 +1,4 @@
-"""The verbs `energy` and `feedback`: a burst of least work, and closed-loop drive."""
+"""The verbs `energy` and `feedback`: bursts of least work, and closed-loop drive."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def energy(
     """Optimise the current of a burst for least work: the swing drive of the paper's discussion.
 
     Each dot reaches the required force; the hammer starts and ends at rest. The exit status is 1 if a dot
-    is not adequate.
+    fails to reach the force.
     """
     from printhammer.control.least_work.burst import least_work
 
@@ -152,7 +152,7 @@ def feedback(
     units: Units = opt.UNITS,
     **passed: Any,
 ) -> Answer:
-    """Print all patterns of eight slots, and two dots at all distances, with position feedback.
+    """Simulate all patterns of eight slots, and two dots at all distances, with position feedback.
 
     The exit status is 1 if a pattern exceeds the limits with feedback.
     """

@@ -1,4 +1,4 @@
-"""The verb `fit`: constants from measurements, one sub-verb for each kind of table."""
+"""The verb `fit`: constants fitted to measurements, one sub-verb for each kind of table."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 GROUP: Final = "Fit constants to measurements: CSV tables whose header gives the unit of each column."
 _MEASURED: Final = "printhammer measure all hendriks-1983 --out lab --force &&"
-"""Makes the tables that the examples read."""
+"""Command that makes the tables that the examples read."""
 
 EXAMPLE: Final = (
     f"{_MEASURED} printhammer fit magnet lab/magnet.csv --spring lab/spring.csv --hammer hendriks-1983"
@@ -80,7 +80,8 @@ def magnet(
 ) -> Answer:
     """Fit F0, Am and Bm of the magnet, and Bs and As of the spring.
 
-    The sum of magnet and spring forces does not separate F0 from Bs: add the spring alone with --spring.
+    The sum of magnet and spring forces does not separate F0 from Bs: add a table of the spring alone with
+    --spring.
     """
     from printhammer.drive.input import read_number
     from printhammer.identify.fitting import fit
@@ -162,7 +163,7 @@ def pack(
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Fit the stiffness of the pack, and with --exponents its exponents."""
+    """Fit the stiffness of the pack, and with --exponents the exponents of its law."""
     from printhammer.identify.fitting import fit
 
     return _fitted(job, hammer, strict, lambda known: fit("pack", file, hammer=known, **passed))
@@ -246,9 +247,9 @@ def motion(
 ) -> Answer:
     """Fit the mass, the damping of the backstop and other constants to records of single shots.
 
-    Constants with standard errors in the hammer file, as written by --into of other fits, enter as priors
-    and are refined; the others are exact. The tables of --magnet, --spring, --pack and --backstop are fitted
-    first.
+    Constants with standard errors in the hammer file, as written by --into of other fits, enter as priors and
+    are refined; all other constants count as exact. The tables of --magnet, --spring, --pack and --backstop
+    are fitted first.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -302,10 +303,10 @@ def coil(
     strict: bool = _STRICT,
     **passed: Any,
 ) -> Answer:
-    """Fit resistance and inductance of the coil, a shorted turn or the saturation, to its current.
+    """Fit resistance and inductance of the coil, optionally a shorted turn or saturation, to current records.
 
-    The hammer's driver, or the voltage column of the table, drives the coil. The initial guess is the values
-    of --hammer.
+    The hammer's driver, or the voltage column of the table, drives the coil. The hammer supplies the initial
+    guesses.
     """
 
     def made(known: Hammer | None) -> Fit:
@@ -326,7 +327,7 @@ def _keys(text: str) -> list[str]:
 
 
 def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[Fit]:
-    """Fit the tables of single parts; the hammer supplies the other constants."""
+    """Fit the tables of single parts; the hammer supplies the remaining constants."""
     from printhammer.identify.fitting import fit
 
     rest = dict(tables)
@@ -342,7 +343,7 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
 
 
 def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer | None], Fit]) -> Answer:
-    """Run a fit and return its summary and files."""
+    """Run a fit; return its summary and its files."""
     from printhammer.hammer.hammer import load
     from printhammer.support.files import write_file
 

@@ -99,7 +99,7 @@ def schema(job: Job) -> Answer:
 
 @verb("hammer list", "printhammer hammer list")
 def list_shipped() -> Answer:
-    """List the hammers that come with the program."""
+    """List the shipped hammers."""
     from printhammer.hammer.hammer import load, shipped
 
     columns: tuple[Column[str], ...] = (
@@ -110,7 +110,7 @@ def list_shipped() -> Answer:
 
 
 def numbered(sources: list[str]) -> list[str]:
-    """Return the numbered list of sources to which the table of constants refers."""
+    """Return the numbered list of sources that the table of constants refers to."""
     lines = (f"[dim]{number}  {escape(source)}[/dim]" for number, source in enumerate(sources, 1))
     return ["\n[bold]sources[/bold]", *lines]
 
@@ -147,7 +147,7 @@ def constants_table(hammer: Hammer, sources: list[str]) -> Table:
 
 
 def statics(hammer: Hammer, picture: EquilibriumPicture) -> Summary:
-    """Return rest state, equilibria, release current and holding margin."""
+    """Return the facts on statics: rest state, equilibria, release current and holding margin."""
     from printhammer.hammer.equilibrium import holding_margin
     from printhammer.results.summary import FactRow, Facts, Summary, judged, quantity, styled
 
@@ -181,7 +181,7 @@ def statics(hammer: Hammer, picture: EquilibriumPicture) -> Summary:
 
 
 POOR = 0.15
-"""Relative misfit of a force above which a fit is called poor."""
+"""Relative deviation of a force from the data sheet above which the fit is called poor."""
 
 
 @verb(

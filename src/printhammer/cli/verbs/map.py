@@ -1,4 +1,4 @@
-"""The verb `map`: displacement against time and firing rate, alone or beside a measured map."""
+"""The verb `map`: displacement against time and firing rate, optionally beside a measured map."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def map_(
 
 
 def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -> int:
-    """Return the number of the paper's figure whose style the picture follows."""
+    """Return the number of the figure of the paper whose style the picture follows."""
     if figure is None:
         return 9
     if not any(path.suffix.lower() in PICTURES for path in outputs):
@@ -114,7 +114,7 @@ def _axes(
     rates: int | None,
     times: int | None,
 ) -> tuple[FloatArray, FloatArray | int]:
-    """Return the rates, Hz, and the times, s, or their number; a measured map supplies the defaults."""
+    """Return the rates, Hz, and the times, s, or their numbers; a measured map supplies the defaults."""
     import numpy as np
 
     from printhammer.maps.frequency import MOST_CELLS, RATES, TIMES, default_rates
@@ -146,7 +146,7 @@ def _axes(
 
 
 def _complaints(chart: xr.Dataset) -> list[str]:
-    """Return a complaint for each status of runs that stopped early, with their rates."""
+    """Return one complaint for each status of runs that stopped early, with the rates of those runs."""
     from printhammer.maps.layout import failed_rates
 
     complaints = []

@@ -1,4 +1,4 @@
-"""The verb `measure`: synthetic measurements of a hammer, in the format of a laboratory."""
+"""The verb `measure`: synthetic measurements of a hammer, in the format of laboratory tables."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def measure(
 
 
 def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str, Path]]:
-    """Return the kinds of measurement and the file of each."""
+    """Check the output; return the requested kinds of measurement, and the file of each kind."""
     from printhammer.identify.bench.laboratory import KINDS
     from printhammer.support.files import check_outputs
 
@@ -123,7 +123,7 @@ def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str,
 
 
 def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the sensor settings of each kind; each setting must apply to at least one kind."""
+    """Return the sensor settings of each kind; raise InputError for a setting that applies to no kind."""
     from printhammer.identify.bench.laboratory import SENSORS, SI
     from printhammer.identify.bench.sensor import PARTS, applicable, by_quantity
 
@@ -144,7 +144,7 @@ def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str,
 
 
 def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any]]:
-    """Return the bench options of each kind; each option must apply to at least one kind."""
+    """Return the bench options of each kind; raise InputError for an option that applies to no kind."""
     from inspect import signature
 
     from printhammer.drive.input import read_number
@@ -170,7 +170,7 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
 
 
 def _possible(kinds: list[str], hammer: Hammer) -> list[str]:
-    """Return the kinds that the hammer allows, and announce the others; "current" needs a voltage drive."""
+    """Return the kinds that the hammer allows; announce the others ("current" needs a voltage drive)."""
     waveform = hammer.waveform
     if waveform is None or waveform.unit != "V":
         kinds = [kind for kind in kinds if kind != "current"]

@@ -135,7 +135,7 @@ def quality(
     threads: int | None = opt.THREADS,
     units: Units = opt.UNITS,
 ) -> Answer:
-    """Report the print quality at a rate; or find the safe rate, the yield, or better materials.
+    """Report the print quality at a rate; or compute the safe rate, the yield, or better materials.
 
     The exit status is 1 if a run stopped early.
     """
@@ -215,7 +215,7 @@ _TAKES: Final = {
 
 
 def _only(task: str, options: set[str]) -> None:
-    """Raise InputError if an option belongs to another task."""
+    """Raise InputError if an option is set that belongs to another task."""
 
     def named(name: str) -> str:
         return "the report" if name == "report" else f"--{name}"
@@ -230,7 +230,7 @@ def _only(task: str, options: set[str]) -> None:
 
 
 def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
-    """Parse the spreads: one number for all constants, and others by key."""
+    """Parse the relative spreads: one number for all constants, and exceptions by key."""
     from printhammer.printing.rates.tolerance import spreads_of
 
     if not texts:
@@ -327,7 +327,8 @@ def print_(
 ) -> Answer:
     """Print a text or a dot pattern at a rate, and draw the page.
 
-    Each wire has a hammer; each print line starts from rest. The exit status is 1 if a run stopped early.
+    Every wire has its own hammer; every print line starts from rest. The exit status is 1 if a run stopped
+    early.
     """
     from printhammer.drive.input import read_positive
     from printhammer.printing.dots.judging import limits_named

@@ -1,4 +1,4 @@
-"""The verb `run`: one hammer, one drive, its dots on the terminal and files on request."""
+"""The verb `run`: simulate one hammer under one drive; show its dots and write files on request."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     out=opt.results("the points"),
 )
 def strobe(job: Job, hammer: Hammer = opt.HAMMER, units: Units = opt.UNITS, **passed: Any) -> Answer:
-    """Sample the state at each firing of a periodic drive; classify the motion as periodic or strange.
+    """Sample the state at each firing of a periodic drive; classify the motion as periodic or chaotic.
 
     The exit status is 1 if the run stopped early.
     """

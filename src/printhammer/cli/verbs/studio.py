@@ -1,4 +1,4 @@
-"""The verbs `studio` and `warm`: the laboratory in a browser, and machine code compiled beforehand."""
+"""The verbs `studio` and `warm`: the studio in a browser, and compilation ahead of time."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ _KERNELS: Final[dict[str, Callable[[Hammer], None]]] = {
 
 
 def _compile_code(name: str, hammer: Hammer) -> tuple[str, float]:
-    """Compile or load one kind of machine code in a separate process; return its name and the time, s."""
+    """Compile or load one kind of machine code in a separate process; return its name and the duration, s."""
     start = time.perf_counter()
     _KERNELS[name](hammer)
     return name, time.perf_counter() - start
@@ -94,7 +94,7 @@ def _announce(sentences: SimpleQueue[str | None]) -> None:
 
 @contextmanager
 def _print_messages(sentences: SimpleQueue[str | None]) -> Iterator[None]:
-    """Print the sentences that other processes put into a queue."""
+    """Print the messages that worker processes put into a queue."""
 
     def work() -> None:
         while (sentence := sentences.get()) is not None:

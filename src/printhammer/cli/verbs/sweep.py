@@ -1,4 +1,4 @@
-"""The verb `sweep`: many hammers under many drives, into a store that can be continued."""
+"""The verb `sweep`: many hammers under many drives, saved in a store that can be resumed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def sweep(
 ) -> Answer:
     """Run a sweep over any constants, drives and initial states.
 
-    The same command resumes an interrupted sweep. A run that fails is a row with a status.
+    The same command resumes an interrupted sweep. A failed run becomes a row with its status.
     """
     if schema:
         from printhammer.sweep import tables
@@ -124,7 +124,7 @@ class SweepProgress:
             self._bar.stop()
 
     def tell(self, done: float, before: int, members: int) -> None:
-        """Update the progress: members done, done before this run, and in total."""
+        """Update the progress display: members done, members done before this run, and total members."""
         now = time.monotonic()
         if self.new <= 0.0 and done <= before:
             # Exclude compiling and the connection to a cluster from the rate.
@@ -140,7 +140,7 @@ class SweepProgress:
 
 
 def progress_text(done: float, before: int, members: int, seconds: float) -> str:
-    """Return the progress text: members done, rate, and time left."""
+    """Format the progress: members done, rate, and time left."""
     text = f"{int(done)} of {members} members"
     new = done - before
     if new <= 0.0 or seconds <= 0.0:
@@ -150,7 +150,7 @@ def progress_text(done: float, before: int, members: int, seconds: float) -> str
 
 
 def duration_text(seconds: float) -> str:
-    """Return a duration in two units at most, such as "2 h 5 min"."""
+    """Format a duration in at most two units, such as "2 h 5 min"."""
     whole = math.ceil(seconds)
     days, hours, minutes = whole // 86400, whole // 3600 % 24, whole // 60 % 60
     if days:

@@ -1,4 +1,4 @@
-"""The verbs `tune` and `learn`: compensation tables from the model, or from the dots of a unit."""
+"""The verbs `tune` and `learn`: compensation tables from the model, or from the dots of a real unit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def tuned_along(
     options: dict[str, Any],
     units: Units,
 ) -> Answer:
-    """Tune one table per value of an axis, such as 'rail 90 V, 110 V, 3'; `header` holds the tick, if any."""
+    """Tune one table per value of an axis, such as 'rail 90 V, 110 V, 3'; `header` holds the timer tick."""
     from printhammer.control.axes import tune_along
 
     axis, values = _read(along)
@@ -44,7 +44,7 @@ def tuned_along(
 
 
 def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None, units: Units) -> Any:
-    """Show the table, rounded to the tick if any, check its size against the budget, and return it."""
+    """Show the table, rounded to the tick if any; check its size against the budget; return the table."""
     made = made.quantised(header["tick"]) if header else made
     made.to_header(budget=budget, **header)
     size = f", {made.size(**header)} bytes in a C header"
@@ -53,7 +53,7 @@ def _show_table(job: Job, made: Any, header: dict[str, Any], budget: int | None,
 
 
 def _read(written: str) -> tuple[str, list[float]]:
-    """Parse an axis and its values."""
+    """Parse an axis and its values, such as 'rail 90 V, 110 V, 3'."""
     from printhammer.control.axes import AXES
 
     axis, _, rest = written.strip().partition(" ")
@@ -164,7 +164,7 @@ def tune(
 
 
 def save_table(made: CompensationTable, header: dict[str, Any], path: Path) -> None:
-    """Write the table; a C header holds ticks of the timer."""
+    """Write the table to a file; a C header states times in ticks of the timer."""
     from printhammer.support.files import write_file
 
     if path.suffix.lower() == ".h":
@@ -262,7 +262,8 @@ def learn(
 ) -> Answer:
     """Learn the compensation table of a unit from the impact times of its test lines.
 
-    The exit status is 1 if, by the readings, the unit probably prints dots beyond the limits in the end.
+    The exit status is 1 if the readings suggest that the unit still prints dots beyond the limits after
+    learning.
     """
     import numpy as np
 
@@ -315,7 +316,7 @@ def learn(
 
 
 def _from_coil(job: Job, hammer: Hammer, signal: Any, noise: str | None) -> dict[str, float]:
-    """Return the error model of impact times from coil samples: noise, offset and fraction missed."""
+    """Return the error model of impact times estimated from coil samples: noise, offset, fraction missed."""
     from dataclasses import asdict
 
     from printhammer.control.impact_time import impact_time

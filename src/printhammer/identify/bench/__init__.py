@@ -1,1 +1,1 @@
-"""The synthetic laboratory: benches and sensors."""
+"""Synthetic laboratory: simulated test benches and sensors."""

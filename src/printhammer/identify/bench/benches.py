@@ -1,13 +1,13 @@
-"""The benches of the synthetic laboratory: true values of each measurement, before sensor errors.
+"""Test benches of the synthetic laboratory: true values of each measurement, before sensor errors.
 
 magnet
     Armature held on a grid of displacements and currents, pack absent: force of magnet and spring.
 spring
-    The same with the magnet removed.
+    Armature held at several displacements, magnet removed: force of the spring.
 pack
-    Slow load cycles to several indentations: the loading branch up, the unloading branch down.
+    Slow load cycles to several peak indentations: force on the loading and unloading branches.
 backstop
-    The armature alone thrown at the backstop at several speeds: rebound speed.
+    Armature alone, thrown at the backstop at several speeds: rebound speed.
 motion
     One shot from rest: displacement and current, from shortly before the firing.
 current
@@ -42,12 +42,12 @@ DISPLACEMENTS: Final = 31
 
 CURRENTS: Final = 6
 HIGHEST_CURRENT: Final = 1.25
-"""Default number of currents, and the highest current relative to the peak of the waveform."""
+"""Default number of currents, and the highest current as a multiple of the waveform's peak."""
 
 PEAKS: Final = (0.3, 0.45, 0.6)
-"""Default peak indentations of the load cycles, relative to the thickness of the pack.
+"""Default peak indentations of the load cycles, as fractions of the pack thickness.
 
-Without a thickness, the largest one is that of a single pulse.
+If the pack has no thickness, the largest peak is the indentation that a single pulse causes.
 """
 
 BRANCH_POINTS: Final = 30
@@ -60,19 +60,19 @@ BEFORE: Final = 100e-6
 """Default time between the start of the record and the firing, s."""
 
 _FINEST: Final = 0.5e-6
-"""Largest time step of the displacement for the low-pass, s: a hundredth of a contact."""
+"""Largest time step of the displacement before low-pass filtering, s: about 1/100 of a contact's duration."""
 
 _MOST: Final = 2_000_000
-"""Largest number of steps in a record, which bounds the memory."""
+"""Largest number of time steps in a record; limits the memory use."""
 
 _RUN_UP: Final = 10e-6
-"""Starting distance from the backstop, m; without forces its value does not matter."""
+"""Initial distance of the armature from the backstop, m; arbitrary, since no force acts on the way."""
 
 _LONGEST: Final = 30
 """Maximum number of doublings of the simulation time for a rebound."""
 
 _LEAST: Final = 1e-6
-"""Smallest restitution in the search for a rebound."""
+"""Smallest coefficient of restitution considered in the search for a rebound."""
 
 
 class Bench(Declared, eq=False):
@@ -128,7 +128,7 @@ def spring(
     *,
     displacements: npt.ArrayLike | None = None,
 ) -> Bench:
-    """Measure the force with the armature held at displacements, m, and the magnet removed."""
+    """Measure the spring force with the armature held at displacements, m, and the magnet removed."""
     if hammer.spring is None:
         raise InputError(
             f"{hammer.path}: the hammer has no [spring]",
@@ -255,7 +255,7 @@ def current(
     before: float | str = BEFORE,
     locked: float | str | None = None,
 ) -> Bench:
-    """Record the coil current of one shot by voltage, the armature free or locked at a displacement, m."""
+    """Record the coil current of one voltage-driven shot, with the armature free or locked at `locked`, m."""
     from printhammer.drive.input import read_number
 
     check_driver(hammer)
@@ -365,7 +365,7 @@ def _peaks(hammer: Hammer) -> FloatArray:
 
 
 def _rebound(bare: Hammer, speed: float) -> float:
-    """Compute the speed, m/s, at which an armature without other forces leaves the backstop."""
+    """Compute the speed, m/s, at which an armature subject to no other force leaves the backstop."""
     part = bare.backstop
     if isinstance(part, HertzBackstop):
         from scipy.optimize import brentq

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 KINDS: Final = tuple(BENCHES)
-"""Kinds of measurements."""
+"""Kinds of measurements that can be simulated."""
 
 UNITS: Final = {
     "displacement": ("m", "um"),
@@ -83,11 +83,11 @@ class Measurement(Result):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title of the table."""
         return f"measurement of the {self.kind} of {self.hammer.name}"
 
     def entries(self) -> Entries:
-        """Return readings and text columns, true values such as `true_force`, and the mask `wrong`."""
+        """Return the columns: readings, words, true values such as `true_force`, and the mask `wrong`."""
         entries: Entries = {}
         for name, readings in self.values.items():
             key, si = name.replace(" ", "_"), SI[name]
@@ -100,7 +100,7 @@ class Measurement(Result):
         return entries | {"wrong": (Column("1", "whether the reading is wrong", ("row",)), wrong)}
 
     def to_csv(self) -> str:
-        """Render the table as CSV: comments, a heading with units, the rows."""
+        """Render the table as CSV: comments, a heading with units, and one line per row."""
         from printhammer.units import from_si
 
         lines = [f"# {key}: {value}" for key, value in self.comments.items()]
@@ -137,10 +137,10 @@ def measure(
     kind : str
         "magnet": static force of magnet and spring over displacement and current; "spring": force of the
         spring alone; "pack": load cycles; "backstop": rebound speeds; "motion": record of one shot;
-        "current": record of a current probe in one shot by voltage.
+        "current": record of the coil current in one voltage-driven shot.
     sensor : Sensor or mapping, optional
-        Sensors; by default `SENSORS`. A mapping states only the differences from these, such as
-        {"noise": {"force": "0.1 N"}, "outliers": "2 %"}, see `printhammer.identify.bench.sensor.adjusted`.
+        Sensors; by default `SENSORS`. A mapping states only the settings that differ, such as {"noise":
+        {"force": "0.1 N"}, "outliers": "2 %"}, see `printhammer.identify.bench.sensor.adjusted`.
     seed : int, optional
         Seed of the random number generator; the same seed gives the same table.
     **bench

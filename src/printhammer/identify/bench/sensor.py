@@ -31,16 +31,16 @@ _WRONG: Final = 0.1
 
 @dataclass(frozen=True)
 class Amount:
-    """A size in SI, or a fraction of full scale or of the reading."""
+    """Size of a sensor error: in SI units, or as a fraction of full scale or of the reading."""
 
     size: float = 0.0
-    """Size in SI, or the fraction."""
+    """Number in SI units, or the fraction."""
     of: str = ""
-    """Empty for SI; "of full scale", the largest true value; or "of reading"."""
+    """Reference of the fraction: "of full scale" (the largest true value) or "of reading"; else empty."""
 
     @classmethod
     def read(cls, text: str | float, si: str, name: str, *, signed: bool = False) -> Amount:
-        """Read a quantity such as "0.2 um", "0.5 %" (of full scale), "1 % of reading", or a number in SI."""
+        """Parse an error size: "0.2 um", "0.5 %" (of full scale), "1 % of reading", or a number in SI."""
         of = ""
         if isinstance(text, str) and "%" in text:
             share, _percent, tail = text.partition("%")
@@ -57,7 +57,7 @@ class Amount:
         return cls(size, of)
 
     def at(self, true: FloatArray) -> FloatArray:
-        """Evaluate the amount at each true value, SI, with the shape of `true`."""
+        """Evaluate the error size at each true value, SI; same shape as `true`."""
         if self.of == READING:
             return self.size * np.abs(true)
         return np.full(true.shape, self.size * (full_scale(true) if self.of else 1.0))
@@ -77,17 +77,17 @@ class Channel(Declared):
             )
 
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
-        """Return the readings of true values, SI, with standard normal numbers for the noise, shape (n,)."""
+        """Simulate readings of true values, SI, with standard normal numbers for the noise, shape (n,)."""
         shown = true + self.offset.at(true) + self.noise.at(true) * normal
         return self.rounded(shown, true)
 
     def rounded(self, shown: FloatArray, true: FloatArray) -> FloatArray:
-        """Round readings to whole steps of the resolution, for the full scale of `true`."""
+        """Round readings to whole quantisation steps; `true` supplies the full scale."""
         step = self.step(full_scale(true))
         return np.rint(shown / step) * step if step > 0.0 else shown
 
     def step(self, full: float) -> float:
-        """Return the step of the readings, SI, for a full scale, SI.
+        """Return the quantisation step of the readings, SI, at a given full scale, SI.
 
         A fraction of full scale is rounded down to 1, 2 or 5 times a power of ten, as is usual for
         instruments.
@@ -102,7 +102,7 @@ class Channel(Declared):
         return float(f"{digit}e{power}")
 
     def described(self, si: str, unit: str, full: float) -> str:
-        """Describe noise, resolution and offset in words, in a unit, for a full scale, SI."""
+        """Describe noise, resolution and offset in words, in the given unit; `full` is the full scale, SI."""
         from printhammer.units import from_si
 
         def absolute(size: float) -> str:
@@ -120,10 +120,10 @@ class Channel(Declared):
 
 @dataclass(frozen=True)
 class Sensor:
-    """Sensors of one bench."""
+    """Sensors of one test bench."""
 
     channels: Mapping[str, Channel]
-    """By quantity: "displacement", "indentation", "current", "force", "impact speed", "rebound speed"."""
+    """Errors of each quantity: displacement, indentation, current, force, impact speed or rebound speed."""
     sampling_rate: float | None = None
     """Sampling rate of records, Hz; None for a bench without records."""
     bandwidth: float | None = None
@@ -165,7 +165,7 @@ NONE: Final = "none"
 """Text for an unlimited bandwidth."""
 
 PARTS: Final = ("noise", "resolution", "offset")
-"""Error settings of every quantity."""
+"""Settings that every quantity has."""
 
 _OTHERS: Final = ("exact", "sampling_rate", "bandwidth", "outliers")
 
@@ -213,7 +213,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
 
 
 def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings that apply to a sensor: its quantities, and records if it makes any."""
+    """Return the settings that apply to a sensor; omit sampling settings if it makes no records."""
     kept = dict(settings)
     for role in PARTS:
         if role in kept:
@@ -227,7 +227,7 @@ def applicable(sensor: Sensor, settings: Mapping[str, Any]) -> dict[str, Any]:
 def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> dict[str, str]:
     """Parse settings such as "force=0.5 %", or "0.2 um" for all quantities of that dimension.
 
-    Returns the text of the amount by quantity; `part`, such as "noise", is used in messages.
+    Returns the text of the error size by quantity; messages name the setting `part`, such as "noise".
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""From what a maker prints of an actuator to a hammer file."""
+"""Build hammer files from manufacturers' data sheets of actuators."""

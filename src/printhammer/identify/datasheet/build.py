@@ -1,13 +1,13 @@
-"""Build a hammer from a data sheet; each constant states whether it is printed, derived or assumed.
+"""Build a hammer from a data sheet; each constant is marked as printed, derived or assumed.
 
 The armature rests at the backstop at 0 and is pulled through the stroke to its end, where the gap is
-`end_gap`. What it strikes, there or at `target`, is a spring with a dashpot of the sheet's restitution, so
-stiff that the work of the magnet indents it by a quarter of the remaining gap.
+`end_gap`. The struck object, there or at `target`, is a spring with a dashpot that has the restitution of the
+sheet; it is so stiff that the work of the magnet indents it by a quarter of the remaining gap.
 
 The magnet follows the reluctance law. A sheet has a few forces at one current, whereas the law has seven
 constants, so the fit is a maximum a posteriori estimate: every constant but the pole area has a log-normal
 prior typical of such devices, and the sum of squared misfits of forces, inductance and priors is minimised. A
-constant that ends up much less uncertain than its prior is marked as derived, another one as assumed.
+constant whose uncertainty is much smaller than that of its prior is marked as derived, any other as assumed.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ INDUCTANCE_ERROR: Final = 0.05
 """Relative standard error of a printed inductance; assumed."""
 
 DERIVED: Final = 0.5
-"""Posterior over prior standard deviation below which a constant counts as derived."""
+"""Ratio of posterior to prior standard deviation below which a constant counts as derived."""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """Log-normal prior of a constant, typical of such devices."""
+    """Log-normal prior of a magnet constant, typical of small solenoids."""
 
     value: float
     spread: float
@@ -61,23 +61,23 @@ GUESSES: Final = {
     "fringe": Guess(0.5, 0.7, "flanks that fringe half as high as the pole's radius, within a factor 2"),
     "leakage": Guess(0.3, 1.0, "a third of the printed inductance passes the armature, within a factor e"),
 }
-"""Priors, in terms in which devices of all sizes are similar; `core` is a gap, `leakage` a fraction."""
+"""Log-normal priors, SI, of size-independent terms; `core` is an equivalent air gap, `leakage` a fraction."""
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """Magnet data of a sheet, SI."""
+    """Magnet data of a data sheet, SI."""
 
     current: float
-    """Current of the forces, A."""
+    """Coil current at which the forces are stated, A."""
     gaps: FloatArray
     forces: FloatArray
-    """Gaps, m, and forces at these gaps, N."""
+    """Gaps, m, and the forces at the gaps, N."""
     inductance: tuple[float, float] | None
     """Inductance at small currents, H, and the gap where it was measured, m."""
     turns: float | None
     area: float | None
-    """Area of the pole face, m^2; like the turns, None if not stated."""
+    """Area of the pole face, m^2; None if not stated, as for the turns."""
     residual_gap: float | None
     """Air gap in series with the working gap, m; None if not stated."""
     closed_at: float
@@ -86,19 +86,19 @@ class Sheet:
 
 @dataclass(frozen=True)
 class SheetMagnet:
-    """A fitted magnet, and the origin of its constants."""
+    """Magnet fitted to a data sheet, with the origin of its constants."""
 
     part: ReluctanceMagnet
     derived: dict[str, float]
-    """Constants that the sheet determines, with their relative standard errors."""
+    """Constants that the data sheet determines, with their relative standard errors."""
     assumed: dict[str, str]
-    """Assumed constants, with the assumption."""
+    """Assumed constants, each with the text of the assumption."""
     forces: FloatArray
-    """Forces of the law at the gaps of the sheet, N."""
+    """Forces of the fitted law at the gaps of the data sheet, N."""
     misfit: float
-    """Largest relative deviation of these forces from the sheet."""
+    """Largest relative deviation of the fitted forces from those of the data sheet."""
     inductance: float
-    """Inductance of the law at small currents, at the gap of the sheet's inductance or the full gap, H."""
+    """Inductance of the fitted law at small currents, at the sheet's inductance gap or the full gap, H."""
 
 
 def fit_magnet(sheet: Sheet) -> SheetMagnet:
@@ -150,14 +150,14 @@ def fit_magnet(sheet: Sheet) -> SheetMagnet:
 
 
 def forces_of(part: ReluctanceMagnet, sheet: Sheet) -> FloatArray:
-    """Compute the forces of a magnet at the gaps of a sheet, N."""
+    """Compute the forces of a magnet at the gaps of a data sheet, N."""
     c = part.packed(0.0)
     places = (sheet.closed_at - sheet.gaps).tolist()
     return np.array([law.magnet_force(c, place, sheet.current) for place in places])
 
 
 def inductance_of(part: ReluctanceMagnet, sheet: Sheet) -> float:
-    """Compute the inductance at small currents, H, at the gap of the sheet's inductance or the widest gap."""
+    """Compute the inductance at small currents, H, at the sheet's inductance gap or the widest gap."""
     gap = float(sheet.gaps.max()) if sheet.inductance is None else sheet.inductance[1]
     return law.magnet_inductance(part.packed(0.0), sheet.closed_at - gap, 0.0)
 
@@ -168,7 +168,7 @@ def _described(
     spread: dict[str, float],
     forces: Callable[[ReluctanceMagnet, Sheet], FloatArray],
 ) -> SheetMagnet:
-    """Classify the constants as derived or assumed."""
+    """Classify the constants of a fitted magnet as derived or assumed."""
     key = {
         "turns": "turns",
         "residual_gap": "residual_gap",
@@ -196,12 +196,12 @@ _HEAVY: Final = 3.0  # Factor on the stated mass above which an armature of iron
 
 
 def implausible(sheet: DataSheet, part: ReluctanceMagnet) -> list[str]:
-    """Return a sentence for each property of a magnet that its device cannot have.
+    """Return one sentence for each physically implausible property of a fitted magnet.
 
-    An armature of iron that closes a round pole of the area and carries its flux to the rim is a quarter of
-    the diameter thick; it must not weigh much more than the sheet says. The driver must be able to store the
-    field at the current of the forces and full gap within a pulse: half the inductance times the squared
-    current, of at most rail times current times on-time.
+    An iron armature that covers a round pole of that area and carries its flux to the rim is a quarter of the
+    pole diameter thick; it must not be much heavier than the mass on the sheet. The driver must be able to
+    store the field at the current of the forces and full gap within a pulse: half the inductance times the
+    squared current, of at most rail times current times on-time.
     """
     found = []
     diameter = 2.0 * math.sqrt(part.pole_area / math.pi)
@@ -226,7 +226,7 @@ RESTITUTION: Final = 0.3
 """Assumed restitution of a stop: steel on steel with a thin film between."""
 
 INDENTATION: Final = 0.25
-"""Fraction of the remaining gap by which the work of the magnet indents the target; assumed."""
+"""Fraction of the remaining gap by which the magnet's work indents the struck object; assumed."""
 
 _GRID: Final = 200  # Number of displacements sampled up to the front of the pack
 
@@ -277,7 +277,7 @@ def _hammer_of(sheet: DataSheet) -> tuple[Hammer, SheetMagnet]:
 
 
 def _head(sheet: DataSheet, magnet: SheetMagnet, current: float) -> str:
-    """Return the text of a hammer file with name, title and note, and a placeholder mass."""
+    """Return the head of the hammer file: name, title, note and a placeholder mass."""
     import tomlkit
 
     points = len(sheet.force)
@@ -344,7 +344,7 @@ def _derived_from(sheet: DataSheet, key: str, how: str) -> tuple[str, str]:
 
 
 def _spring(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any] | None:
-    """Return the spring table, None without a spring; raise `InputError` if the magnet is weaker."""
+    """Return the spring table, None without a spring; raise `InputError` if the magnet cannot overcome it."""
     stated = [name for name in ("preload", "stiffness") if f"spring.{name}" in sheet.entries]
     if not stated:
         return None
@@ -377,7 +377,7 @@ def _restitution(sheet: DataSheet) -> dict[str, Any]:
 
 
 def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Build the table of the pack, which models the target that the armature strikes."""
+    """Return the table of the pack, which models the object that the armature strikes."""
     place = "target" if "target" in sheet.entries else "stroke"
     table: dict[str, Any] = {"law": "dashpot", "front": sheet.constant(place)}
     if "stop.stiffness" in sheet.entries:
@@ -398,7 +398,7 @@ def _pack(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, An
 
 
 def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -> float:
-    """Compute the work of magnet and spring up to a displacement at a constant current, J."""
+    """Compute the work of magnet and spring from rest to a displacement, at constant current, J."""
     c = magnet.part.packed(0.0)
     x = np.linspace(0.0, front, _GRID)
     pull = np.array([law.magnet_force(c, place, current) for place in x.tolist()])
@@ -431,7 +431,7 @@ def damping_ratio(restitution: float) -> float:
 
 
 def _waveform(sheet: DataSheet, magnet: SheetMagnet, current: float) -> dict[str, Any]:
-    """Return the waveform table: the driver of the sheet, or the rail alone."""
+    """Return the waveform table: the driver of the data sheet, or a pulse of the rail voltage."""
     from printhammer.drive.waveforms.shapes import SHAPES
 
     table: dict[str, Any] = {"shape": sheet.driver.get("shape", "rail"), "voltage": sheet.constant("rail")}

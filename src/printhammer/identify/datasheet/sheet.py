@@ -1,12 +1,7 @@
-"""Read and validate data sheets of actuators: TOML with the values that a maker prints.
+"""Read and validate data sheets of actuators: TOML with the values that a manufacturer prints.
 
-    name = "pull-12v"
-    source = "data sheet of the maker, page 3"
-    rail = "12 V"
-    resistance = "10 ohm"                    # at 20 degC
-    force = [["0.25 mm", "85.9 N"], ["5 mm", "3.59 N"]]
-    stroke = "4.75 mm"
-    mass = "26 g"
+    name = "pull-12v" source = "manufacturer's data sheet, page 3" rail = "12 V" resistance = "10 ohm"
+    # at 20 degC force = [["0.25 mm", "85.9 N"], ["5 mm", "3.59 N"]] stroke = "4.75 mm" mass = "26 g"
 
 These are required. Optional are
 
@@ -19,8 +14,9 @@ the end of
 at the
   end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of the
   struck object;
-- `on_time`; `driver`, a waveform table without its voltage; `title`, `note` and `strike`, the noun for what a
-  pulse makes.
+- `on_time`; `driver`, a waveform table without its voltage; `title`, `note` and `strike`, the noun for the
+result of a
+  pulse.
 
 `assumed` lists the keys whose values the reader of the sheet has guessed, and ``[why]`` states a source for
 single keys.
@@ -41,7 +37,7 @@ from printhammer.support.files import read_text
 from printhammer.units import describe, split, to_si
 
 TEXTS: Final = {"name": True, "source": True, "title": False, "note": False, "strike": False}
-"""Text keys of a sheet, and whether they are required."""
+"""Text keys of a data sheet, and whether they are required."""
 
 QUANTITIES: Final = {
     "rail": ("V", True),
@@ -56,13 +52,13 @@ QUANTITIES: Final = {
     "target": ("m", False),
     "on_time": ("s", False),
 }
-"""Quantities of a sheet, their SI units, and whether they are required."""
+"""Quantities of a data sheet, their SI units, and whether they are required."""
 
 TABLES: Final = {
     "spring": {"preload": "N", "stiffness": "N/m"},
     "stop": {"restitution": "1", "stiffness": "N/m", "damping": "N s/m"},
 }
-"""Tables of a sheet, and their quantities with SI units."""
+"""Tables of a data sheet, and their quantities with SI units."""
 
 _ZERO: Final = ("end_gap", "spring.preload", "spring.stiffness", "stop.restitution", "stop.damping")
 _OTHERS: Final = ("force", "inductance", "driver", "assumed", "why")
@@ -72,12 +68,12 @@ _WHOLE: Final = 1e6  # Magnitude below which whole numbers are written without a
 
 @dataclass(frozen=True)
 class Entry:
-    """A quantity of a sheet, as written and in SI."""
+    """Quantity of a data sheet, as written and in SI."""
 
     key: str
     value: float
     unit: str
-    """Unit as written."""
+    """Unit as written in the data sheet."""
     si: float
 
 
@@ -86,26 +82,26 @@ class DataSheet:
     """Contents of a data sheet."""
 
     where: str
-    """Name of the file, for messages."""
+    """File name, for error messages."""
     texts: dict[str, str]
     entries: dict[str, Entry]
     """Quantities by key, such as "mass" and "spring.preload"."""
     force: list[tuple[Entry, Entry]]
-    """Gaps and forces, in the order of the sheet."""
+    """Gap and force pairs, in the order of the data sheet."""
     inductance: tuple[Entry, Entry] | None
     """Inductance, and the gap at which it was measured."""
     driver: dict[str, Any]
     assumed: frozenset[str]
-    """Keys whose values the reader of the sheet has guessed."""
+    """Keys whose values were guessed by the person who transcribed the data sheet."""
     why: dict[str, str] = field(default_factory=dict)
-    """Source texts of single keys."""
+    """Sources of single keys, by key."""
 
     def si(self, key: str, otherwise: float = math.nan) -> float:
-        """Return a quantity in SI, or `otherwise` if the sheet lacks it."""
+        """Return a quantity of the data sheet in SI, or `otherwise` if it is missing."""
         return self.entries[key].si if key in self.entries else otherwise
 
     def origin(self, key: str) -> tuple[str, str]:
-        """Return status and source of a key, possibly inherited from its table."""
+        """Return status and source of a key; a key without its own source inherits that of its table."""
         holder = key.partition(".")[0]
         guessed = not self.assumed.isdisjoint((key, holder))
         otherwise = "assumed beside the data sheet" if guessed else f"data sheet: {self.texts['source']}"
@@ -120,7 +116,7 @@ class DataSheet:
 
 
 def plain(value: float) -> float | int:
-    """Return an integer if the number is whole, else the number."""
+    """Convert a whole number to `int`; return any other number unchanged."""
     return int(value) if value.is_integer() and abs(value) < _WHOLE else value
 
 
@@ -205,7 +201,7 @@ def _quantity_text(key: str) -> str:
 
 
 def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
-    """Parse a quantity that must be positive or, with `zero`, not negative."""
+    """Parse a quantity that must be positive or, with `zero`, non-negative."""
     zero = zero or key in _ZERO
     if isinstance(written, bool) or not isinstance(written, str | int | float):
         raise InputError.of(
@@ -224,7 +220,7 @@ def _entry(key: str, written: Any, si: str, *, zero: bool = False) -> Entry:
 
 
 def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[Entry, Entry]:
-    """Parse a pair of quantities, of which a length may be 0."""
+    """Parse a pair of quantities; a length in the pair may be 0."""
     if not isinstance(written, list) or len(written) != _PAIR:
         raise InputError.of(key, written, wanted, written=shown(written))
     first, second = (_entry(key, part, si, zero=si == "m") for part, si in zip(written, units, strict=True))
@@ -232,7 +228,7 @@ def _pair(key: str, written: Any, units: tuple[str, str], wanted: str) -> tuple[
 
 
 def _keys(document: Mapping[str, Any]) -> list[str]:
-    """List the keys of a sheet that may have an origin: tables, and their entries."""
+    """List the keys of a data sheet that may state a source: top-level keys and table entries."""
     whole = [key for key in document if key not in (*TEXTS, "assumed", "why")]
     inner = [f"{name}.{key}" for name in (*TABLES, "driver") for key in document.get(name, {})]
     return [*whole, *inner]
@@ -270,7 +266,7 @@ def _why(document: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _check(sheet: DataSheet) -> None:
-    """Raise `InputError` for inconsistent entries."""
+    """Raise `InputError` if the entries of a data sheet contradict each other."""
     gaps = [gap.si for gap, _force in sheet.force]
     if len(set(gaps)) < len(gaps):
         raise InputError("force: a gap is given twice", key="force", expected="one force at each")

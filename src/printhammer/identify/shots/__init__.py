@@ -1,1 +1,1 @@
-"""Constants from displacement records of single shots."""
+"""Fits of constants to displacement records of single shots."""

@@ -1,7 +1,7 @@
 """Approach phase of the motion fit: multiple shooting with penalised gaps between segments.
 
-Gaps between the segments are allowed, with a penalty that rises from step to step. A wrong constant is thus
-corrected by what each segment shows by itself, before errors can grow from contact to contact.
+Gaps between the segments are allowed, but penalised; the penalty rises during the iteration. Each segment
+thus helps to correct a wrong constant by itself, before errors can grow from contact to contact.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 _WIDE: Final = 10.0
-"""Initial scale of the gap penalty, in largest gaps: a gap of this size costs as much as all data."""
+"""Initial scale of the gap penalty, in units of the largest gap; such a gap costs as much as all data."""
 _NARROW: Final = 0.001
-"""Gap, in strokes and typical speeds, below which the gaps can be closed at once."""
+"""Scale of the gap penalty, normalised by stroke and typical speed, below which the approach ends."""
 _RISE: Final = 0.3  # Factor on the width of the penalty after a successful step
 _LONGEST: Final = 0.3
-"""Largest change per step: relative for a constant, in strokes and typical speeds for a state."""
+"""Largest change per step: relative for a constant, normalised by stroke and typical speed for a state."""
 _HALVINGS: Final = 6  # Iteration limit of the step halving
 _TRIES: Final = 2
-"""Number of steps per value of the penalty."""
+"""Number of Gauss-Newton steps for each value of the gap penalty."""
 
 
 class Prior(Declared, eq=False):
-    """Gaussian prior of some parameters: mean and covariance."""
+    """Gaussian prior of some of the fitted parameters: mean and covariance."""
 
     which: IntArray = part("indices of the parameters, shape (k,)")
     mean: FloatArray = part("mean, SI, shape (k,)")
@@ -37,7 +37,7 @@ class Prior(Declared, eq=False):
 
 
 class Priors:
-    """Several independent priors in whitened form, with the parameters in their scales."""
+    """Independent Gaussian priors in whitened form; each parameter is measured in units of its scale."""
 
     def __init__(self, priors: Sequence[Prior], scales: FloatArray) -> None:
         self.scales = scales
@@ -61,7 +61,7 @@ class Priors:
         ]
 
     def rows(self, columns: int) -> list[FloatArray]:
-        """Return the whitened rows of each prior, with the parameters in the first `columns` columns."""
+        """Return the whitened rows of each prior; the parameters occupy the first `columns` columns."""
         blocks = []
         for prior, white in self._white:
             row = np.zeros((len(prior.which), columns))
@@ -71,7 +71,7 @@ class Priors:
 
 
 def largest_gap(chains: Sequence[Chain], units: FloatArray) -> float:
-    """Return the largest gap of all chains, in strokes and typical speeds."""
+    """Return the largest gap between segments in all chains, normalised by stroke and typical speed."""
     return max((float(np.abs(chain.gaps / units).max()) for chain in chains if chain.gaps.size), default=0.0)
 
 
@@ -89,7 +89,7 @@ class Approach:
         self.keep = [(~rows).astype(np.float64) for rows in spikes]
 
     def run(self, values: FloatArray, states: Sequence[FloatArray]) -> tuple[FloatArray, list[FloatArray]]:
-        """Return parameters, SI, and joint states from which a fit with closed gaps can start."""
+        """Compute parameters, SI, and joint states from which a fit with closed gaps can start."""
         values, states = values.copy(), list(states)
         chains = self.shooting.chains(values, states, derivatives=True)
         width = 0.0 if chains is None else _WIDE * largest_gap(chains, self.shooting.units)
@@ -143,7 +143,7 @@ class Approach:
     def _step(
         self, values: FloatArray, chains: Sequence[Chain], scales: FloatArray, width: float
     ) -> FloatArray:
-        """Return the Gauss-Newton step, in scales of the parameters and units of the states."""
+        """Compute the Gauss-Newton step; parameters are in units of their scales, states in `units`."""
         count = len(values)
         size = count + sum(chain.gaps.size for chain in chains)
         units = self.shooting.units

@@ -5,7 +5,7 @@ the data misfit or the gap is smaller than at all earlier steps (a filter method
 Math. Program. 91 (2002) 239). While the constants are far off, only spikes of the records are excluded; near
 the solution, outliers are excluded by their residuals.
 
-Diagnostics: degenerate constants, weakly determined ones, and constants that could be fitted too.
+Diagnostics: degenerate constants, weakly determined constants, and held constants that could be fitted too.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _TIED: Final = 0.98
 _WEAK: Final = 0.1
 """Relative standard error above which a constant is weakly determined."""
 _SHARE: Final = 0.02
-"""Component of a constant in the degenerate direction, relative to the largest, above which it is named."""
+"""Relative component in the degenerate direction above which a message names the constant."""
 
 
 def condition_number(design: FloatArray) -> float:
@@ -46,14 +46,14 @@ def condition_number(design: FloatArray) -> float:
 def singular(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Compute singular values, ascending, and right singular vectors as columns, of a tall matrix.
 
-    The small normal matrix is used, which is accurate for condition numbers up to 1e7.
+    They are computed from the small normal matrix, which is accurate for condition numbers up to 1e7.
     """
     squares, vectors = np.linalg.eigh(matrix.T @ matrix)
     return np.sqrt(np.maximum(squares, 0.0)), vectors
 
 
 def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> None:
-    """Raise `InputError` if some constants can change together without changing the motion.
+    """Raise `InputError` if a joint change of several constants leaves the motion unchanged.
 
     `where` names the files; `design` is the whitened Jacobian, shape (m, p).
     """
@@ -84,7 +84,7 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
 
 
 def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatArray) -> list[str]:
-    """Return one sentence per highly correlated pair, and per weakly determined constant."""
+    """Return one sentence per highly correlated pair of constants and per weakly determined constant."""
     errors = np.sqrt(np.diag(covariance))
     sentences = []
     for i, name in enumerate(names):
@@ -101,7 +101,7 @@ def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatAr
 
 
 def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
-    """Return the indices of the weakly determined constants."""
+    """Return the indices of the weakly determined constants: those with a large relative standard error."""
     errors = np.sqrt(np.diag(covariance))
     return [int(i) for i in np.flatnonzero(errors > _WEAK * np.abs(values))]
 
@@ -109,7 +109,7 @@ def weak(values: FloatArray, covariance: FloatArray) -> list[int]:
 def would_be_found(
     design: FloatArray, columns: FloatArray, names: Sequence[str], residuals: FloatArray
 ) -> list[tuple[str, float, float]]:
-    """Estimate the best changes of additional constants, if each in turn were free as well.
+    """Estimate by how much each held constant would change if it alone were fitted in addition.
 
     `design`, shape (m, p), `residuals`, and `columns`, shape (m, q), the derivatives per relative change of
     the further constants, are whitened by the standard errors of the data. Returned are, for each constant,
@@ -127,28 +127,28 @@ def would_be_found(
 
 _MOST_STEPS: Final = 40  # Iteration limit of the Gauss-Newton method
 _FULL: Final = 0.4
-"""Largest relative change of a constant in one step."""
+"""Largest relative change of a constant in one Gauss-Newton step."""
 _SHORTEST: Final = 1e-3  # Smallest step fraction of the damping
 _EXACT: Final = 1e-11
-"""Relative change of all constants below which exact data are fitted."""
+"""Relative change of all constants below which a fit to exact data has converged."""
 _NEAR, _DONE = 1.0, 1e-3
-"""Steps, in standard errors, below which outliers are excluded, and below which the fit has converged."""
+"""Step sizes, in standard errors, below which outliers are excluded and below which the fit has converged."""
 _NARROW, _CLOSED = 1e-2, 1e-8
-"""Gaps, in strokes and typical speeds, below which outliers are excluded, and the fit has converged."""
+"""Gap sizes, normalised, below which outliers are excluded and below which the fit has converged."""
 _FLOOR: Final = 1e-7
-"""Noise floor in strokes, below which nothing counts as an outlier."""
+"""Noise floor, as a fraction of the stroke; smaller residuals are never outliers."""
 _LEAST: Final = 1e-16
-"""Noise, m, that weights exact data."""
+"""Standard deviation assumed for the noise of exact data, m; sets their weight."""
 _REACH: Final = 3.0
 _POINTS: Final = 7
-"""Extent of a profile, in standard errors, and number of its points."""
+"""Half-width of a profile, in standard errors, and number of its points."""
 _LOST: Final = 1e-7
 """Relative singular value below which rounding dominates."""
 _NO_MOTION: Final = "the hammer does not move so that the records could be compared with it"
 
 
 class Solution(Declared, eq=False):
-    """Result of the iteration: parameters, covariance, states, residual scales and weights."""
+    """Result of the Gauss-Newton iteration: parameters, covariance, states, residual scales and weights."""
 
     values: FloatArray = part("parameters, SI, shape (p,)")
     covariance: FloatArray = part("covariance of the parameters, SI, shape (p, p)")
@@ -165,7 +165,7 @@ class Solution(Declared, eq=False):
 
 
 class GaussNewton:
-    """Fit of the parameters of a `Shooting`; a robust fit excludes outliers."""
+    """Gauss-Newton fit of the parameters of a `Shooting`; with `robust`, outliers are excluded."""
 
     def __init__(self, shooting: Shooting, priors: Sequence[Prior], *, robust: bool) -> None:
         self.shooting = shooting
@@ -193,10 +193,10 @@ class GaussNewton:
         held: BoolArray | None = None,
         noise: Solution | None = None,
     ) -> Solution:
-        """Fit the parameters from initial values, SI, and initial joint states of each shot, shape (j, 2).
+        """Fit the parameters, starting from values, SI, and joint states of each shot, shape (j, 2).
 
-        Parameters in the mask `held` do not change. With `noise`, a nearby solution, its outliers and noise
-        scales are used.
+        Parameters in the mask `held` do not change. If `noise`, a nearby solution, is passed, its outliers
+        and noise scales are reused.
         """
         scales = self.shooting.parameters.scales
         # A profile starts near its solution.
@@ -284,7 +284,7 @@ class GaussNewton:
         )
 
     def _cost(self, values: FloatArray, chains: Sequence[Chain], here: _Weighted) -> float:
-        """Return the cost of data and prior at parameter values, with the scales of the current step."""
+        """Compute the cost of data and priors at parameter values, with the current residual scales."""
         total = 0.0
         for shot, chain in enumerate(chains):
             left = self.data[shot] - self.shooting.shown(shot, chain.motion)
@@ -323,8 +323,8 @@ class GaussNewton:
     def profile(self, solution: Solution, which: int, degrees_of_freedom: float) -> Profile:
         """Compute the profile of one parameter and its 95 % interval.
 
-        The noise is that of the solution, with the given degrees of freedom. The profile ends where no fit
-        converges or the parameter would change its sign.
+        The noise scales are those of the solution, with the given degrees of freedom. The profile ends where
+        no fit converges, or where the parameter would change its sign.
         """
         error = float(np.sqrt(solution.covariance[which, which]))
         best = solution.values[which]
@@ -356,7 +356,7 @@ class GaussNewton:
 
 @dataclass(frozen=True, eq=False)
 class _Weighted:
-    """The linear problem of a step: whitened rows and residuals, outliers and scales."""
+    """Linear problem of one step: whitened rows and residuals, outliers, and residual scales."""
 
     design: FloatArray
     residuals: FloatArray
@@ -366,7 +366,7 @@ class _Weighted:
 
 
 def _solved(design: FloatArray, residuals: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the least-squares step and the standard errors, both in the scales of the parameters."""
+    """Solve for the least-squares step and the standard errors, in units of the parameters' scales."""
     sizes = np.sqrt((design * design).sum(axis=0))
     sizes[sizes == 0.0] = 1.0
     values, vectors = singular(design / sizes)

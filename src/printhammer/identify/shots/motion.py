@@ -1,9 +1,9 @@
 """Fit constants to displacement records of single shots, by multiple shooting between contacts.
 
-The records determine the mass and the effect of the contacts on the motion, for known static forces. Since a
-motion depends only on forces over mass, a common factor on mass and all forces leaves every record unchanged.
+With the static forces known, the records determine the mass and the contact laws. Since a motion depends only
+on forces over mass, a common factor on mass and all forces leaves every record unchanged.
 
-The result includes a test of the model, and remarks on records and constants.
+The result includes a test of the model and remarks on records and constants.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ from printhammer.identify.shots.shot import FEWEST, Pulse, Shot, fit_pulse, read
 from printhammer.support.arrays import FloatArray
 
 _REJECTED: Final = 0.01
-"""Significance level below which the model is rejected."""
+"""Significance level below which the F-test rejects the model."""
 _LARGER: Final = 1.1
-"""Factor by which the noise may exceed the estimate from a record, which is no more accurate."""
+"""Factor by which residuals may exceed the noise estimate of a record; the estimate is no more accurate."""
 _DEGREES: Final = 0.22
-"""Degrees of freedom per sample of a noise estimate from the median of third differences."""
+"""Degrees of freedom per sample of the noise estimate (median of third differences)."""
 _TOLD: Final = 0.05
-"""Relative standard error up to which a held constant is reported as one that could be fitted."""
+"""Relative standard error below which a held constant is reported as one that could be fitted."""
 _OFF: Final = 5.0  # Standard errors from which a deviation is reported
 
 
 def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float, str]:
-    """Test the residuals against the noise of the records themselves (F-test, with a margin)."""
+    """Test the residuals against the noise of the records (F-test); return the p-value and the reason."""
     from scipy.stats import f
 
     p_value, worst = 1.0, ""
@@ -81,7 +81,7 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
 
 
 def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
-    """Report records whose rest position differs from the hammer's."""
+    """Return remarks on records whose rest position differs from the hammer's."""
     sentences = []
     for shot, shown, scale in zip(shots, solution.shown, solution.scales, strict=True):
         before = shot.t < 0.0
@@ -98,7 +98,7 @@ def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 
 def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
-    """Report records with autocorrelated residuals."""
+    """Return remarks on records with autocorrelated residuals."""
     return [
         f"the residuals of {shot.name} depend on each other: {len(shot.t)} samples count as"
         f" {len(shot.t) / memory:.0f}"
@@ -108,7 +108,7 @@ def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 
 def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str) -> list[str]:
-    """Report held constants that the records could determine, and those that they contradict."""
+    """Return remarks on held constants that the records could determine, or that the records contradict."""
     sentences = [
         "a motion shows forces divided by the mass only: the mass is as sure as the forces taken as known"
     ]
@@ -162,7 +162,7 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
 
 _DAMPING: Final = "backstop.damping"
 _FIRST_GUESS: Final = 0.3
-"""Initial guess of damping over stiffness if the hammer has no damping, s/m."""
+"""Initial guess of the ratio l/k if the hammer has no backstop damping, s/m."""
 
 
 def fit_motion(
@@ -177,10 +177,10 @@ def fit_motion(
 ) -> Fit:
     """Fit the mass and other constants to displacement records of single shots.
 
-    Every record is cut in free flight between its contacts. Each segment is integrated separately from a
-    state of its own; the constants are common, and at the solution each segment begins where the preceding
-    one ends (`printhammer.identify.shots.shooting`). The sensor is a first-order low-pass with additive
-    noise.
+    Every record is divided in free flight between its contacts. Each segment is integrated separately from
+    its own initial state; the constants are common, and at the solution each segment begins where the
+    preceding one ends (`printhammer.identify.shots.shooting`). The sensor is a first-order low-pass with
+    additive noise.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def fit_motion(
         Contents of the table's columns, such as "time=1, displacement=2*50 um/V"; by default as described in
         a file beside the table, else by its heading; see `printhammer.support.tables.columns`.
     bandwidth : float or str, optional
-        Bandwidth of the sensor (-3 dB), Hz; by default that of a comment ``# bandwidth: 200 kHz`` in the
+        Bandwidth of the sensor (-3 dB), Hz; by default the value in a comment ``# bandwidth: 200 kHz`` in the
         record, else unlimited. The current probe is assumed to have the same bandwidth.
     earlier : sequence of Fit, optional
         Fits to apply to the hammer first. For a constant in several fits, the first one counts.
@@ -247,7 +247,7 @@ def fit_motion(
 def _free_keys(
     hammer: Hammer, free: Sequence[str] | None, shots: Sequence[Shot], *, touched: bool
 ) -> tuple[str, ...]:
-    """Return the keys of the constants to fit; raise `InputError` if one cannot be fitted."""
+    """Return the keys of the constants to fit; raise `InputError` for a constant that cannot be fitted."""
     hertz = hammer.backstop is not None and hammer.backstop.law == "hertz"
     if free is None:
         return ("mass", _DAMPING) if touched and hertz else ("mass",)
@@ -286,7 +286,7 @@ def _free_keys(
 
 
 def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
-    """Return the hammer with backstop stiffness and damping as explicit constants if these are fitted."""
+    """Return the hammer with explicit backstop stiffness and damping if these constants are fitted."""
     backstop = hammer.backstop
     changes: dict[str, float | None] = {}
     for key, name in (("backstop.stiffness", "k"), (_DAMPING, "l")):
@@ -308,14 +308,14 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
 
 
 def _known(hammer: Hammer, *, own_waveform: bool) -> Uncertainty:
-    """Return the uncertainty of the constants that move the armature."""
+    """Return the uncertainty of the constants that affect the motion."""
     known = hammer.uncertainty or Uncertainty((), np.empty((0, 0)))
     idle = ("platen", "coil.") if own_waveform else ("platen", "coil.", "waveform.")
     return known.without([key for key in known.keys if key.startswith(idle)])
 
 
 def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
-    """Return the fingerprints of records; raise `InputError` for one that the hammer was fitted to before."""
+    """Return the fingerprints of records; raise `InputError` for a record already used for the hammer."""
     prints = tuple(hashlib.sha256(Path(path).read_bytes()).hexdigest()[:16] for path in paths)
     used = hammer.uncertainty.records if hammer.uncertainty is not None else ()
     for path, print_ in zip(paths, prints, strict=True):
@@ -330,7 +330,7 @@ def _unused(paths: Sequence[str | Path], hammer: Hammer) -> tuple[str, ...]:
 
 
 def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], list[str]]:
-    """Return the current of each shot, None for the hammer's own waveform, and remarks."""
+    """Return the current pulse of each shot (None: the hammer's own waveform), and remarks."""
     pulses: list[Pulse | None] = []
     for shot in shots:
         if shot.current is None:
@@ -354,7 +354,7 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
 def _assembled(
     hammer: Hammer, keys: tuple[str, ...], pulses: Sequence[Pulse | None], known: Uncertainty
 ) -> tuple[FloatArray, Parameters, list[Prior], list[Pulse | None]]:
-    """Return initial guess, parameters, priors, and the current of each shot."""
+    """Return the initial guess, the parameters, the priors, and the current pulse of each shot."""
     start = [hammer.constants[key].si for key in keys]
     priors: list[Prior] = []
     if known.keys:
@@ -392,7 +392,7 @@ def _assembled(
 
 
 def _definite(covariance: FloatArray, values: FloatArray) -> FloatArray:
-    """Return a covariance with a small diagonal added, so that it can be inverted."""
+    """Return a covariance matrix with a small diagonal added, so that the matrix can be inverted."""
     return covariance + np.diag((1e-12 * values) ** 2 + 1e-13 * covariance.diagonal())
 
 

@@ -1,11 +1,11 @@
-"""Multiple shooting: each segment of a single shot has its own initial state; gaps close at the solution.
+"""Multiple shooting: every segment of a shot has its own initial state; at the solution no gap remains.
 
-The model of a record is a chain of segments. The first begins at rest at the firing, each other one in free
-flight with displacement and velocity as additional unknowns; at the solution each segment begins where the
-preceding one ends. Gaps are allowed while the constants are wrong, so that no error grows through more than
-one contact. The unknown states are eliminated from the linearised conditions ("condensing": H. G. Bock, in:
-Modelling of Chemical Reaction Systems, Springer 1981, 102), so that a step costs no more than one for the
-constants alone.
+The model of a record is a chain of segments. The first segment begins at rest at the firing; every later
+segment begins in free flight, with displacement and velocity as additional unknowns. At the solution each
+segment begins where the preceding one ends. Gaps are allowed while the constants are wrong, so that no error
+grows through more than one contact. The unknown states are eliminated from the linearised conditions
+("condensing": H. G. Bock, in: Modelling of Chemical Reaction Systems, Springer 1981, 102), so that a step
+costs no more than a step in the constants alone.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from printhammer.run.ensemble import Ensemble
 from printhammer.support.arrays import FloatArray, IntArray
 
 _STEP: Final = 1e-7
-"""Finite-difference step: relative for a constant, in strokes and typical speeds for a state."""
+"""Finite-difference step: relative for a constant, normalised by stroke and typical speed for a state."""
 _FINEST: Final = 2e-6
-"""Largest time step for the low-pass, s."""
+"""Largest time step of the displacement before low-pass filtering, s."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,43 +36,42 @@ class Parameters:
     """Fitted parameters: constants of the hammer, and constants of the current of each shot."""
 
     keys: tuple[str, ...]
-    """Keys of the hammer's constants."""
+    """Dotted keys of the fitted hammer constants."""
     owners: tuple[int, ...]
-    """Shot of each further parameter; those of one shot are the constants of its pulse."""
+    """Shot index of each pulse parameter; the parameters of a shot are the constants of its current pulse."""
     scales: FloatArray
-    """Scales of all parameters, SI."""
+    """Scales of all parameters, SI; derivatives are per unit of scale."""
 
     @property
     def count(self) -> int:
-        """Number of parameters."""
+        """Number of fitted parameters: hammer constants and pulse constants."""
         return len(self.keys) + len(self.owners)
 
     def of_shot(self, shot: int) -> list[int]:
-        """Return the indices of the current parameters of a shot."""
+        """Return the indices of the pulse parameters of a shot."""
         return [len(self.keys) + i for i, owner in enumerate(self.owners) if owner == shot]
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Stretches of one shot at some values of the parameters, with derivatives."""
+    """Simulated segments of one shot at given parameter values, with derivatives."""
 
     motion: FloatArray
-    """Displacement, m, and velocity, m/s, at the grid times. Shape (g, 2)."""
+    """Displacement, m, and velocity, m/s, at the grid times; shape (g, 2)."""
     gaps: FloatArray
-    """End of each segment minus the beginning of the next, shape (j, 2)."""
+    """Gaps: final state of each segment minus the initial state of the next, shape (j, 2)."""
     by_parameter: FloatArray
-    """Derivatives of the motion with respect to the parameters in their scales; p = 0 if not requested. Shape
-    (g, 2, p)."""
+    """Derivatives of the motion per scale of each parameter, shape (g, 2, p); p = 0 if not requested."""
     by_state: FloatArray
-    """Derivatives of the motion with respect to the initial state of the segment. Shape (g, 2, 2)."""
+    """Derivatives of the motion with respect to the initial state of the segment, shape (g, 2, 2)."""
     end_by_parameter: FloatArray
     end_by_state: FloatArray
-    """Derivatives of the final state of each segment but the last, shape (j, 2, p) and (j, 2, 2)."""
+    """Derivatives of each segment's final state with respect to its initial state, shape (j, 2, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Time grid of a shot, indices of the samples in it, and indices at which segments begin."""
+    """Time grid of a shot, with the grid indices of the samples and of the segment starts."""
 
     grid: FloatArray
     samples: IntArray
@@ -82,7 +81,7 @@ class _Plan:
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """One member of the ensemble: a segment with hammer, drive, initial state and output times."""
+    """Run of the ensemble: one segment with hammer, drive, initial state and output times."""
 
     hammer: Hammer
     drive: PulseTrain
@@ -91,7 +90,7 @@ class _Run:
 
 
 class Shooting:
-    """Chains of segments for several shots, integrated together.
+    """Multiple-shooting model of several shots, whose segments are integrated as one ensemble.
 
     Constants of the hammer that are not fitted stay fixed; where a pulse is None, the hammer's own waveform
     is fired.
@@ -114,14 +113,14 @@ class Shooting:
         self.lasting = [0.0 if each is None else 1.5 * each.support for each in waveforms]
 
     def hammer_at(self, values: FloatArray) -> Hammer:
-        """Return the hammer with other values, SI, of the fitted constants."""
+        """Return the hammer with the fitted constants set to `values`, SI."""
         changes = {key: float(value) for key, value in zip(self.parameters.keys, values, strict=False)}
         return self.hammer.replace(changes) if changes else self.hammer
 
     def _variants(
         self, values: FloatArray, derivatives: bool
     ) -> list[tuple[Hammer, float, list[PulseTrain]]]:
-        """Return hammer, rest state and drives at the values, and with each parameter perturbed."""
+        """Return hammer, rest state and drives at parameter values, and for each perturbed parameter."""
         parameters = self.parameters
         count = len(parameters.keys)
         variants = []
@@ -154,8 +153,8 @@ class Shooting:
     ) -> list[Chain] | None:
         """Integrate all segments; return None for an invalid hammer or a failed simulation.
 
-        The arguments are parameter values, SI, and displacement, m, and velocity, m/s, at the joints of each
-        shot, shape (j, 2).
+        `values` are the parameters, SI; `states` the displacement, m, and velocity, m/s, at the joints of
+        each shot, shape (j, 2).
         """
         try:
             variants = self._variants(values, derivatives)
@@ -197,7 +196,7 @@ class Shooting:
         return [self._chain(shot, states[shot], table, where, count) for shot in range(len(self.shots))]
 
     def _acts(self, variant: int, shot: int, start: float) -> bool:
-        """Whether a perturbed parameter affects a segment that begins at a time, s."""
+        """Whether perturbing a parameter changes a segment that begins at a given time, s."""
         number = variant - 1 - len(self.parameters.keys)
         return number < 0 or (self.parameters.owners[number] == shot and start <= self.lasting[shot])
 
@@ -237,7 +236,7 @@ class Shooting:
         return Chain(motion, ends[:-1] - states, by_parameter, by_state, ends_p[:-1], ends_s[:-1])
 
     def shown(self, shot: int, motion: FloatArray) -> FloatArray:
-        """Apply the sensor model; return readings at the samples of a shot, at rest before the firing.
+        """Apply the sensor model: return the readings at the samples of a shot, at rest before the firing.
 
         `motion` holds displacement and velocity on the grid, or derivatives of them, shape (g, 2, ...); the
         readings have the shape (n, ...).
@@ -249,7 +248,7 @@ class Shooting:
         return out[rows].reshape(len(rows), *motion.shape[2:])
 
     def opened(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray]:
-        """Return readings and derivatives of a shot with independent segments.
+        """Compute the readings of a shot with independent segments, and their derivatives.
 
         The readings have the shape (n,), the derivatives with respect to the parameters, in their scales, and
         to the states at the joints, in `units`, the shape (n, p + 2 j).
@@ -269,7 +268,7 @@ class Shooting:
         return out[:, 0], out[:, 1:]
 
     def condensed(self, shot: int, chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Eliminate the states at the joints: linear model of a shot with closed gaps (condensing).
+        """Eliminate the joint states by condensing; return the linear model of a shot with closed gaps.
 
         Returned are the readings with closed gaps at unchanged parameters, shape (n,); their derivatives with
         respect to the parameters in their scales, shape (n, p); the change of the joint states that closes

@@ -1,6 +1,6 @@
-"""Displacement record of a single shot: reading, detection of contacts, and division into segments.
+"""Displacement record of a single shot: reading, contact detection, and division into segments.
 
-The record is cut in free flight, midway between contacts, where a local parabola gives displacement and
+The record is divided in free flight, midway between contacts, where a local parabola gives displacement and
 velocity as initial guesses for the integration of the next segment. The current of the shot is either the
 hammer's waveform, fitted to the recorded current, or the recorded current.
 """
@@ -29,15 +29,15 @@ from printhammer.units import from_si
 Surface = Literal["pack", "backstop"]
 
 FEWEST: Final = 5
-"""Smallest number of samples in a contact."""
+"""Smallest number of samples in a detected contact."""
 _CLEAR: Final = 0.005
-"""Distance from a surface, in strokes, beyond which a contact has clearly begun or ended."""
+"""Distance from a surface, as a fraction of the stroke, beyond which a contact has begun or ended."""
 _WINDOW: Final = 15e-6
-"""Longest averaging time for the detection of contacts, s; contacts last longer."""
+"""Longest averaging time for contact detection, s; shorter than any contact."""
 
 
 class Touch(Declared):
-    """A contact detected in a record."""
+    """Contact with backstop or pack, detected in a record."""
 
     surface: Surface = part('either "pack" or "backstop"')
     first: int = part("index of its first sample")
@@ -50,7 +50,7 @@ class Touch(Declared):
 
 
 class Shot(Declared, eq=False):
-    """One record, with its contacts and joints."""
+    """Displacement record of one shot, with its contacts and segment joints."""
 
     name: str = part("file name, for messages")
     t: FloatArray = part("times of the samples, s, ascending, 0 at the firing, shape (n,)")
@@ -66,7 +66,7 @@ class Shot(Declared, eq=False):
     )
 
     def touching(self, surface: Surface) -> list[Touch]:
-        """Return the contacts with one surface, except the rest at the start."""
+        """Return the contacts with one surface, without the rest position at the start."""
         return [touch for touch in self.touches if touch.surface == surface and touch.first > 0]
 
 
@@ -82,13 +82,14 @@ def read_shot(
     hammer : Hammer
         Hammer whose backstop and pack define the surfaces.
     bandwidth : float, optional
-        Bandwidth of the sensor, Hz; by default that of a comment ``# bandwidth: 200 kHz``, else unlimited.
+        Bandwidth of the sensor, Hz; by default the value in a comment ``# bandwidth: 200 kHz``, else
+        unlimited.
 
     Raises
     ------
     InputError
         The file is invalid, times do not ascend, the record begins too late or ends too early, misses the
-        impact, or has too few samples in it.
+        impact, or has too few samples during the impact.
     """
     table = read_table(path, {"time": "s", "displacement": "m"}, optional={"current": "A"}, columns=columns)
     name, t, x = str(table.path), table.values["time"], table.values["displacement"]
@@ -124,7 +125,7 @@ def read_shot(
 def find_touches(
     t: FloatArray, x: FloatArray, noise: float, hammer: Hammer
 ) -> tuple[list[Touch], FloatArray, float]:
-    """Detect contacts; return them, the smoothed record, and the distance clear of the noise, m.
+    """Detect the contacts; return contacts, smoothed record, and the distance above noise, m.
 
     A contact begins where the smoothed record crosses the surface, and counts if it then goes clearly beyond;
     it ends where the record crosses back, if it then goes clearly away.
@@ -144,7 +145,7 @@ def find_touches(
 
 
 def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
-    """Return the intervals of samples beyond a surface; crossings within the noise do not end them."""
+    """Return the sample intervals beyond a surface; crossings within the noise do not end an interval."""
     touches: list[Touch] = []
     inside, outside = np.flatnonzero(depth > clear), np.flatnonzero(depth < -clear)
     row = 0
@@ -167,7 +168,7 @@ def _visits(surface: Surface, depth: FloatArray, clear: float) -> list[Touch]:
 def _check(
     name: str, t: FloatArray, smooth: FloatArray, clear: float, touches: list[Touch], hammer: Hammer
 ) -> None:
-    """Raise `InputError` for a record that does not cover the shot."""
+    """Raise `InputError` for a record that does not cover the shot from rest to after the impact."""
     start = smooth[0] - hammer.position if hammer.position is not None else 0.0
     if start > clear:
         raise InputError(
@@ -204,7 +205,7 @@ def _check(
 
 
 def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> tuple[float, float]:
-    """Estimate displacement and velocity at a sample from a robust local parabola."""
+    """Estimate displacement and velocity at a sample from a robust local parabola fit."""
     rows = slice(max(row - reach, 0), row + reach + 1)
     s = t[rows] - t[row]
     scale = float(np.abs(s).max())
@@ -219,7 +220,7 @@ def _state(t: FloatArray, x: FloatArray, row: int, reach: int, noise: float) -> 
 
 
 def stroke_of(hammer: Hammer, x: FloatArray) -> float:
-    """Return the distance from backstop to pack, m; without them, the range of a record."""
+    """Return the distance from backstop to pack, m; if one is missing, the range of the record."""
     if hammer.position is not None and hammer.front is not None:
         return hammer.front - hammer.position
     return float(np.ptp(x)) or 1e-4
@@ -242,17 +243,17 @@ def _um(metres: float) -> str:
 
 
 _FLOOR: Final = 1e-9
-"""Noise, relative to the amplitude, below which a record counts as exact."""
+"""Noise, as a fraction of the amplitude, below which a record counts as exact."""
 _POOR: Final = 1e-3
-"""Residuals, relative to the amplitude, that are always acceptable."""
+"""RMS residual of the fitted waveform, as a fraction of the peak current, that is always accepted."""
 _LARGER: Final = 1.2
-"""Residuals, relative to the noise, above which a waveform does not describe a current."""
+"""Ratio of RMS residual to noise above which the waveform does not describe the recorded current."""
 _INTERVALS: Final = 200
-"""Largest number of segments of a waveform taken from the record."""
+"""Largest number of segments in a waveform sampled from the record."""
 
 
 class Pulse(Declared, eq=False):
-    """Waveform of one shot, with the uncertainty of its constants."""
+    """Current pulse of one shot, with the uncertainty of its waveform constants."""
 
     waveform: Waveform = part("waveform at the estimated values")
     names: tuple[str, ...] = part(
@@ -263,24 +264,24 @@ class Pulse(Declared, eq=False):
     note: str = part("remark; may be empty", default="")
 
     def changed(self, values: Sequence[float]) -> Waveform:
-        """Return the waveform with other values of its constants."""
+        """Return the waveform with its constants set to other values."""
         if self.names == ("scale",):
             return self.waveform.scaled(float(values[0]))
         new = dict(zip(self.names, (float(value) for value in values), strict=True))
         return type(self.waveform)(**{**self.waveform.model_dump(), **new})
 
     def at(self, values: Sequence[float]) -> Pulse:
-        """Return the pulse at other values of its constants, without uncertainty."""
+        """Return the pulse with its constants set to other values, without uncertainty."""
         waveform = self.changed(values) if self.names else self.waveform
         return Pulse(waveform, (), np.zeros(0), np.zeros((0, 0)))
 
 
 def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform | None, tau: float) -> Pulse:
-    """Fit the constants of a waveform to a recorded current, or use the record as the waveform.
+    """Fit waveform constants to a recorded current; if the fit is poor, use the record as the waveform.
 
     `t` are ascending times, s, with the firing at 0, and `current` the readings, A, both of shape (n,);
-    `waveform` gives the initial guess, and `tau` is the time constant of the sensor, s. Messages begin with
-    `where`.
+    `waveform` gives the initial guess, and `tau` is the time constant of the sensor, s. Error messages begin
+    with `where`.
     """
     noise = noise_of_record(current)
     top = float(np.percentile(np.abs(current[t >= 0.0]), 98.0)) if (t >= 0.0).any() else 0.0
@@ -307,7 +308,7 @@ def fit_pulse(where: str, t: FloatArray, current: FloatArray, waveform: Waveform
 def _fitted(
     t: FloatArray, current: FloatArray, waveform: Waveform, tau: float, top: float
 ) -> tuple[Pulse, float]:
-    """Return the fitted pulse, and the RMS residual, A."""
+    """Fit the waveform constants; return the pulse and the RMS residual, A."""
     from scipy.optimize import least_squares
 
     names = tuple(name for name in quantities(type(waveform)) if getattr(waveform, name))
@@ -345,7 +346,7 @@ def _fitted(
 
 
 def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: float) -> list[FloatArray]:
-    """Return two starts: the given constants, and those with height and width estimated from the record."""
+    """Return two initial guesses: the given constants, and height and width estimated from the record."""
     high = t[np.abs(current) > 0.5 * top]
     recorded = dict(values)
     recorded["amplitude"] = top
@@ -354,7 +355,7 @@ def _starts(t: FloatArray, current: FloatArray, values: dict[str, float], top: f
 
 
 def _recorded(t: FloatArray, current: FloatArray, noise: float, note: str) -> Pulse:
-    """Return the record, averaged over short bins, as a waveform."""
+    """Return the recorded current as a waveform, averaged over short bins."""
     after = np.flatnonzero(t >= 0.0)
     each = max(1, -(-len(after) // _INTERVALS))
     bins = [after[i : i + each] for i in range(0, len(after), each)]

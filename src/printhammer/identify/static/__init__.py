@@ -1,1 +1,1 @@
-"""Constants of one part from static tables and rebounds."""
+"""Fits of the constants of a single part to static measurements and rebound speeds."""

@@ -1,7 +1,7 @@
 """Build fit results from least-squares solutions, and test the residuals.
 
-The tests compare the law with richer laws and look for runs in the residuals; inseparable constants are
-named.
+The tests compare the law with laws that have one more term, and look for runs in the residuals; the result
+names constants that the data cannot separate.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ _RUNS: Final = (
     "residuals of neighbours go together: the data bend another way than the law, or the sensor is slow"
 )
 _COPY: Final = 1e-6
-"""Singular value of a normalised Jacobian below which a term is collinear with others."""
+"""Singular value of the normalised Jacobian below which a term counts as collinear with the others."""
 
 _TOGETHER: Final = "the rows left out follow one another: there the data leave the law"
 
 _HARD_TO_TELL: Final = 30.0
-"""Condition number above which inseparable constants are named."""
+"""Condition number above which the result names the constants that the data cannot separate."""
 
 
 def judge(
@@ -50,14 +50,14 @@ def judge(
     """Test a law against laws with one more term, and its residuals and outliers for runs.
 
     Each term is added to the linearised, weighted fit, and a t-test, with errors and degrees of freedom as in
-    the fit, tells whether it is significant. Two tests examine the residuals in the order of the abscissa,
-    series by series: the runs of their signs, and von Neumann's ratio. A third test asks whether the excluded
-    rows are more consecutive than random gross errors would be. The smallest p-value is corrected for the
-    number of tests (Bonferroni).
+    the fit, determines whether the term is significant. Two tests examine the residuals in the order of the
+    abscissa, series by series: the runs of their signs, and von Neumann's ratio. A third test checks whether
+    the excluded rows are more consecutive than random gross errors would be. The smallest p-value is
+    corrected for the number of tests (Bonferroni).
 
     `terms` maps the meaning of a missing term to its values, in the unit of the data; terms, abscissa and
     series have the shape (m,) of the data. Returned are the corrected p-value, NaN if the data are exact or
-    too few, and the meaning of the smallest one, empty unless the law is rejected.
+    too few, and the meaning of the term or test with the smallest p-value, empty unless the law is rejected.
     """
     if solution.exact or solution.degrees_of_freedom < 3:
         return math.nan, ""
@@ -75,7 +75,7 @@ def judge(
 
 
 def need(solution: Solution, term: FloatArray) -> float:
-    """Return the p-value of one additional term in the linearised fit; NaN if it is collinear."""
+    """Compute the p-value of one additional term in the linearised fit; NaN if the term is collinear."""
     from scipy.stats import t
 
     root = np.sqrt(solution.variance[solution.used])
@@ -94,10 +94,10 @@ def need(solution: Solution, term: FloatArray) -> float:
 
 
 def runs_p_value(values: FloatArray) -> float:
-    """Return the p-value of the Wald-Wolfowitz runs test on the signs of ordered residuals.
+    """Compute the p-value of the Wald-Wolfowitz runs test on the signs of ordered residuals.
 
-    The number of runs is compared with its normal approximation, two-sided
-    (A. Wald and J. Wolfowitz, Ann. Math. Statist. 11 (1940) 147); NaN for fewer than 8 of either sign.
+    The number of runs is compared with its normal approximation, two-sided (A. Wald and J. Wolfowitz, Ann.
+    Math. Statist. 11 (1940) 147); NaN for fewer than 8 residuals of either sign.
     """
     from scipy.stats import norm
 
@@ -113,10 +113,11 @@ def runs_p_value(values: FloatArray) -> float:
 
 
 def ratio_p_value(values: FloatArray) -> float:
-    """Return the p-value of von Neumann's ratio against positive serial correlation.
+    """Compute the p-value of von Neumann's ratio test for positive serial correlation.
 
-    The mean squared difference of neighbours over the mean square is nearly normal with mean 2 and variance
-    4 (n - 2) / (n^2 - 1) (J. von Neumann, Ann. Math. Statist. 12 (1941) 367); NaN for fewer than 8 values.
+    The ratio of the mean squared difference of neighbours to the mean square is nearly normal with mean 2 and
+    variance 4 (n - 2) / (n^2 - 1) (J. von Neumann, Ann. Math. Statist. 12 (1941) 367); NaN for fewer than 8
+    values.
     """
     from scipy.stats import norm
 
@@ -131,8 +132,8 @@ def ratio_p_value(values: FloatArray) -> float:
 def stretch_p_value(signs: FloatArray) -> float:
     """Bound the probability that random gross errors are as consecutive as the excluded rows.
 
-    `signs` are those of the residuals, 0 for used rows. A stretch of k excluded rows of one sign begins at
-    any of n places with probability (1/2)^(k - 1) q^k, with q the fraction excluded. NaN without two
+    `signs` are those of the residuals, 0 for used rows. A run of k excluded rows of one sign begins at any of
+    the n rows with probability (1/2)^(k - 1) q^k, with q the fraction of excluded rows. NaN without two
     consecutive rows.
     """
     longest = length = 0
@@ -146,7 +147,7 @@ def stretch_p_value(signs: FloatArray) -> float:
 
 
 def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
-    """Describe the parameters that the data hardly distinguish; empty at a small condition number.
+    """Describe the parameters that the data hardly distinguish; empty if the condition number is small.
 
     The sentence names the parameters with large components in the weakest direction; parameters with an empty
     name are skipped.
@@ -165,16 +166,16 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
 
 
 _WEAK: Final = 0.1
-"""Relative standard error above which a constant gets a profile."""
+"""Relative standard error above which the profile of a constant is computed."""
 
 _GRID: Final = 25  # Number of values of a profile likelihood
 
 _COARSE: Final = 1e-8
-"""Relative tolerance of the iterations of a profile."""
+"""Relative tolerance of the least-squares iterations of a profile."""
 
 
 class Data(Declared, eq=False):
-    """Data of a fit with their abscissa, series and origin."""
+    """Data of a fit, with abscissa, series and file of origin."""
 
     files: tuple[Path, ...] = part("files of the data")
     kind: str = part('one of "magnet", "solenoid", "spring", "pack" and "backstop"')
@@ -187,7 +188,7 @@ class Data(Declared, eq=False):
 
 
 def solved(data: Data, law: Law, start: FloatArray | Parameters, *, robust: bool) -> Solution:
-    """Fit a law to data; see `printhammer.identify.least_squares.solve`.
+    """Fit a law to data by least squares; see `printhammer.identify.least_squares.solve`.
 
     Raises
     ------
@@ -222,11 +223,11 @@ def assemble(
     p_value: float = math.nan,
     notes: Sequence[str] = (),
 ) -> Fit:
-    """Build the result of a fit, with intervals, and with profiles of weakly determined constants.
+    """Build the result of a fit, with 95 % intervals and with profiles of weakly determined constants.
 
     `parameters` gives for each parameter its key, its SI unit, and whether a hammer file has it; an empty key
-    marks a nuisance parameter. `remedies` say, by key, what to measure to find a constant that must be
-    positive. `given`, `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
+    marks a nuisance parameter. `remedies` states, by key, what to measure to determine a constant that must
+    be positive. `given`, `indistinct`, `rejected`, `p_value` and `notes` are as in `Fit`.
 
     Raises
     ------
@@ -304,14 +305,14 @@ def assemble(
 
 
 def _unseen(constant: FittedConstant) -> str:
-    """Describe the fitted value of a constant that must be positive."""
+    """Describe why a constant that must be positive is not: negative, or indistinguishable from zero."""
     if constant.interval[1] < 0.0:
         return f"came out negative, {constant.value:.3g} {constant.unit}"
     return "cannot be distinguished from zero"
 
 
 def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profile:
-    """Compute the profile of one parameter: hold it at values about the best one, and refit the others.
+    """Compute the profile of one parameter: hold it at values around the optimum, and refit the others.
 
     The values extend to four standard errors, within the bounds; rows and weights are those of the fit.
     """
@@ -341,7 +342,7 @@ def profile(law: Law, data: FloatArray, solution: Solution, index: int) -> Profi
 
 
 def _crossing(values: FloatArray, increase: FloatArray, level: float, never: float) -> float:
-    """Locate where a profile first reaches a level, by linear interpolation of its square root."""
+    """Locate where a profile first reaches a level, by linear interpolation of the profile's square root."""
     above = np.flatnonzero(increase >= level)
     if not above.size:
         return never
@@ -352,7 +353,7 @@ def _crossing(values: FloatArray, increase: FloatArray, level: float, never: flo
 
 
 def enough(data: Data, needed: int, what: str) -> None:
-    """Raise `InputError` for data with fewer rows than a fit needs, or without a nonzero value."""
+    """Raise `InputError` for data with too few rows for a fit, or with no nonzero value."""
     where = " and ".join(str(path) for path in data.files)
     if len(data.values) < needed:
         raise InputError(

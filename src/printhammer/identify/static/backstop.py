@@ -31,14 +31,14 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import read_table
 
 _SERIES: Final = (1.0, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42525, -2848 / 18225)
-"""Coefficients of y / z in powers of z, from the law by comparison of coefficients."""
+"""Coefficients of the power series of y / z in z, derived from the restitution law."""
 
 _SMALL: Final = 0.02
 """Largest |z| at which the series is used: it is exact to rounding, whereas the logarithms cancel."""
 
 
 def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the restitution e = y / z of the law and its derivative de/dz, for z = (l/k) v_in > -1.
+    """Solve the law for the restitution e = y / z; return e and de/dz, for z = (l/k) v_in > -1.
 
     The derivative is from dy/dz = z (1 - y) / ((1 + z) y).
     """
@@ -61,17 +61,17 @@ def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 class RestitutionLaw:
-    """Rebound speed over impact speed, m/s, positive, shape (m,); p = [l/k]."""
+    """Rebound speed as a function of impact speed, m/s, both positive, shape (m,); parameters p = [l/k]."""
 
     def __init__(self, speed: FloatArray) -> None:
         self.speed = speed
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the rebound speeds, m/s."""
+        """Compute the rebound speeds, m/s."""
         return self.speed * rebound(self._z(p))[0]
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives with respect to l/k."""
+        """Compute the derivatives of the rebound speeds with respect to l/k."""
         return (self.speed**2 * rebound(self._z(p))[1])[:, None]
 
     def spread(self, p: FloatArray) -> FloatArray:
@@ -92,7 +92,7 @@ class RestitutionLaw:
 
 
 RATIO: Final = "backstop.damping / backstop.stiffness"
-"""Key of l/k, whose unit is s/m."""
+"""Key of the ratio l/k, in s/m."""
 
 _ROWS: Final = 6  # Smallest number of rebounds for a fit with an error
 _SPAN: Final = 1.5
@@ -103,14 +103,14 @@ _AXES: Final = (("impact speed", "m/s"), ("rebound speed", "m/s"))
 
 @dataclass(frozen=True)
 class Stiffness:
-    """A Hertz stiffness k with its standard error and origin."""
+    """Hertz stiffness k, with its standard error and origin."""
 
     value: float
     """Stiffness k, N/m^1.5."""
     standard_error: float = 0.0
-    """Standard error, in the same unit; 0 if unknown."""
+    """Standard error of k, N/m^1.5; 0 if unknown."""
     how: str = ""
-    """Source text of the constant; empty if the stiffness is taken as known and is not a result."""
+    """Source text of k; empty if the stiffness is taken as known and is not a fit result."""
 
     @classmethod
     def from_bodies(
@@ -234,7 +234,7 @@ def fit_backstop(
 
 
 def _why(solution: Solution, speed: FloatArray, back: FloatArray) -> str:
-    """Describe how the rebounds deviate from the law."""
+    """Describe how the rebound speeds deviate from the restitution law."""
     used = solution.used
     share = (back / speed)[used]
     constant = float(np.median(share))
@@ -284,7 +284,7 @@ def _constant(k: Stiffness) -> FittedConstant:
 
 
 def _of_bodies(k: Stiffness) -> Fit:
-    """Return a result without data, for a stiffness from the bodies alone."""
+    """Return a fit result without data, for a stiffness computed from the two bodies alone."""
     none = np.empty(0)
     whole = np.empty(0, dtype=np.int64)
     return Fit(

@@ -39,7 +39,7 @@ class TotalLaw:
         self.parameters = (4 if position is None else 5) + (zero is None)
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the force, N."""
+        """Compute the force of magnet and spring, N."""
         x = self._place(p)
         pull: FloatArray = (p[1] - p[2] * self.current) ** 2 / np.sqrt(x)
         if self.position is None:
@@ -50,7 +50,7 @@ class TotalLaw:
         return force
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives with respect to the parameters."""
+        """Compute the derivatives of the force with respect to the parameters."""
         x, magnet = self._place(p), self.magnet.astype(np.float64)
         left = p[1] - p[2] * self.current
         pull = [-2.0 * left / np.sqrt(x) * magnet, 2.0 * left * self.current / np.sqrt(x) * magnet]
@@ -70,11 +70,11 @@ class TotalLaw:
         return np.column_stack([magnet, 1.0 - magnet, (self._slope(p) * magnet) ** 2, by_current**2])
 
     def at(self, p: FloatArray, x: FloatArray, current: FloatArray) -> FloatArray:
-        """Return the force at displacements measured from x = 0, m, and currents, A."""
+        """Compute the force at displacements measured from x = 0, m, and currents, A."""
         return TotalLaw(x, current, self.position, 0.0).value(p)
 
     def richer(self, p: FloatArray, *, by_current: bool) -> dict[str, FloatArray]:
-        """Return terms that equation (3) lacks, by the meaning of each."""
+        """Return candidate terms that equation (3) lacks, keyed by the meaning of each term."""
         x, magnet, current = self._place(p), self.magnet.astype(np.float64), self.current
         place = "the pull does not follow the inverse root of the displacement"
         square = "the pull does not follow the square of Am - Bm I"
@@ -151,7 +151,7 @@ _SPARE: Final = 4
 """Smallest number of rows in excess of parameters, for the errors and the test of the law; arbitrary."""
 
 _LEVELS: Final = 12
-"""Largest number of distinct currents shown as separate series."""
+"""Largest number of distinct currents plotted as separate series."""
 
 _COMBINED: Final = "magnet.F0 + spring.Bs (1 + b / spring.As)"
 _SLOPE: Final = "spring.Bs / spring.As"
@@ -247,7 +247,7 @@ def _data(table: Readings, alone: Readings | None) -> Data:
 
 
 def _check(table: Readings, alone: Readings | None, zero: float, position: float | None) -> int:
-    """Check that a table allows a fit; return the number of distinct currents, 0 for a continuum."""
+    """Check that a table allows a fit; return the number of distinct currents, 0 if they are continuous."""
     x, current, force = (table.values[name] for name in ("displacement", "current", "force"))
     low = int(np.argmin(x))
     if x[low] <= zero:
@@ -333,7 +333,7 @@ def _indistinct(with_spring: bool, levels: int) -> list[str]:
 
 
 def clusters(values: FloatArray) -> int:
-    """Count the clusters of values, separated by gaps of 5 % of their span; 0 for a continuum."""
+    """Count the clusters of values, separated by gaps of 5 % of the range; 0 if the values are continuous."""
     if float(np.ptp(values)) <= 1e-3 * float(np.abs(values).max()):
         return 1
     groups = 1 + int(group_of(values).max())

@@ -27,14 +27,14 @@ from printhammer.support.tables.readings import Readings, read_table
 from printhammer.units import from_si
 
 _TURN: Final = 0.05
-"""Reversal of the indentation, as a fraction of its largest, that counts as a change of direction."""
+"""Reversal, as a fraction of the largest indentation, that counts as a change of direction."""
 
 _FALL: Final = 0.05
-"""Fall of the loading force, as a fraction of the largest, that counts as a decrease."""
+"""Fall of the loading force, as a fraction of the largest force, that counts as a decrease."""
 
 
 class Cycles(Declared, eq=False):
-    """Branch and load cycle of each row."""
+    """Branch (loading or unloading) and load cycle of each row of a table."""
 
     unloading: BoolArray = part("whether a row is on the unloading branch, shape (m,)")
     cycle: IntArray = part("index of the load cycle, shape (m,)")
@@ -61,7 +61,7 @@ def cycles_of(table: Readings) -> Cycles:
 
 
 def _by_sense(depth: FloatArray) -> BoolArray:
-    """Mask of the rows between a local maximum of the indentation and the next minimum."""
+    """Mask of the unloading rows: between a local maximum of the indentation and the next minimum."""
     unloading = np.zeros(len(depth), dtype=bool)
     least = _TURN * float(np.ptp(depth))
     extreme, falling = 0, False
@@ -127,15 +127,15 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
 
 
 LOADING, UNLOADING = 2.7, 11.0
-"""Exponents of equation (5)."""
+"""Exponents of the loading and unloading branches of equation (5)."""
 
 _SPARE: Final = 4  # Smallest number of rows beyond the number of unknowns
 _LOADING_ROWS: Final = 4  # Smallest number of rows of a loading branch
 _MEETS: Final = 0.02
-"""Offset of a turning point, as a fraction of the largest indentation, below which no remark is made."""
+"""Offset of a turning point, as a fraction of the largest indentation, up to which it is not reported."""
 
 _FAR: Final = 1.0
-"""Largest absolute logarithm of fitted over measured turning point."""
+"""Largest absolute logarithm of the ratio of fitted to measured turning point."""
 
 
 class PackLaw:
@@ -155,7 +155,7 @@ class PackLaw:
         self.parameters = 1 + len(self.turns) + 2 * exponents
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the force, N."""
+        """Compute the force, N."""
         low, high = self.exponents(p)
         power = low * self.log_r
         if len(self.turns):
@@ -164,7 +164,7 @@ class PackLaw:
         return np.where(self.inside, p[0] * np.exp(power), 0.0)
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives with respect to the parameters."""
+        """Compute the derivatives of the force with respect to the parameters."""
         force, (low, high) = self.value(p), self.exponents(p)
         columns = [force / p[0]]
         for k in range(len(self.turns)):
@@ -175,7 +175,7 @@ class PackLaw:
         return np.column_stack(columns)
 
     def by_exponents(self, p: FloatArray) -> list[FloatArray]:
-        """Return the derivatives of the force with respect to the two exponents."""
+        """Compute the derivatives of the force with respect to the two exponents."""
         force, out = self.value(p), self.cycles.unloading
         depth = p[1 + self.column] if len(self.turns) else np.zeros_like(force)
         return [np.where(out, depth, self.log_r) * force, np.where(out, (self.log_r - depth) * force, 0.0)]
@@ -187,7 +187,7 @@ class PackLaw:
         return np.column_stack([np.ones_like(force), force**2, (steep * force) ** 2])
 
     def exponents(self, p: FloatArray) -> tuple[float, float]:
-        """Return the exponents of loading and unloading."""
+        """Return the exponents of loading and unloading: fitted, or 2.7 and 11."""
         return (float(p[-2]), float(p[-1])) if self.free else (LOADING, UNLOADING)
 
 
@@ -300,7 +300,7 @@ def _check_turns(law: PackLaw, table: Readings, solution: Solution) -> None:
 
 
 def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
-    """Test the exponents of equation (5); return the p-value, and the reason of a rejection."""
+    """Test the exponents of equation (5); return the p-value and the reason for a rejection."""
     out = bool(len(law.turns))
     terms = dict(zip("pq", law.by_exponents(solution.p)[: 1 + out], strict=False))
     p_value, why = judge(solution, terms, data.abscissa, data.series)
@@ -320,7 +320,7 @@ def _judge(law: PackLaw, data: Data, solution: Solution) -> tuple[float, str]:
 
 
 def _notes(law: PackLaw, table: Readings, solution: Solution) -> list[str]:
-    """List remarks: missing unloading rows, and turning points away from the largest indentation."""
+    """Return remarks on missing unloading rows, and on turning points away from the largest indentation."""
     if not len(law.turns):
         return ["without rows of unloading the hysteresis of the pack is taken from equation (5), not tested"]
     sentences = []

@@ -38,16 +38,16 @@ _REACH: Final = 1e3
 """Largest factor between a fitted constant and its initial guess; arbitrary."""
 
 _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
-"""Constants whose effect vanishes when they are large, as that of the others when they are small."""
+"""Constants whose effect vanishes when they are large; the effect of all others vanishes at zero."""
 
 _FACTOR: Final = 4.0
-"""Factor between force and slope of the inductance beyond saturation; a pound-force is 4.4 N."""
+"""Ratio of force to i^2/2 dL/dg above which a unit must be wrong (lbf for N: 4.4), not the saturation."""
 
 _SPARE: Final = 4
 """Smallest number of rows in excess of parameters, for the errors; arbitrary."""
 
 _STARTS: Final = 8
-"""Number of starts of the multi-start search; the first is an estimate, the others scatter about it."""
+"""Number of starts of the multi-start search; the first is an estimate, the others are random around it."""
 
 
 def fit_solenoid(
@@ -176,7 +176,7 @@ class CircuitLaw:
         self.rows = list(zip(gap.tolist(), current.tolist(), strict=True))
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the logarithms."""
+        """Compute the logarithms of force and linkage."""
         constants = dict(zip(CONSTANTS, p.tolist(), strict=True))
         constants["leakage_reach"] = max(constants["leakage_reach"], (1.0 + 1e-9) * self.widest)
         c = ReluctanceMagnet(turns=self.turns, closed_at=0.0, **constants).packed(0.0)
@@ -186,7 +186,7 @@ class CircuitLaw:
         return logarithms
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives with respect to the parameters, by central differences."""
+        """Compute the derivatives of the logarithms with respect to the parameters by central differences."""
         steps = 1e-5 * p
         columns = [
             (self.value(p + step) - self.value(p - step)) / (2.0 * size)
@@ -202,7 +202,7 @@ class CircuitLaw:
 def _start(
     law: CircuitLaw, gap: FloatArray, force: FloatArray, linkage: FloatArray, data: FloatArray
 ) -> FloatArray:
-    """Return an initial guess: the best of several least-squares searches in the logarithms."""
+    """Return the initial guess: the best of several least-squares searches in the logarithms."""
     from scipy.optimize import least_squares
 
     current = np.array([row[1] for row in law.rows])

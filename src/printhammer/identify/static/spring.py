@@ -27,15 +27,15 @@ class SpringLaw:
         self.travel = travel
 
     def value(self, p: FloatArray) -> FloatArray:
-        """Return the force, N."""
+        """Compute the force of the spring, N."""
         return np.asarray(p[0] * (1.0 - self.travel / p[1]))
 
     def jacobian(self, p: FloatArray) -> FloatArray:
-        """Return the derivatives with respect to Bs and As."""
+        """Compute the derivatives of the force with respect to Bs and As."""
         return np.column_stack([1.0 - self.travel / p[1], p[0] * self.travel / (p[1] * p[1])])
 
     def spread(self, p: FloatArray) -> FloatArray:  # noqa: ARG002
-        """Return one variance component: on a line, an error in x only adds to the error in the force."""
+        """Return one variance component: along a line, an error in x only adds to the error in the force."""
         return np.ones((len(self.travel), 1))
 
 
