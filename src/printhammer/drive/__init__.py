@@ -1,1 +1,1 @@
-"""Drives: firing times and waveforms."""
+"""Drives: pulse trains, bursts, sequences and sinusoidal forces, and their files."""

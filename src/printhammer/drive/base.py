@@ -28,7 +28,7 @@ class Drive:
     """
 
     bounded: ClassVar[bool] = False
-    """Whether `largest_pulse` is a stated bound instead of a consequence of the pieces."""
+    """Whether `largest_pulse` is a stated bound instead of the computed maximum of the segments."""
 
     def __init__(
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap = "add", period: float | None = None
@@ -97,7 +97,7 @@ class Drive:
     def kernel_arrays(self) -> tuple[FloatArray, IntArray, FloatArray, bool, bool]:
         """Return the arrays of the drive for the kernel.
 
-        Firing times, s; first row of each firing's segment table; all tables stacked
+        Firing times, s; first row of each firing's segment table; all segment tables stacked
         (`printhammer.drive.segments.stacked`); whether pulses replace each other; whether the drive is a
         force.
         """
@@ -160,7 +160,7 @@ class Drive:
         return result
 
     def _begins(self) -> IntArray:
-        """Return, for each firing, the first row of its table in the kernel's tables."""
+        """Return, for each firing, the index of its segment table's first row in the stacked tables."""
         return np.zeros(len(self._times), np.int64)
 
     def _ends(self) -> FloatArray:
@@ -169,11 +169,11 @@ class Drive:
         return ends
 
     def _reach(self) -> int:
-        """Return the number of latest firings, counted without gaps, that may still be active."""
+        """Return the number of latest firings whose pulses may still be active at a time."""
         return self.overlapping
 
     def _values(self, time: FloatArray, pulse: IntArray) -> FloatArray:
-        """Return the values of the pulses with given indices at given times, s."""
+        """Return the values, A or N, of the pulses with given indices at given times, s."""
         return evaluate(self._segments, time, self._times[pulse])
 
     def __eq__(self, other: object) -> bool:

@@ -36,7 +36,7 @@ class Ragged:
     values : array, shape (all, ...)
         Entries of all rows, concatenated.
     starts : int array, shape (rows + 1,)
-        Index of the first entry of each row, and the total number of entries.
+        Index of each row's first entry in `values`, followed by the total number of entries.
     """
 
     values: npt.NDArray[Any]
@@ -56,7 +56,7 @@ class Ragged:
 
     @classmethod
     def sorted_by(cls, keys: npt.NDArray[Any]) -> Self:
-        """Group the indices of equal keys into rows, in ascending order of the keys."""
+        """Group indices by key: one row per distinct key, with the indices of the entries that have it."""
         _, counts = np.unique(keys, return_counts=True)
         return cls(np.argsort(keys, kind="stable"), starts_of(counts))
 
@@ -90,7 +90,7 @@ class Ragged:
         return self.values[self.starts[1:] - 1]
 
     def places(self, rows: IntArray) -> IntArray:
-        """Return the indices in `values` of the entries of several rows, concatenated."""
+        """Return the indices of the entries of several rows in `values`, concatenated."""
         counts = self.counts[rows]
         starts = starts_of(counts)
         return np.arange(starts[-1]) + np.repeat(self.starts[rows] - starts[:-1], counts)
@@ -119,7 +119,7 @@ def starts_of(counts: IntArray) -> IntArray:
 
 
 class PulseTrains(Sequence[PulseTrain]):
-    """Batch of pulse trains that fire one waveform, or a few different ones.
+    """Batch of pulse trains, each with one waveform; few different waveforms occur.
 
     All firing times are in one array, in the form that an ensemble uses; indexing builds a `PulseTrain` on
     demand.
@@ -193,7 +193,7 @@ class PulseTrains(Sequence[PulseTrain]):
         firings.values.flags.writeable = False
 
     def _check(self) -> None:
-        """Raise InputError for invalid firing times, with the message of a single train."""
+        """Check the firing times; raise the same InputError as a single train with invalid times."""
         if not len(self):
             raise InputError("no train is given", key="train", expected="at least one")
         times, starts = self._firings.values, self._firings.starts
@@ -257,7 +257,7 @@ def firings_of(drives: Sequence[Drive]) -> Ragged:
 
 
 def joined(parts: Sequence[Sequence[Drive]]) -> Sequence[Drive]:
-    """Concatenate sequences of drives, as flat arrays if all of them are batches."""
+    """Concatenate sequences of drives; the result is a batch of flat arrays if all sequences are batches."""
     trains = [part for part in parts if isinstance(part, PulseTrains)]
     if not parts or len(trains) < len(parts):
         return [drive for part in parts for drive in part]

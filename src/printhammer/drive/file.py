@@ -76,8 +76,8 @@ def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
     Raises
     ------
     InputError
-        The file cannot be read, is not TOML, has an unknown key, lacks one, or has a value of the wrong kind,
-        unit or range; the sentence names file, key and value.
+        The file cannot be read, is not TOML, has an unknown or missing key, or a value of the wrong kind,
+        unit or range; the message names file, key and value.
     """
     path = Path(path)
     return read_drive(read_text(path, "the drive file"), waveform, name=str(path), folder=path.parent)
@@ -208,7 +208,7 @@ def _arguments(table: dict[str, Any], kind: str) -> dict[str, Any]:
 
 
 def _quantity(value: Any, units: tuple[str, ...], where: str) -> tuple[float, str]:
-    """Parse a quantity in one of several SI units; return the value and its unit."""
+    """Parse a quantity that may have one of several dimensions; return its SI value and SI unit."""
     from printhammer.units import split, to_si
 
     if isinstance(value, str):
@@ -311,7 +311,7 @@ def _waveform(table: dict[str, Any], folder: Path, where: str) -> Waveform:
 
 
 def _chain(data: dict[str, Any], folder: Path, where: str) -> Chain:
-    """Parse a chain: a list of waveforms, each with its offset."""
+    """Parse a chain: a list of waveforms, each with its offset from the firing."""
     _known(data, {"parts"}, where)
     _required(data, ("parts",), where)
     if not isinstance(data["parts"], list) or not data["parts"]:

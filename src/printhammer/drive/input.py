@@ -14,13 +14,13 @@ from printhammer.errors import InputError, located
 from printhammer.support.arrays import FloatArray
 
 PULSES: Final = 9
-"""Default number of firings of a train, as in the bursts of the paper."""
+"""Default number of firings of a pulse train, as in the bursts of the paper."""
 
 MOST_PULSES: Final = 10_000_000
 """Largest number of firings of a drive; arbitrary, to refuse typing errors."""
 
 SPACING_UNITS: Final = {"rate": "Hz", "period": "s"}
-"""The two ways to specify the spacing of firings, and their SI units."""
+"""Names of the arguments that state the spacing of firings, rate or period, and their SI units."""
 
 
 def read_number(value: float | str, si: str, name: str) -> float:
@@ -77,7 +77,7 @@ def read_count(value: SupportsIndex | None, name: str, least: int = 1) -> int:
 
 
 def read_array(values: npt.ArrayLike, name: str, what: str = "numbers", si: str = "") -> FloatArray:
-    """Parse numbers into a new array of any shape.
+    """Parse numbers into a new float array of any shape.
 
     With a unit `si`, a list may hold text with units beside numbers in SI.
     """

@@ -36,11 +36,11 @@ POLYNOMIAL: Final = 0
 EXPONENTIAL: Final = 1
 SINE: Final = 2
 END: Final = 3
-"""Kind of the last row if the kernel receives several tables in one array."""
+"""Kind of the row that ends each table if the kernel receives several tables in one array."""
 SWITCHED: Final = 4
 DECAY: Final = 5
 RESERVOIR: Final = 6
-"""Kinds of the segments of a driver, whose value is the supply voltage p0, and 0 while the supply is off."""
+"""Kinds of a driver's segments: supply on (value: supply voltage p0), supply off (value 0), reservoir."""
 COLUMNS: Final = 6  # Number of columns of a table
 
 _CHUNK: Final = 1024  # Intervals evaluated at once, which bounds the memory; arbitrary
@@ -113,7 +113,7 @@ def evaluate(segments: FloatArray, t: npt.ArrayLike, fired: npt.ArrayLike = 0.0)
 
 
 def _inner_extremes(row: FloatArray, length: float) -> list[float]:
-    """Return the points s in (0, length) where the slope of a segment vanishes."""
+    """Return the stationary points of a segment, as times s in (0, length) after its start."""
     _, kind, _, p1, p2, p3 = (float(entry) for entry in row)
     if kind == SINE:
         if not math.isfinite(length):

@@ -42,8 +42,9 @@ class PulseSequence(Drive):
     Raises
     ------
     InputError
-        No waveforms, something else among them, one that never ends, currents and forces together; not as
-        many times as waveforms; times negative, not finite, duplicate or descending.
+        `waveforms` is empty, contains something else than waveforms, an endless waveform, or both currents
+        and forces; the numbers of times and waveforms differ; or a time is negative, not finite, duplicate or
+        descending.
     """
 
     _largest: float
@@ -130,7 +131,8 @@ class PulseSequence(Drive):
         Raises
         ------
         InputError
-            Not as many times as waveforms; times negative, not finite, duplicate or descending.
+            The numbers of times and waveforms differ, or a time is negative, not finite, duplicate or
+            descending.
         """
         return PulseSequence(self._waveforms, times, self._overlap)
 
@@ -144,7 +146,7 @@ class PulseSequence(Drive):
         return document({"format": FORMAT, "overlap": self._overlap}, tables)
 
     def _place(self, waveforms: Sequence[Waveform]) -> None:
-        """Store the waveforms: the distinct segment tables, and the table of each firing."""
+        """Store the waveforms: their distinct segment tables, and the index of each firing's table."""
         numbers: dict[bytes, int] = {}
         tables: list[FloatArray] = []
         supports: list[float] = []

@@ -21,12 +21,12 @@ FORMAT = 1
 
 
 def quantity_text(value: float, unit: str) -> dict[str, Any]:
-    """Format one quantity as a TOML table; -0.0 becomes 0.0."""
+    """Format one quantity as a TOML inline table with value and unit; -0.0 is written as 0.0."""
     return {"value": float(value) + 0.0, "unit": unit}
 
 
 def column_text(values: Iterable[float], unit: str) -> dict[str, Any]:
-    """Format several numbers with a common unit as a TOML table."""
+    """Format numbers with a common unit as a TOML inline table with values and unit."""
     return {"values": [float(value) + 0.0 for value in values], "unit": unit}
 
 

@@ -36,7 +36,7 @@ __all__ = ["Burst", "Drive", "Overlap", "PulseTrain", "SineForce"]
 
 
 class _Pulsed(Drive):
-    """Drive of pulses of finite duration."""
+    """Base class of drives that fire pulses of finite duration."""
 
     def __init__(
         self, waveform: Waveform, times: npt.ArrayLike, overlap: Overlap, period: float | None
@@ -69,23 +69,23 @@ class PulseTrain(_Pulsed):
     Parameters
     ----------
     waveform
-        Waveform of every firing; None, as of a hammer without a waveform, is refused.
+        Waveform of every firing; None, for instance from a hammer without a waveform, raises the error.
     rate, period
         Firings per second, Hz, or the time between them, s; one of the two.
     at
-        Instead: firing times, s, ascending.
+        Firing times, s, ascending, instead of a rate or period.
     pulses
         Number of firings; by default nine, as in the bursts of the paper, or one without rate and period.
     overlap
         "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
     start
-        First firing, or shift of the given times, s.
+        Time of the first firing, or shift of the times `at`, s.
 
     Raises
     ------
     InputError
-        A rate or period not positive, fewer than 1 pulses, times negative, not finite, duplicate or
-        descending, contradictory arguments, a quantity of the wrong dimension.
+        A rate or period is not positive, there are fewer than 1 pulses, a time is negative, not finite,
+        duplicate or descending, a quantity has the wrong dimension, or arguments contradict each other.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class PulseTrain(_Pulsed):
         super().__init__(waveform, first + steps, overlap, spacing)
 
     def _with_checked_times(self, times: FloatArray, rate: float | None) -> PulseTrain:
-        """Return a train of the same waveform at validated times, s.
+        """Return a train with the same waveform at new, already validated firing times, s.
 
         `rate` is the rate of these times, Hz, or None.
         """
@@ -153,7 +153,7 @@ class Burst(_Pulsed):
     rate, period
         Firings per second within a burst, Hz, or the time between them, s; one of the two.
     pulses
-        Firings of one burst.
+        Number of firings of one burst.
     bursts
         Number of bursts.
     gap
@@ -213,12 +213,12 @@ class SineForce(Drive):
     frequency
         Hz.
     phase
-        At t = 0, rad.
+        Phase at t = 0, rad.
 
     Raises
     ------
     InputError
-        A number not finite, a frequency not positive, a quantity of the wrong dimension.
+        A number is not finite, the frequency is not positive, or a quantity has the wrong dimension.
     """
 
     def __init__(self, amplitude: float | str, frequency: float | str, phase: float | str = 0.0) -> None:

@@ -1,10 +1,10 @@
-"""Compilation in a second process of machine code that will be needed next.
+"""Compile, in a second process, the machine code that a motion needs after its run.
 
     python -m printhammer.run.ahead LAWS
 
-compiles, for laws passed as JSON, the functions that a motion needs besides its run. They are then loaded
-from disk; if that is impossible, because the laws come from a part file or the cache cannot be written, the
-first process compiles them.
+compiles, for laws passed as JSON, the functions that evaluate a motion after its run. The first process then
+loads them from disk; if that is impossible, because the laws come from a part file or the cache cannot be
+written, the first process compiles them too.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from printhammer.support.threads import thread_count
 
 
 def begin(laws: Laws) -> Callable[[], None]:
-    """Compile the functions that a motion needs besides its run in another process, if a core is free.
+    """Start compiling, in another process if a core is free, the functions that evaluate a motion.
 
     Returns
     -------
     callable
-        Function that waits for the process, which ends with this process at the latest.
+        Function that waits for the other process, which ends with this process at the latest.
     """
     if thread_count(None) < 2:
         return _nothing
@@ -53,7 +53,7 @@ def _nothing() -> None:
 
 
 def prepare(laws: Laws) -> None:
-    """Compile the functions that a motion needs besides its run, by calls on an empty record."""
+    """Compile the functions that evaluate a motion, by calling them on an empty record."""
     kernel = specialise(laws)
     none, nodes, contacts, constants = np.empty(0), np.empty((0, 5)), np.empty((0, 7)), np.zeros(64)
     drive = (none, np.zeros(0, np.int64), np.empty((0, 7)), False, np.zeros(0, np.int64), np.zeros(1))

@@ -18,13 +18,13 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 
 class Contact(Declared):
-    """Touch of the pack or the backstop."""
+    """One contact of the armature with pack or backstop, from touch to departure."""
 
-    surface: Literal["pack", "backstop"] = part("what is touched")
-    t_in: float = scalar("s", "time of touch", more="of the start of the run where it was open already")
+    surface: Literal["pack", "backstop"] = part("touched surface")
+    t_in: float = scalar("s", "time of touch", more="start of the run if the contact was open then")
     v_in: float = scalar("m/s", "velocity at touch", more="likewise")
-    t_out: float | None = scalar("s", "time of leaving", more="None while it is open")
-    v_out: float | None = scalar("m/s", "velocity at leaving", more="None while it is open")
+    t_out: float | None = scalar("s", "time of leaving", more="None while the contact is open")
+    v_out: float | None = scalar("m/s", "velocity at leaving", more="None while the contact is open")
     t_peak: float = scalar("s", "time of the largest indentation or compression")
     depth: float = scalar("m", "largest indentation or compression")
     peak_force: float | None = scalar(
@@ -32,13 +32,13 @@ class Contact(Declared):
     )
     loss: float = scalar(
         "J",
-        "energy that the contact took from the armature for good",
+        "energy of the armature that the contact dissipated",
         more="minus the work of the whole pack force, or of the viscous force of the backstop; of an open"
         " pack contact: so far, what it stores included",
     )
-    firing: int | None = part("number of the latest firing at or before the touch")
-    extra: bool = part("a pack contact that is not the first one after its firing")
-    initial: bool = part("whether it was open at the start of the run")
+    firing: int | None = part("index of the latest firing at or before the touch")
+    extra: bool = part("whether the contact is a pack contact after the first one of its firing")
+    initial: bool = part("whether the contact was open at the start of the run")
 
 
 class Dot(Declared):
@@ -48,33 +48,34 @@ class Dot(Declared):
     one is a lost dot.
     """
 
-    index: int = part("number of the firing, from 0")
+    index: int = part("index of the firing, from 0")
     fired_at: float = scalar("s", "time of the firing")
     struck: bool = part(
-        "False for a lost dot", more="all that follows is then None, but for the number of extra contacts, 0"
+        "whether the firing made a dot",
+        more="for a lost dot the fields that follow are None, and `extra_contacts` is 0",
     )
-    flight_time: float | None = scalar("s", "from firing to touch", default=None)
-    impact_speed: float | None = scalar("m/s", "at touch", default=None)
+    flight_time: float | None = scalar("s", "time from firing to touch", default=None)
+    impact_speed: float | None = scalar("m/s", "velocity at touch", default=None)
     peak_force: float | None = scalar("N", "largest pack force", default=None)
     indentation: float | None = scalar("m", "largest indentation", default=None)
     contact_time: float | None = scalar(
-        "s", "from touch to leaving", more="None also while the contact is open", default=None
+        "s", "time from touch to leaving", more="None also while the contact is open", default=None
     )
     loading_work: float | None = scalar(
         "J", "work done on the pack up to its largest indentation", default=None
     )
-    net_loss: float | None = scalar("J", "energy that the pack kept", default=None)
+    net_loss: float | None = scalar("J", "energy dissipated in the pack", default=None)
     extra_contacts: int = part("further pack contacts before the next firing", default=0)
 
 
 class _Numbers:
-    """Counter of the pack contacts of each firing."""
+    """Counter that numbers the pack contacts of each firing."""
 
     def __init__(self) -> None:
         self._counts: dict[int, int] = {}
 
     def count(self, surface: int, initial: bool, fired: int) -> int:
-        """Return the index of the next contact among those of its firing, and count it."""
+        """Return the index of a contact among the pack contacts of its firing, and increment the counter."""
         number = contact_number(surface, initial, fired, self._counts.get(fired, 0))
         if number != NO_DOT:
             self._counts[fired] = number + 1
@@ -82,7 +83,7 @@ class _Numbers:
 
 
 def contact_numbers(contacts: Sequence[Contact]) -> list[int]:
-    """Return the index of each contact among those of its firing; `DOT` marks the contact of the dot."""
+    """Return the index of each contact among the pack contacts of its firing; index `DOT` makes the dot."""
     numbers = _Numbers()
     return [
         numbers.count(
@@ -95,7 +96,7 @@ def contact_numbers(contacts: Sequence[Contact]) -> list[int]:
 
 
 def step_range(record: Record, row: int) -> tuple[int, int]:
-    """Return the first step of a contact and the step after its last."""
+    """Return the range of integration steps within a contact: the first, and one past the last."""
     first = int(record.contacts[row, 5])
     t_out = record.contacts[row, 3]
     last = len(record.nodes) - 1
@@ -108,7 +109,7 @@ def step_range(record: Record, row: int) -> tuple[int, int]:
 
 
 def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]]:
-    """Return surface and time, s, of every touch of a run, except contacts open at its start."""
+    """Return surface and time, s, of every touch in a run; contacts open at the start are excluded."""
     return [
         ("pack" if int(row[0]) == PACK_SURFACE else "backstop", float(row[1]))
         for row in record.contacts
@@ -117,10 +118,10 @@ def touches_of(record: Record) -> list[tuple[Literal["pack", "backstop"], float]
 
 
 def contacts_of(problem: Problem, record: Record, increments: FloatArray, rigid: bool) -> list[Contact]:
-    """Combine the recorded contacts with their peaks and losses.
+    """Build the contacts of a run from the kernel's record, with peak forces and energy losses.
 
-    The increments are those of `printhammer.run.energy.increments_of`; `rigid` states whether the backstop is
-    rigid.
+    `increments` is the result of `printhammer.run.energy.increments_of`; `rigid` states whether the backstop
+    is rigid.
     """
     if len(record.contacts) == 0:
         return []
@@ -215,23 +216,25 @@ _FIRINGS: Final = "member firing"
 
 
 class DotTable(Result):
-    """Dots of the members, padded to the largest number of firings; NaN for missing values."""
+    """Dots of all ensemble members, one row per member, padded with NaN to the largest number of firings."""
 
-    fired: BoolArray = column("1", "whether there was such a firing, and the run came so far", _FIRINGS)
+    fired: BoolArray = column(
+        "1", "whether the member has this firing, and the run reached its time", _FIRINGS
+    )
     fired_at: FloatArray = column("s", "time of the firing", _FIRINGS)
-    struck: BoolArray = column("1", "whether it made a dot", _FIRINGS)
+    struck: BoolArray = column("1", "whether the firing made a dot", _FIRINGS)
     flight_time: FloatArray = column("s", "time from firing to touch", _FIRINGS)
     impact_speed: FloatArray = column("m/s", "velocity at touch", _FIRINGS)
     peak_force: FloatArray = column("N", "largest pack force", _FIRINGS)
     indentation: FloatArray = column("m", "largest indentation", _FIRINGS)
     contact_time: FloatArray = column(
-        "s", "time from touch to leaving", _FIRINGS, more="nan also while the contact is open"
+        "s", "time from touch to leaving", _FIRINGS, more="NaN also while the contact is open"
     )
     extra_contacts: IntArray = column("1", "further pack contacts before the next firing", _FIRINGS)
 
     @classmethod
     def from_rows(cls, rows: FloatArray, fired_at: FloatArray, reached: FloatArray) -> DotTable:
-        """Build the table from rows of the kernel, shape (members, firings, columns).
+        """Build the table from the dot rows of the kernel, shape (members, firings, columns).
 
         Parameters
         ----------
@@ -258,7 +261,7 @@ class DotTable(Result):
 
 
 class ExtraDots(Result):
-    """Extra contacts of all members, ordered by member, firing and time."""
+    """Extra pack contacts of all ensemble members, ordered by member, firing and time."""
 
     member: IntArray = column("1", "index of the member", "extra")
     firing: IntArray = column("1", "index of the firing of that member", "extra")
@@ -267,7 +270,7 @@ class ExtraDots(Result):
 
     @classmethod
     def from_rows(cls, groups: Sequence[tuple[IntArray, Ragged]]) -> ExtraDots:
-        """Concatenate the extra contacts of several groups, each with the indices of its members."""
+        """Concatenate the extra contacts of several groups; each group comes with its members' indices."""
         member = np.concatenate(
             [np.zeros(0, np.int64), *(np.repeat(own, rows.counts) for own, rows in groups)]
         )

@@ -74,25 +74,25 @@ class Effort:
 
     @property
     def quiet(self) -> Effort:
-        """The same effort without progress, for a part of the work."""
+        """Copy without progress reports, for a subtask."""
         return replace(self, progress=None)
 
     @property
     def alone(self) -> Effort:
-        """The same effort in the calling thread and without progress, for work inside a thread."""
+        """Copy with a single thread and without progress reports, for work inside a worker thread."""
         return Effort(self.tolerance, threads=1)
 
     @property
     def running(self) -> AtFixedTolerance:
-        """Keywords of a run of an ensemble whose tolerance is already set."""
+        """Keywords `threads` and `progress` for `Ensemble.run`; the ensemble already has its tolerance."""
         return {"threads": self.threads, "progress": self.progress}
 
     def at(self, tolerance: float) -> Effort:
-        """Return the same effort at another tolerance, without progress."""
+        """Return a copy with another tolerance and without progress reports."""
         return Effort(tolerance, self.threads)
 
     def within(self, begun: int, total: int) -> Effort:
-        """Return the effort of a part of the work, whose progress starts at `begun` of `total`."""
+        """Return a copy for a subtask, whose progress is counted from `begun` on, out of `total` steps."""
         return replace(self, progress=shifted(self.progress, begun, total))
 
     def report(self, done: int, total: int) -> None:
@@ -115,8 +115,8 @@ _ENTRIES: Final = {
     "threads": """threads : int, optional
     Number of threads, by default one per core. The result does not depend on it.""",
     "progress": """progress : callable, optional
-    Called now and then, in the calling thread, with the number of steps done and the number of all steps,
-    as far as it is known.""",
+    Called from time to time, in the calling thread, with the number of steps done and, as far as it is
+    known, the total number of steps.""",
     "firing": """**firing
     How the hammer is fired, as for `printhammer.Regime.of`.""",
 }

@@ -1,4 +1,4 @@
-"""Energies of a run: work of the coil, and the ledger of all terms.
+"""Energies of a run: work of the coil, and the ledger of all works, losses and stored energies.
 
 The ledger sums the work of the coil, the losses in pack and backstop, and the stored energy.
 """
@@ -33,11 +33,15 @@ class CoilWork(Declared):
 
     net: float = scalar("J", "integral of the power", more="`coil_work` of the energy ledger")
     positive: float = scalar(
-        "J", "integral of the power where it is positive", more="what a supply gives that takes nothing back"
+        "J",
+        "integral of the power where it is positive",
+        more="the energy from a supply that cannot take energy back",
     )
     squared_current: float = scalar("A^2 s", "integral of the squared current")
     heat: float | None = scalar(
-        "J", "resistance of the coil times that", more="None for a hammer without `coil.resistance`"
+        "J",
+        "heat of the coil: resistance times integral of the squared current",
+        more="None for a hammer without `coil.resistance`",
     )
 
     @property
@@ -54,7 +58,7 @@ def coil_power(hammer: Hammer, x: FloatArray, v: FloatArray, magnet: FloatArray)
 
 
 def coil_work_of(problem: Problem, record: Record) -> CoilWork:
-    """Integrate the power of the coil along a run, separately over stretches of one sign.
+    """Integrate the coil power along a run, separately over intervals of positive and negative power.
 
     The quadrature is that of the ledger. Steps in which the power changes sign are split there, so that every
     integrand is smooth.
@@ -99,7 +103,7 @@ def _gauss(drive: Drive, ends: FloatArray) -> float:
 
 
 def _stretches(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return steps and times, s, between which the power of the coil has one sign."""
+    """Split steps where the coil power changes sign; return step index, start and end, s, of each part."""
     begins, finishes = record.nodes[:-1, 0], record.nodes[1:, 0]
     rows = np.flatnonzero(finishes > begins)
     begins, finishes = begins[rows], finishes[rows]
@@ -131,7 +135,7 @@ def _signs(problem: Problem, record: Record, times: FloatArray) -> FloatArray:
 
 
 _POINTS, _PIECES = 10, 8
-"""Points of the quadrature over the current, and its pieces."""
+"""Gauss points per subinterval of the quadrature over the current, and number of subintervals."""
 
 
 class Ledger(Declared):
@@ -141,37 +145,40 @@ class Ledger(Declared):
     drive_work: float = scalar("J", "work of a drive that is a force")
     pack_loss: float = scalar("J", "minus the integral of Fp v dt")
     backstop_loss: float = scalar(
-        "J", "minus the integral of Fe v dt, and what impacts on a rigid backstop take"
+        "J", "minus the integral of Fe v dt, plus the energy lost in impacts on a rigid backstop"
     )
     damping_loss: float = scalar("J", "minus the integral of the damping force of the armature times v dt")
-    supply_work: float = scalar("J", "energy that the supply of a voltage has given")
-    copper_loss: float = scalar("J", "heat of the coil under a voltage")
+    supply_work: float = scalar("J", "energy delivered by a voltage supply")
+    copper_loss: float = scalar("J", "heat of the coil under a voltage drive")
     driver_loss: float = scalar("J", "heat in the supply's resistance and the diodes")
     eddy_loss: float = scalar("J", "heat of the shorted turn")
     field: float = scalar(
-        "J", "change of the magnetic energy that goes with the current", more="of a reservoir as well"
+        "J",
+        "change of the magnetic energy due to the current",
+        more="plus the change of a reservoir capacitor's energy",
     )
     electric_residual: float = scalar(
         "J",
         "supply work minus losses minus coil work minus field",
-        more="0 but for numerical errors, and 0 unless a voltage drives the coil",
+        more="numerical error of the electric balance; exactly 0 unless a voltage drives the coil",
     )
     kinetic: float = scalar("J", "change of kinetic energy from start to end")
     stored: float = scalar(
-        "J", "change of stored energy likewise", more="magnet at zero current, spring, Hertz"
+        "J", "change of stored energy from start to end", more="magnet at zero current, spring, Hertz"
     )
     throughput: float = scalar("J", "sum of the integrals of the absolute power of all works and losses")
     residual: float = scalar(
         "J",
-        "work minus losses minus changes",
-        more="0 but for numerical errors, since each term has a quadrature of its own",
+        "work minus losses minus changes of kinetic and stored energy",
+        more="numerical error of the balance, since each term has its own quadrature",
     )
 
 
 def increments_of(problem: Problem, record: Record) -> FloatArray:
-    """Return the integrals of power [J] in every step: coil, drive force, pack, backstop and damping loss.
+    """Integrate the power terms over each step, J: coil, drive force, and pack, backstop, damping losses.
 
-    For a voltage drive also the supply, and losses in coil, driver and shorted turn.
+    Under a voltage drive, further columns hold the supply work and the losses in coil, driver and shorted
+    turn.
     """
     times = record.nodes[:, 0]
     return problem.quadratures(record, np.arange(len(times) - 1), times[:-1], times[1:])
@@ -193,9 +200,10 @@ def stored_energy(hammer: Hammer, x: float) -> float:
 
 
 def field_energy(problem: Problem, record: Record, row: int) -> float:
-    """Return the energy of the magnetic field of the current at a node, and of a reservoir, J.
+    """Return the magnetic field energy due to the current at a node, plus that of a reservoir capacitor, J.
 
-    E = i lambda - integral of lambda over the current from 0 to i, by Gauss's quadrature.
+    With the flux linkage lambda(i), the field energy is i lambda minus the integral of lambda over the
+    current from 0 to i, computed by Gauss quadrature.
     """
     hammer = problem.hammer
     constants = problem.constants

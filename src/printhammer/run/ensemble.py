@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 DISPLAY_TOLERANCE: Final = 5e-7
-"""Tolerance for pictures: displacements are accurate to about 1e-4 of the stroke."""
+"""Tolerance for plots: displacements are accurate to about 1e-4 of the stroke."""
 
 Engine = Literal["auto", "plain", "lanes"]
 ENGINES: Final = get_args(Engine)
@@ -54,22 +54,22 @@ _TIMES: Final = "member strobe"
 
 
 class Strobes(Result):
-    """States at given times, padded to the largest number of times; NaN after the end of a run."""
+    """States of all members at requested times, padded to the largest number; NaN after the end of a run."""
 
     t: FloatArray = column("s", "time", _TIMES)
     x: FloatArray = column("m", "displacement", _TIMES)
     v: FloatArray = column("m/s", "velocity", _TIMES)
     branch: IntArray = column(
-        "1", "mode of motion", _TIMES, more="-1 where a run ended before", codes=MODE_NAMES
+        "1", "mode of motion", _TIMES, more="-1 after the end of a run", codes=MODE_NAMES
     )
     memory: FloatArray = column(
-        "m", "latest local maximum inside the pack", _TIMES, more="0 but on the unloading branch"
+        "m", "latest local maximum inside the pack", _TIMES, more="0 except on the unloading branch"
     )
     current: FloatArray | None = column(
         "A",
         "current in the coil",
         _TIMES,
-        more="None unless a voltage drives a member, nan for the others",
+        more="None unless a voltage drives a member; NaN for members without a voltage drive",
         default=None,
     )
     turn: FloatArray | None = column(
@@ -80,36 +80,36 @@ class Strobes(Result):
     )
 
     def entries(self) -> Entries:
-        """Return the states by name, with the electric part only if there is one."""
+        """Return the state arrays by name; currents and voltage only if a voltage drives a member."""
         return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
 
     @property
     def electric(self) -> FloatArray | None:
-        """Currents and voltage, shape (members, strobes, 3); None without a circuit."""
+        """Currents, A, and capacitor voltage, V, shape (members, strobes, 3); None without a circuit."""
         parts = [part for part in (self.current, self.turn, self.reservoir) if part is not None]
         return np.stack(parts, axis=2) if parts else None
 
 
 class EnsembleResult(Result):
-    """Results of the runs of an ensemble."""
+    """Results of an ensemble: status of each run, and the requested dots, states and displacements."""
 
     status: IntArray = column("1", "how the run ended", "member", more="0 is ok", codes=STATUS_NAMES)
     reached: FloatArray = column("s", "time at which the run ended", "member")
     steps: IntArray = column("1", "steps of the integrator", "member")
-    dots: DotTable | None = part("what the firings did", more="if asked for", default=None)
-    extra: ExtraDots | None = part("extra contacts", more="if asked for", default=None)
-    strobes: Strobes | None = part("states at the times asked for", default=None)
+    dots: DotTable | None = part("dots of the firings", more="if requested", default=None)
+    extra: ExtraDots | None = part("extra contacts", more="if requested", default=None)
+    strobes: Strobes | None = part("states at the requested times", default=None)
     x: npt.NDArray[np.float32] | None = column(
         "m",
         "displacement at the common times",
         "member time",
-        more="nan where a run ended before",
+        more="NaN after the end of a run",
         default=None,
     )
 
     @property
     def title(self) -> str:
-        """Title of the result, one line."""
+        """One-line title with the number of runs."""
         return f"{len(self.status)} runs of an ensemble"
 
     def entries(self) -> Entries:
@@ -130,7 +130,7 @@ class EnsembleResult(Result):
 
     @property
     def status_names(self) -> list[str]:
-        """Names of the statuses."""
+        """Name of each run's status, such as "ok" or "runaway"."""
         return [STATUS_NAMES[code] for code in self.status]
 
 
@@ -163,9 +163,9 @@ class Ensemble:
     Raises
     ------
     InputError
-        Numbers of hammers, drives, ends, states and starts that do not fit together; an end not positive or
-        not after its start; a state not finite; steps not positive; a hammer without a rest state where no
-        states are given.
+        The numbers of hammers, drives, ends, states and starts differ; an end is not positive or not after
+        its start; a state is not finite; `max_steps` is not positive; or a hammer has no rest state and no
+        states are passed.
     """
 
     def __init__(
@@ -393,7 +393,7 @@ class Ensemble:
         return whole
 
     def _spread(self, rows: Sequence[Ragged]) -> FloatArray:
-        """Return rows of the members of each group as an array (members, rows, columns), padded with NaN."""
+        """Merge the groups' rows into one array, shape (members, rows, columns), padded with NaN."""
         most = max((own.longest for own in rows), default=0)
         width = max((own.values.shape[1] for own in rows), default=MOST_COLUMNS)
         whole = np.full((self.size, most, width), np.nan)

@@ -1,4 +1,4 @@
-"""Groups of members with the same laws: the arrays of the kernel, and their results.
+"""Groups of ensemble members with the same laws: input arrays for the kernel, and its results.
 
 The drives of an ensemble are arrays, too: a few forms of pulses, and many firing times.
 """
@@ -54,7 +54,7 @@ arbitrary."""
 _STROBE_WIDTH: Final = 4
 _ELECTRIC_WIDTH: Final = 3
 _PIECE: Final = 4 * lane_layout.LANES
-"""Members in one piece of work for lanes."""
+"""Number of members in one unit of work for vector lanes."""
 
 
 class Group:
@@ -134,7 +134,7 @@ class Group:
 
 
 class _Posed(NamedTuple):
-    """Distinct problems of the members, without drives, one per row; `by` is the row of each member."""
+    """Distinct initial-value problems of the members, one per row; `by` is the row index of each member."""
 
     constants: FloatArray
     controls: FloatArray
@@ -195,7 +195,7 @@ def _scales(
     first_drive: Drive,
     states: FloatArray,
 ) -> tuple[list[tuple[float, float]], IntArray]:
-    """Return the distinct scales of members with the same hammer, and the index for each member."""
+    """Return the distinct scales (m, m/s) of members with the same hammer, and the index for each member."""
     x, v = states[own, 1], states[own, 2]
     if hammer.position is None or hammer.front is None:
         periods = [math.nan if (period := fired.drives[i].period) is None else period for i in own]
@@ -255,28 +255,28 @@ class Job:
         )
 
     def finish(self, x: npt.NDArray[np.float32]) -> None:
-        """Copy the displacements of a partial group to their rows."""
+        """Copy the displacements of a group to the rows of its members in the ensemble's array."""
         if self.kept.x is not x:
             x[self.group.members] = self.kept.x
 
     def rows_of_dots(self) -> Ragged:
-        """Return the rows of the firings of each member."""
+        """Return the recorded dots of each member, one row per firing."""
         if not self._want_extra:
             return Ragged(self.kept.dots, self.kept.dot_starts)
         return self._rows(self.kept.dot_starts[:-1], self.group.firings.counts)
 
     def rows_of_extra(self) -> Ragged:
-        """Return the rows of the extra contacts of each member."""
+        """Return the recorded extra contacts of each member, one row per contact."""
         return self._rows(self.kept.dot_starts[:-1] + self.group.firings.counts, self.kept.extra)
 
     def _rows(self, begins: IntArray, counts: IntArray) -> Ragged:
-        """Return stored rows of each member, from their starts and counts."""
+        """Select the recorded rows of each member, from start indices and counts."""
         starts = starts_of(counts)
         places = np.arange(starts[-1]) + np.repeat(begins - starts[:-1], counts)
         return Ragged(self.kept.dots[places], starts)
 
     def make_room(self) -> bool:
-        """Allocate rows for all extra contacts of members with too few; return whether there are any.
+        """Allocate rows for members with more extra contacts than rows; return whether any member has more.
 
         The next integration covers these members only, and fills their rows again.
         """
@@ -295,9 +295,9 @@ class Job:
         return True
 
     def share_out(self, threads: int) -> int:
-        """Distribute neighbouring members over different pieces; return the length of a piece.
+        """Distribute neighbouring members over different units of work; return the size of a unit in members.
 
-        Neighbours take about the same time, and a piece takes as long as its longest member.
+        Neighbours take about the same time, and a unit takes as long as its slowest member.
         """
         count = self.order.size
         pieces = threads * max(1, round(count / (_PIECE * threads)))
@@ -358,18 +358,18 @@ class Job:
 
 
 class Form(NamedTuple):
-    """Form of a drive: everything except its firing times.
+    """Form of a drive: all of its properties except the firing times.
 
     Attributes
     ----------
     table : int
-        Index of its segment table among those of all drives.
+        Index of the drive's segment table among the tables of all drives.
     replace, force : bool
-        Whether a firing cuts off the pulses before it; whether it is a force.
+        Whether a firing cuts off the pulses before it; whether the drive is a force.
     peak : float
         Largest absolute value of any one pulse, A, N or V.
     supply : Supply
-        Supply of a voltage.
+        Supply of a voltage drive.
     """
 
     table: int
@@ -391,9 +391,9 @@ class Fired:
     firings : Ragged
         Firing times of the members, s.
     begins : int array, shape (all firings,)
-        Row of the member's tables at which that of each firing begins.
+        First row of each firing's segment table within the table of the member's form.
     table_of, peak_of, supply_of : array, shape (members,)
-        Table, peak and number of the supply of the form of each member.
+        Segment table index, peak value and supply index of each member's form.
     tables, rates, kinds : list
         Segment tables, and the result of `closed_form` for each.
     """
@@ -451,7 +451,7 @@ class Fired:
 
 
 def closed_form(table: FloatArray) -> tuple[list[float], LaneKinds | None]:
-    """Return the rates of the pieces of a set of waveforms, and the kinds of pieces, for lanes.
+    """Return decay rates and frequencies, 1/s, and the kinds of segments of waveforms, for vector lanes.
 
     The kinds are None if the waveforms have more rates than lanes support.
     """

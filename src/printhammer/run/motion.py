@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 FORCES: Final = ("magnet", "spring", "pack", "backstop", "damping", "drag", "drive", "total")
-"""Names of the forces: equations (3), (4), (5), (6), (7), damping of the armature (if the hammer has any), a
-drive that is a force, and their sum."""
+"""Names of the forces: equations (3) to (7), damping of the armature (if the hammer has any), a drive that is
+a force, and the total."""
 
 PATHS: Final = ("supply", "chopped", "blocked", "backward")
 """Paths of the current of a coil: through the supply, through the diode of a chopper, none, and decay of a
@@ -55,7 +55,7 @@ _BISECTIONS: Final = 52  # Bisections that exhaust the bits of a float
 
 
 MOST_DOTS: Final = 40
-"""Largest number of dots shown in a summary; otherwise the first and last ones. Arbitrary."""
+"""Largest number of dots listed in a summary; of more dots, only the first and last are listed. Arbitrary."""
 
 
 def _remark(dot: Dot) -> str:
@@ -82,12 +82,12 @@ class Motion(Result, fields=False):
 
     @property
     def hammer(self) -> Hammer:
-        """The hammer."""
+        """Hammer whose motion was simulated."""
         return self._problem.hammer
 
     @property
     def drive(self) -> Drive:
-        """The drive."""
+        """Drive that was applied."""
         return self._problem.drive
 
     @property
@@ -165,7 +165,7 @@ class Motion(Result, fields=False):
 
     @property
     def driven(self) -> Literal["current", "force"]:
-        """Quantity that drives the armature: a current in the coil (A), or a force (N)."""
+        """Kind of drive: "current" through the coil (also under a voltage), or "force" on the armature."""
         return "force" if self.drive.quantity == "force" else "current"
 
     def driven_at(self, t: npt.ArrayLike) -> FloatArray:
@@ -231,7 +231,7 @@ class Motion(Result, fields=False):
         return table
 
     def at(self, t: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return displacement, m, and velocity, m/s, at any times of the run, s; after jumps."""
+        """Return displacement, m, and velocity, m/s, at times of the run, s; at a jump, the later values."""
         table = self._resampled(t)
         return table[:, 0], table[:, 1]
 
@@ -288,7 +288,7 @@ class Motion(Result, fields=False):
 
     @cached_property
     def coil_work(self) -> CoilWork:
-        """Work of the coil over the whole run: net, positive, recovered, and its heat."""
+        """Coil work over the whole run: net and positive work, squared current, and heat of the coil."""
         return coil_work_of(self._problem, self._record)
 
     @cached_property
@@ -333,7 +333,7 @@ class Motion(Result, fields=False):
 
     @property
     def title(self) -> str:
-        """Title of the motion, one line."""
+        """One-line title: hammer, start and end of the motion."""
         return f"motion of {self.hammer.name}, {self.start:.9g} s to {self.end:.9g} s"
 
     def summary(self) -> Summary:
@@ -418,7 +418,7 @@ class Motion(Result, fields=False):
         )
 
     def entries(self) -> Entries:
-        """Return the output grid by name: `x`, `v`, `current`, and the forces as `force_magnet` and so on."""
+        """Return arrays on the output grid by name: `x`, `v`, `current`, and forces as `force_magnet` etc."""
         forces = {f"force_{name}": (name, values) for name, values in self.force.items()}
         return super().entries() | {
             key: (Column("N", f"{name} force", ("t",)), values) for key, (name, values) in forces.items()
@@ -441,14 +441,14 @@ class Motion(Result, fields=False):
         write_parquet(self.to_pandas(), path)
 
     def write(self, path: Path) -> None:
-        """Write the motion: for a name in .json like `to_json`, else its record like `save`."""
+        """Write the motion: a .json file in the format of `to_json`, any other in the format of `save`."""
         if path.suffix.lower() == ".json":
             write_file(path, self.to_json())
         else:
             self.save(path)
 
     def to_json(self) -> str:
-        """Return dots, contacts, energies, constants and drive as JSON, SI, names with units."""
+        """Return dots, contacts, energies, constants and drive as JSON text, SI, with units in the names."""
         times, x = self.maxima
         top = int(x.argmax()) if len(x) else None
         content = {

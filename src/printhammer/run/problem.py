@@ -1,4 +1,4 @@
-"""Problem for the kernel: a hammer and a drive with laws bound, constants packed and scales chosen.
+"""Initial-value problem for the kernel: a hammer's laws, packed constants and scales, and its drive.
 
 This module is the only one that converts public objects to arguments of the kernel.
 """
@@ -38,7 +38,7 @@ LARGEST_TOLERANCE: Final = 1e-5
 
 MAX_STEPS: Final = 50_000_000  # Default largest number of steps of a run
 FAR: Final = 1e4
-"""Distance from the origin, in strokes, beyond which the armature counts as runaway; arbitrary."""
+"""Distance from the origin, in strokes, beyond which the motion counts as a runaway; arbitrary."""
 
 _NODES: Final = 2048  # Rows of nodes in the smallest working space
 _CONTACTS: Final = 256  # Rows of contacts in the smallest working space
@@ -47,12 +47,12 @@ _MOST_FLIGHTS: Final = 1e6  # Largest number of flights of that guess
 
 
 def live_size(firings: int) -> int:
-    """Return the length of the working space `live` of the kernel for a drive."""
+    """Return the length of the kernel's working array `live` for a number of firings."""
     return 3 + 7 * firings
 
 
 def node_width(laws: Laws) -> int:
-    """Return the number of columns of a record's nodes."""
+    """Return the number of columns of the node array: more for a hammer with a coil circuit."""
     return CIRCUIT_NODE_WIDTH if laws.circuit else NODE_WIDTH
 
 
@@ -62,7 +62,7 @@ class Record(Declared):
     status: int = part("code of the status")
     nodes: FloatArray = part(
         "time, displacement, velocity, mode and memory at the ends of all steps, shape (n, 5)",
-        more="with a coil circuit its state and the path of the current, shape (n, 9)",
+        more="with a coil circuit also the electric state and the path of the current, shape (n, 9)",
     )
     contacts: FloatArray = part(
         "surface, time and velocity in and out, first node, whether open at the start, shape (m, 7)"
@@ -76,18 +76,20 @@ class Record(Declared):
 
 
 class Stretch(Declared):
-    """Part of a record, up to a pause or the end; the next stretch overwrites its arrays."""
+    """Section of a record, up to a pause or the end of the run; the next stretch overwrites its arrays."""
 
-    status: int = part("code of the status, PAUSED but for the last")
-    nodes: FloatArray = part("as in `Record`", more="the first one is the last of the stretch before")
-    contacts: FloatArray = part(
-        "as in `Record`", more="one that is open at a pause is the first of the stretch after it"
+    status: int = part("code of the status; PAUSED for every stretch except the last")
+    nodes: FloatArray = part(
+        "as in `Record`", more="the first node repeats the last node of the preceding stretch"
     )
-    reached: float = scalar("s", "time that the run got to")
+    contacts: FloatArray = part(
+        "as in `Record`", more="a contact that is open at a pause is the first contact of the next stretch"
+    )
+    reached: float = scalar("s", "time that the run has reached")
 
 
 class _TooLong(Exception):
-    """A stretch does not fit into the arrays."""
+    """Raised when a stretch of the record does not fit into the allocated arrays."""
 
 
 def fresh_carry(
@@ -115,7 +117,7 @@ def check_tolerance(tolerance: object) -> None:
 
 
 def laws_of(hammer: Hammer, drive: Drive) -> Laws:
-    """Return the laws of the parts of a hammer under a drive, for the kernel."""
+    """Return the laws of a hammer's parts, and of its drive, that select the compiled kernel."""
     return Laws(
         magnet=_module(hammer.magnet),
         spring=_module(hammer.spring),
@@ -160,10 +162,11 @@ def scales_of(
 ) -> tuple[float, float]:
     """Return a typical displacement [m] and speed [m/s] of a hammer, the units of tolerances.
 
-    The displacement is the distance from the backstop to the pack. If one of them is missing, it is the
-    distance that the forces would move the mass in one period of the drive or of the hammer, or that of the
-    initial state. The speed is what the largest force imparts to the mass over that distance. `static` is the
-    static force of the hammer, computed if not passed.
+    The displacement is the distance from backstop to pack. If backstop or pack is missing, the displacement
+    is the larger of two: the distance that the forces would move the mass in one period of the drive or of
+    the hammer, and the distance of the initial state from the origin. The speed is the one that the largest
+    force imparts to the mass over that displacement. `static` is the static force of the hammer, computed if
+    not passed.
     """
     if static is None:
         static = StaticForce(hammer)
@@ -208,13 +211,13 @@ def bounds_of(hammer: Hammer, scales: tuple[float, float]) -> tuple[float, float
 class Problem:
     """Hammer under a drive, ready for integration.
 
-    The state, displacement, m, and velocity, m/s, is that at the time `start`, s. The tolerance is the error
-    of one step, in units of the stroke and of a typical speed. In the pack and under a voltage the state has
+    `state` holds displacement, m, and velocity, m/s, at the time `start`, s. The tolerance is the error of
+    one step, in units of the stroke and of a typical speed. In the pack and under a voltage the state has
     further components, `beyond`.
     """
 
     max_steps: int | None = None
-    """Largest number of steps of the run; None: `MAX_STEPS`."""
+    """Largest number of steps of the run; None for `MAX_STEPS`."""
 
     def __init__(
         self,
@@ -260,32 +263,32 @@ class Problem:
             self.constants[layout.POSITION] -= away
 
     def drive_arrays(self) -> tuple[Any, ...]:
-        """Return the kernel's `Train` of the drive, with working space."""
+        """Return the drive as the kernel's tuple `Train`, including working arrays."""
         count = self.firings.size
         under_way, live = np.zeros(count, np.int64), np.zeros(live_size(count))
         return (self.firings, self.begins, self.pieces, self.replace, under_way, live)
 
     @property
     def columns(self) -> int:
-        """Number of columns filled by `resample`."""
+        """Number of columns of the table that `resample` returns."""
         return 15 if self.laws.circuit else 10
 
     @property
     def state_size(self) -> int:
-        """Number of components of the state: displacement, velocity, memory; electric state of a circuit."""
+        """Number of state components: displacement, velocity, memory, and the electric state of a circuit."""
         return 6 if self.laws.circuit else 3
 
     @property
     def linkage_scale(self) -> float:
-        """Flux linkage of a typical current in the coil, Wb."""
+        """Flux linkage of the coil at a typical current, Wb, by which errors are normalised."""
         return float(self.constants[layout.LINKAGE_SCALE])
 
     def room(self, count: int) -> FloatArray:
-        """Return an array for a number of nodes."""
+        """Allocate an array for a number of nodes."""
         return np.empty((count, node_width(self.laws)))
 
     def run(self, end: float) -> Record:
-        """Integrate to time `end`, s."""
+        """Integrate from the initial state to time `end`, s; return the record of the run."""
         # A generous guess: unused memory costs nothing, a repeated run does.
         flights = min(max(end - self.start, 0.0) * self.scales[1] / self.scales[0], _MOST_FLIGHTS)
         capacity = _NODES + int(_NODES_A_FLIGHT * flights)
@@ -353,7 +356,7 @@ class Problem:
         return out
 
     def peaks(self, record: Record) -> FloatArray:
-        """Return time, depth and force, shape (m, 3), at the peaks of all contacts."""
+        """Return time, s, depth, m, and force, N, at the peak of each contact, shape (m, 3)."""
         out = np.empty((len(record.contacts), 3))
         self.kernel.peaks(record.contacts, record.nodes, self.drive_arrays(), self.constants, out)
         return out

@@ -1,6 +1,6 @@
-"""Regime: a hammer under a periodic drive without end, with all constants accessible by name.
+"""Regime: a hammer under an endless periodic drive, with all parameters accessible by name.
 
-The k-th firing of a train is at k times its period; a rate is converted to the period 1 / rate.
+The k-th firing of a pulse train is at k times its period; a rate is converted to the period 1 / rate.
 
 `Window` is the window in which strobe points are drawn; distances are measured in its half-widths.
 """
@@ -73,11 +73,11 @@ PAPER_WINDOW: Final = Window(PAPER_X, PAPER_V)
 def window_of(hammer: Hammer, drive: Drive) -> Window:
     """Return the window of a hammer under a drive.
 
-    The window is that of Fig. 11 for a hammer whose backstop and pack are where the paper has them. For other
-    hammers its half-widths are a sixth of the distance from backstop to pack, as in Fig. 11, and a sixth of
-    the speed that the largest force imparts to the armature over that distance; if a hammer lacks one of them
-    and nothing bounds the motion, its scales (`printhammer.run.problem.scales_of`). As in Fig. 11 the
-    backstop, or the origin, lies a quarter of the width from the left.
+    The window is that of Fig. 11 if backstop and pack have the positions of the paper. For other hammers the
+    half-widths are a sixth of the distance from backstop to pack, as in Fig. 11, and a sixth of the speed
+    that the largest force imparts to the armature over that distance; without a backstop or without a pack,
+    they are the scales of the hammer (`printhammer.run.problem.scales_of`). As in Fig. 11 the backstop, or
+    the origin, lies a quarter of the width from the left.
     """
     place, front = hammer.position, hammer.front
     if (
@@ -120,16 +120,20 @@ class Regime(Declared):
     hammer: Hammer = part("the hammer")
     period: float = scalar("s", "time between firings, or period of the force")
     waveform: Waveform | None = part(
-        "what every firing does", more="None for the hammer's own, and under an endless force", default=None
+        "waveform of every firing",
+        more="None for the hammer's own waveform, and under a continuous periodic force",
+        default=None,
     )
     drive: Drive | None = part(
-        "an endless force such as `printhammer.SineForce`", more="None for a train of pulses", default=None
+        "a continuous periodic force such as `printhammer.SineForce`",
+        more="None for a train of pulses",
+        default=None,
     )
     overlap: Overlap = part(
         '"add": overlapping pulses add up; "replace": each firing cuts off the pulse before', default="add"
     )
     phase: float = part(
-        "part of the period between a firing and the section at which states are looked at", default=0.0
+        "fraction of the period from a firing to the section at which states are recorded", default=0.0
     )
 
     @classmethod
@@ -164,7 +168,7 @@ class Regime(Declared):
         Raises
         ------
         InputError
-            There is no waveform, period and rate are not exactly one positive number, the drive is not an
+            There is no waveform, period and rate are not exactly one positive number, the drive is not a
             continuous periodic force, or the phase is invalid.
         """
         part = 0.0 if phase is None else read_phase(phase)
@@ -238,7 +242,7 @@ class Regime(Declared):
     def memory(self) -> int:
         """Number of earlier pulses that can still be active at a firing; 0 for a continuous periodic force.
 
-        After that many firings, a train is periodic.
+        After `memory` firings, the drive of a pulse train is periodic.
         """
         if self.drive is not None:
             return 0
@@ -248,7 +252,7 @@ class Regime(Declared):
 
     @property
     def at_firings(self) -> Self:
-        """The same regime with the section at the firing."""
+        """Copy with the section at the firing, phase 0."""
         return self if self.phase == 0.0 else replace(self, phase=0.0)
 
     def pulses(self, count: int) -> Drive:
@@ -258,7 +262,7 @@ class Regime(Declared):
         return PulseTrain(self.fired, period=self.period, pulses=count, overlap=self.overlap)
 
     def train(self, firings: int) -> tuple[Drive, float]:
-        """Return a drive with identical history at `firings` firings, and the time of the first, s.
+        """Return a drive with the same history at each of `firings` firings, and the time of the first, s.
 
         All earlier pulses are active at the first firing; one more pulse is fired at the end, so that no
         state depends on the position of the end.
@@ -282,11 +286,11 @@ class Regime(Declared):
 
     @property
     def window(self) -> Window:
-        """Window in which strobe points are drawn; its half-widths are the unit of distances."""
+        """Window in which strobe points are plotted; its half-widths are the unit of distances."""
         return window_of(self.hammer, self.train(1)[0])
 
     def value(self, name: str) -> float:
-        """Return a constant by name, SI; see `with_`."""
+        """Return a parameter by name, SI; see `with_`."""
         if name == PERIOD:
             return self.period
         if name == RATE:
@@ -302,7 +306,7 @@ class Regime(Declared):
         return float(number)
 
     def quantity(self, name: str) -> Quantity:
-        """Return unit, meaning and symbol of a constant by name; see `with_`."""
+        """Return unit, meaning and symbol of a parameter by name; see `with_`."""
         self.value(name)
         if name == PERIOD and self.drive is not None:
             return replace(TIMING[name], meaning="period of the force")
@@ -317,12 +321,12 @@ class Regime(Declared):
         return Quantity(constant.si_unit, constant.symbol, constant.meaning)
 
     def with_(self, name: str, value: float) -> Self:
-        """Return a regime with one constant replaced.
+        """Return a copy with one parameter replaced.
 
         Parameters
         ----------
         name : str
-            "period", "rate", "waveform.amplitude" and the like, "drive.amplitude" or "drive.phase" under an
+            "period", "rate", "waveform.amplitude" and the like, "drive.amplitude" or "drive.phase" under a
             continuous periodic force, or the dotted key of any constant of the hammer, such as
             "backstop.damping".
         value : float
@@ -345,7 +349,7 @@ class Regime(Declared):
 
     @property
     def names(self) -> list[str]:
-        """Names of all constants that `with_` accepts."""
+        """Names of all parameters that `with_` accepts."""
         own = self.waveform
         names = [name for name in self.hammer.constants if own is None or not name.startswith(WAVEFORM)]
         if own is not None:
@@ -388,7 +392,7 @@ def read_phase(phase: float) -> float:
     """Parse a phase, a fraction of the period."""
     part = read_number(phase, "1", "phase")
     if not 0.0 <= part < 1.0:
-        raise InputError.of("phase", phase, "a part of the period from 0 up to but not including 1")
+        raise InputError.of("phase", phase, "a fraction of the period from 0 up to but not including 1")
     return part
 
 
@@ -401,7 +405,7 @@ def regimes_of(
     overlap: Overlap | None = None,
     phase: float | None = None,
 ) -> list[Regime]:
-    """Return the regimes of many trains.
+    """Return the regimes of many pulse trains, one per hammer, period or drive.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Runs of the paper's two integrators, recorded in the format of the default integrator.
 
-Between the ends of fixed steps such a run has no defined motion; the cubic through position and velocity at
-both ends replaces it. A touch is recorded at the first step end inside a contact, since the schemes locate no
+Between the ends of fixed steps the schemes define no motion; it is replaced by the cubic through position and
+velocity at both ends. A touch is recorded at the first step end inside a contact, since the schemes locate no
 discontinuity.
 """
 
@@ -126,7 +126,7 @@ class SchemeProblem(Problem):
         return bool(getattr(self._modules.get("backstop"), "RIGID", False))
 
     def _nodes(self, t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-        """Return step ends as nodes, each with the mode of its state as the schemes see it."""
+        """Convert step ends to nodes, each with the mode of motion that the schemes assign to its state."""
         position, front = self.hammer.position, self.hammer.front
         keep = np.isfinite(x) & np.isfinite(v)
         nodes = np.zeros((int(keep.sum()), 5))
@@ -164,7 +164,7 @@ class SchemeProblem(Problem):
         return np.ascontiguousarray(table)
 
     def _forces(self, x: float, v: float, value: float, mode: float, peak: float) -> tuple[float, ...]:
-        """Return magnet, spring, pack, elastic and viscous force, N, and no damping."""
+        """Return magnet, spring and pack force, elastic and viscous backstop force, and 0 for damping, N."""
         packed = self._packed
         position, front = self.hammer.position, self.hammer.front
         current = 0.0 if self.laws.force_drive else value
@@ -183,7 +183,7 @@ class SchemeProblem(Problem):
         return magnet, self._law("spring_force")(packed["spring"], x), pack, elastic, viscous, 0.0
 
     def peaks(self, record: Record) -> FloatArray:
-        """Return time, depth and force, shape (m, 3), at the largest step ends of all contacts."""
+        """Return time, s, depth, m, and force, N, at the deepest step end of each contact, shape (m, 3)."""
         nodes = record.nodes
         out = np.zeros((len(record.contacts), 3))
         table = self.resample(record, nodes[:, 0])

@@ -60,9 +60,9 @@ def simulate(
     state : sequence of float or str, optional
         Displacement, m, and velocity, m/s, or text with units, at time 0; by default the rest state. In the
         pack with the mode and the memory, as in `printhammer.run.ensemble.Strobes`; under a voltage then with
-        the current in the coil, A, or with that, the current in its shorted turn, A, and the voltage of the
-        supply's capacitor, V; by default there is no current, and the capacitor is charged. `Motion.state_at`
-        returns all components.
+        the current in the coil, A, or with the currents in the coil and in its shorted turn, A, and the
+        voltage of the supply's capacitor, V; by default there is no current, and the capacitor is charged.
+        `Motion.state_at` returns all components.
     tolerance : float, optional
         Error tolerance of one step, in units of the distance from backstop to pack and of a typical speed.
     points : int, optional
@@ -104,7 +104,7 @@ def simulate(
 
 
 def announce_compiling(callback: Callable[[str], None], *, helped: bool = True) -> Callable[[], None]:
-    """Register a callback for a sentence before compilation; return a function that unregisters it.
+    """Register a callback that receives a sentence before compilation; return a function to unregister it.
 
     The sentence names what is compiled and the expected duration. Further sentences report, once, that
     machine code cannot be cached, or why cached code does not fit. If `helped`, a second process compiles as
@@ -171,22 +171,22 @@ CODES: Final = {"pack": PACK_SURFACE, "backstop": BACKSTOP_SURFACE}
 
 _STRETCH: Final = 4096  # Nodes of a record in one stretch, which bounds the memory
 _SURFACE, _IN, _OUT, _INITIAL = 0, 1, 3, 6
-"""Columns of a contact."""
+"""Columns of a contact in the kernel's record: surface, touch, departure, open at the start."""
 
 
 class Touches(Declared):
-    """Touches of one surface."""
+    """Touches of one surface, pack or backstop, in a run."""
 
     rows: FloatArray = part(
         "time, s, and velocity, m/s, at touch and at leaving, shape (n, 4)",
         more="NaN for a contact that is open at the end",
     )
     status: str = part("how the run ended", more='"ok" also where it was ended because of touches enough')
-    reached: float = scalar("s", "time that the run got to")
+    reached: float = scalar("s", "time that the run has reached")
 
 
 def touches_of(problem: Problem, surface: Surface, after: float, end: float, most: int) -> Touches:
-    """Return the first touches of a surface in a run, at most `most`, which end the run.
+    """Integrate until a surface has been touched `most` times, or to the end; return the touches.
 
     Touches count from the time `after`, s, up to the `end` of the run, s; a contact open at its start does
     not count.

@@ -1,6 +1,7 @@
 """Initial state of a run: the rest state, or a validated state.
 
-In the pack its branch and memory belong to the state, under a voltage the currents of the coil: see `Beyond`.
+In the pack, branch and memory belong to the state; under a voltage, the currents of the coil do: see
+`Beyond`.
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ if TYPE_CHECKING:
 class Beyond(NamedTuple):
     """Components of a state besides displacement and velocity; by default outside the pack, without current.
 
-    The branch of the pack, a place in `printhammer.run.ensemble.MODE_NAMES` or -1 (as follows from
-    displacement and velocity), and the latest local maximum in the pack, m; under a voltage the currents in
-    the coil and in its shorted turn, A, and the voltage of the supply's capacitor, V, NaN for a charged one.
+    In the pack: the branch, an index in `printhammer.run.ensemble.MODE_NAMES` or -1 (determined by
+    displacement and velocity), and the latest local maximum, m. Under a voltage: the currents in the coil and
+    in its shorted turn, A, and the voltage of the supply's capacitor, V, NaN for a charged capacitor.
     """
 
     branch: float = -1.0
@@ -42,7 +43,7 @@ class Beyond(NamedTuple):
 
 AT_REST: Final = Beyond()
 FORMS: Final = {2: (), 3: (2,), 4: (0, 1), 5: (2, 3, 4), 7: (0, 1, 2, 3, 4)}
-"""Lengths of a state, and the fields of `Beyond` that follow displacement and velocity in it."""
+"""Valid lengths of a state, and the fields of `Beyond` that follow displacement and velocity in each."""
 
 STATE: Final = (
     "displacement in m and velocity in m/s; in the pack with branch and memory in m; under a voltage then"
@@ -50,7 +51,7 @@ STATE: Final = (
 )
 
 HELD_BRANCHES: Final = {HELD_LOADING: LOADING, HELD_UNLOADING: UNLOADING}
-"""Branches of the pack on which the armature rests, and the branches to which they belong."""
+"""Modes in which the armature rests in the pack, and the branch of the pack law of each."""
 
 _UNITS: Final = ("m", "m/s")
 _UNITS_BEYOND: Final = ("1", "m", "A", "A", "V")
@@ -82,8 +83,8 @@ def initial_state(hammer: Hammer, state: Sequence[float] | None) -> tuple[float,
     Raises
     ------
     InputError
-        Not two finite numbers; a displacement where the law of the magnet does not hold, or behind a rigid
-        backstop; no state, and the hammer has no rest state.
+        The state is not two finite numbers; its displacement is outside the range of the magnet law, or
+        behind a rigid backstop; or no state is passed and the hammer has no rest state.
     """
     if state is None:
         return hammer.rest, 0.0

@@ -95,7 +95,7 @@ def emf(hammer: Hammer, x: float, current: float) -> float:
 
 
 def current_of(hammer: Hammer, x: float, linkage: float, main: float) -> float:
-    """Return the current in a coil, A, of its flux linkage and that of its main path, Wb."""
+    """Return the coil current, A, from the flux linkages of the coil and of its main path, Wb."""
     coil = winding_of(hammer)
     if coil.turn_resistance:
         return (linkage - main) / (coil.leakage or 0.0)
@@ -111,7 +111,7 @@ def _law(hammer: Hammer, name: str) -> Any:
 
 
 def typical_current(hammer: Hammer, drive: Drive) -> float:
-    """Return the largest current that a voltage drive sustains, A."""
+    """Return the largest current that a voltage drive can sustain in the coil, A."""
     coil = winding_of(hammer)
     largest = 0.0
     for waveform in waveforms_of(drive):
@@ -140,7 +140,7 @@ def typical_current(hammer: Hammer, drive: Drive) -> float:
 
 
 def current_scale(hammer: Hammer, drive: Drive) -> float:
-    """Return the scale of differences of the coil current, A: 1 without a voltage drive."""
+    """Return the scale that normalises differences of the coil current, A; 1 without a voltage drive."""
     return typical_current(hammer, drive) if drive.quantity == "voltage" else 1.0
 
 

@@ -1,4 +1,4 @@
-"""Windows of many devices (`printhammer.run.window`), with their single pulses run as ensembles."""
+"""Run windows of many devices (`printhammer.run.window`), from single pulses simulated as ensembles."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from printhammer.support.arrays import FloatArray
 def waits_of(
     hammers: Sequence[Hammer], waveforms: Sequence[Waveform], threads: int | None = None
 ) -> FloatArray:
-    """Return the time from the last firing to the end of each run, s, as `wait_of`, by ensembles.
+    """Compute the time from last firing to end of each run, s, as `wait_of` does, by ensembles.
 
     One hammer and one waveform for each run, shape (runs,); equal objects are simulated once.
     """

@@ -51,7 +51,7 @@ class Window(NamedTuple):
 
 
 class Single(NamedTuple):
-    """State of a single pulse at the end of a window: completed, flight time, distance from rest."""
+    """Outcome of a single pulse at the end of a window: completed run, flight time, distance from rest."""
 
     ok: bool
     flight: float  # Flight time, s; NaN without a dot
@@ -150,7 +150,7 @@ def _single(hammer: Hammer, drive: Drive, end: float) -> Single:
 
 
 def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
-    """Whether a window holds the required flights, and ends with the armature at rest."""
+    """Whether a window is long enough: it holds `FLIGHTS` flight times and ends with the armature at rest."""
     if not seen.ok:
         return True
     struck = math.isfinite(seen.flight)
@@ -165,6 +165,6 @@ def is_enough(hammer: Hammer, seen: Single, wait: float) -> bool:
 
 
 def last_wait(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the largest window, s, which is not doubled any further."""
+    """Return the largest window, s, beyond which a window is not doubled."""
     way, speed = scales_of(hammer, PulseTrain(waveform), (hammer.rest, 0.0))
     return least_wait(waveform) + min(_LONGEST * way / speed, _LAST)

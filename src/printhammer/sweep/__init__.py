@@ -1,4 +1,4 @@
-"""Sweeps over hammers and drives: spec, members, blocks of work, and a resumable store."""
+"""Parameter sweeps over hammers and drives: spec, members, blocks of work, and a resumable store."""
 
 from printhammer.sweep.api import sweep
 

@@ -47,14 +47,15 @@ def sweep(
     spec : path or mapping
         Spec file, or its contents as a mapping; see the guide on sweeps.
     out : path
-        Folder of the store (Zarr v3), new, to be resumed, or complete. A name that ends in .csv: a table with
-        a row for each member and a column for each firing, made of the store beside it that ends in .zarr.
+        Folder of the store (Zarr v3), new, to be resumed, or complete. If the name ends in .csv, a table with
+        one row per member and one column per firing is written to that file; the store has the same name with
+        the suffix .zarr.
     threads : int, optional
         Threads on this machine; by default as many as there are cores.
     dask : str or distributed.Client, optional
         Address of the scheduler of a dask cluster, or a client, to run there instead.
     progress : callable, optional
-        Called from time to time with the number of members done, done before this run, and in total.
+        Called from time to time with three numbers of members: done so far, done before this run, total.
 
     Returns
     -------
@@ -115,7 +116,7 @@ def sweep(
 
 
 def _member_table(result: xr.Dataset) -> pd.DataFrame:
-    """Return a row for each member; arrays over firings or times have a column for each of these."""
+    """Convert a sweep to a table: one row per member, one column per array and firing or time."""
     wide = result[["status"]]
     for name, variable in result.data_vars.items():
         further = [dim for dim in variable.dims if dim not in wide["status"].dims]

@@ -1,4 +1,4 @@
-"""Axes of a sweep: the constant that varies, its unit and meaning, and its values."""
+"""Axes of a sweep: the parameter that varies, its unit and meaning, and its values."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ _FIRING: Final = Quantity("s", "t", "time of a firing", ge=0.0)
 
 
 class Axis(Declared, eq=False):
-    """One axis of a sweep."""
+    """One axis of a sweep: a parameter and its values."""
 
     key: str = part("key as written in the spec")
-    name: str = part("name of its dimension or coordinate in the store")
+    name: str = part("name of the axis's dimension or coordinate in the store")
     target: Target = part(
-        "whether it changes the hammer, the waveform of the drive, its timing, a firing time or the state"
+        "object that the axis changes: hammer, waveform, timing of the drive, a firing time, or initial state"
     )
     field: str = part("target of the change: the key, the name of a number, or the index of a firing")
     note: Quantity = part("unit, meaning and bounds")
@@ -71,7 +71,7 @@ def read_axis(
     grid: bool,
     named: Mapping[str, object] = MappingProxyType({}),
 ) -> Axis:
-    """Parse an axis.
+    """Parse one `[[axis]]` table of a sweep spec.
 
     `own_waveform` is the waveform table of the drive, if any; `named` are the waveforms of a sequence, by
     name. A grid takes values or a range, a Latin hypercube a range only.
@@ -138,7 +138,7 @@ def _resolved(
 
 
 def _constant_of(waveform: object, name: str) -> Quantity | None:
-    """Return the declaration of a constant of a waveform table of the drive, or None."""
+    """Return unit, meaning and bounds of a constant in a waveform table of the drive; None if unknown."""
     shape = waveform.get("shape") if isinstance(waveform, Mapping) else None
     if not isinstance(waveform, Mapping) or not isinstance(shape, str) or shape not in kinds_of("waveform"):
         return None

@@ -49,16 +49,16 @@ def run_dask(
 ) -> None:
     """Compute blocks on a cluster, and write each in this process when it is done.
 
-    The scheduler repeats a task whose worker is killed. A task that it abandons because it cost several
-    workers is postponed until all others are done, then computed alone on the cluster, in ever smaller
+    The scheduler repeats a task whose worker is killed. A task that it abandons because it killed several
+    workers is postponed until all other tasks are done, then computed alone on the cluster, in ever smaller
     pieces; a member that still kills its worker is recorded as lost. The arguments are those of `run_local`,
     and a `distributed.Client` of the scheduler.
 
     Raises
     ------
     InputError
-        The scheduler or the last worker is gone, a worker has other versions or cannot do the work, or from
-        `write`.
+        The scheduler or the last worker is gone, a worker has other software versions or cannot do the work,
+        or `write` raises the error.
     """
     tasks = _Tasks(client, plan)
     try:
@@ -85,7 +85,7 @@ class _Tasks:
     def side_by_side(
         self, todo: Sequence[Index], write: Callable[[Index, Results], None], tell: Callable[[float], None]
     ) -> list[Index]:
-        """Compute blocks concurrently; return the blocks that cost several workers."""
+        """Compute blocks concurrently; return the blocks that killed several workers."""
         left = deque(todo)
         suspects: list[Index] = []
         while left or self._futures:
@@ -102,7 +102,7 @@ class _Tasks:
         return suspects
 
     def alone(self, rows: FloatArray) -> Results:
-        """Compute members without concurrent tasks, in smaller pieces if they kill the worker."""
+        """Compute members one task at a time, in ever smaller pieces if the members kill the worker."""
         import numpy as np
 
         self._submit(rows, ())
@@ -134,7 +134,7 @@ class _Tasks:
         future.add_done_callback(self._done.put)
 
     def _next(self) -> tuple[Index, Results | None] | None:
-        """Wait for a task; return its block and results, with results None if it cost several workers."""
+        """Wait for a task; return its block and its results, None if the task killed several workers."""
         try:
             future = self._done.get(timeout=_INTERVAL)
         except Empty:
@@ -149,7 +149,7 @@ class _Tasks:
         return index, self._result(future)
 
     def _result(self, future: Any) -> Results | None:
-        """Return the results of a finished task; None if it cost several workers."""
+        """Return the results of a finished task; None if the task killed several workers."""
         if future.status == "error":
             error = future.exception()
         else:

@@ -29,12 +29,12 @@ KINDS: Final = ("train", "times", "burst", "sequence", "sine")
 """Tables of a drive file that define the firing times."""
 
 _OF_DRIVE: Final = ("waveform", "drive", "at")
-"""Targets of axes that change the drive."""
+"""Targets of axes that change the drive: its waveform, its timing, or one firing time."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """Run of a sweep: hammer, drive, end [s], displacement [m] and velocity [m/s] at the start."""
+    """One run of a sweep: hammer, drive, end [s], and initial displacement [m] and velocity [m/s]."""
 
     hammer: Hammer
     drive: Drive
@@ -43,7 +43,7 @@ class Member:
 
 
 class Members(NamedTuple):
-    """Several runs: the fields of `Member`, one entry for each; `states` has shape (members, 2)."""
+    """Several runs of a sweep: the fields of `Member`, one entry per run; `states`: shape (members, 2)."""
 
     hammers: list[Hammer]
     drives: Sequence[Drive]
@@ -61,7 +61,7 @@ class Base(Declared):
     )
     folder: Path = part("folder of the files that the drive refers to")
     state: tuple[float | None, float | None] = part(
-        "displacement, m, and velocity, m/s, at the start; None for those at rest"
+        "displacement, m, and velocity, m/s, at the start; None for the value at rest"
     )
     duration: float | None = scalar("s", "end of the runs")
     tolerance: float = part("error allowed in one step")
@@ -69,7 +69,7 @@ class Base(Declared):
 
     @property
     def kind(self) -> str:
-        """Table of the drive that defines the firing times."""
+        """Name of the drive table that defines the firing times, such as "train"; empty without one."""
         return next((name for name in KINDS if name in self.drive), "")
 
 
@@ -199,7 +199,7 @@ class Maker:
         return tomllib.loads(document(head, tables))
 
     def _standard(self, hammer: Hammer) -> tuple[Waveform | None, Hashable]:
-        """Return the default waveform of a hammer and its identity, shared by many hammers."""
+        """Return the waveform to fire with a hammer, and a key that is equal for equal waveforms; cached."""
         if id(hammer) not in self._standards:
             fired = self.base.waveform if self.base.waveform is not None else hammer.waveform
             does = None if fired is None else (fired.quantity, fired.segments().tobytes())

@@ -1,4 +1,4 @@
-"""Outputs of a sweep: the arrays of the store, their meanings, and their selection in a spec."""
+"""Outputs of a sweep: arrays of the store, their units and meanings, and their selection in a spec."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ ALWAYS: Final = (
 """Outputs stored for every member."""
 
 DOTS: Final = (
-    Output("fired", FIRING, "bool", "", "whether there was such a firing in the run"),
+    Output("fired", FIRING, "bool", "", "whether the run includes this firing"),
     Output("fired_at", FIRING, "float64", "s", "time of the firing"),
     Output("struck", FIRING, "bool", "", "whether a dot was struck"),
     Output("flight_time", FIRING, "float64", "s", "time from firing to touch"),
@@ -110,16 +110,16 @@ OF_MOTION: Final = (
     Output("backstop_touches", "", "int64", "", "touches of the backstop"),
     Output("coil_work", "", "float64", "J", "work of the coil"),
     Output("drive_work", "", "float64", "J", "work of a driving force"),
-    Output("pack_loss", "", "float64", "J", "energy that the pack kept"),
-    Output("backstop_loss", "", "float64", "J", "energy that the backstop took"),
-    Output("damping_loss", "", "float64", "J", "energy that the damping of the armature took"),
-    Output("energy_residual", "", "float64", "J", "what the energy ledger leaves over"),
+    Output("pack_loss", "", "float64", "J", "energy dissipated in the pack"),
+    Output("backstop_loss", "", "float64", "J", "energy dissipated in the backstop"),
+    Output("damping_loss", "", "float64", "J", "energy dissipated by the damping of the armature"),
+    Output("energy_residual", "", "float64", "J", "residual of the energy ledger"),
 )
-"""Scalars that require the whole motion, at several times the computation time."""
+"""Scalar outputs that require the whole motion, which takes several times the computation time."""
 
 
 class Outputs(Declared):
-    """Outputs stored for each member."""
+    """Selection of the outputs that are stored for each member."""
 
     arrays: tuple[Output, ...] = part("all arrays, the status first")
     firings: int = part("length of the dimension of the firings")
@@ -130,11 +130,11 @@ class Outputs(Declared):
         return any(output in self.arrays for output in outputs)
 
     def length(self, output: Output) -> tuple[int, ...]:
-        """Return the shape of an array beyond the dimensions of the members."""
+        """Return the shape of an output array without its member dimensions."""
         return {"": (), FIRING: (self.firings,), TIME: (self.times.size,)}[output.dim]
 
     def empty(self, members: int) -> dict[str, Any]:
-        """Return arrays of fill values, of shape (members, ...)."""
+        """Allocate the output arrays by name, shape (members, ...), filled with fill values."""
         return {
             output.name: np.full((members, *self.length(output)), output.fill, output.dtype)
             for output in self.arrays
@@ -171,7 +171,7 @@ def read_outputs(table: OutputsTable, firings: int) -> Outputs:
     arrays += _chosen(table.scalars, scalars, "scalars")
     if len(arrays) == len(ALWAYS):
         raise InputError(
-            "outputs: nothing is asked for",
+            "outputs: nothing is requested",
             key="outputs",
             expected="dots, strobes, final, displacement or scalars",
         )

@@ -57,7 +57,7 @@ def between(share: FloatArray, low: float, high: float, geometric: bool) -> Floa
 class Blocks(Declared):
     """Division of a grid of members into blocks, each a whole chunk and contiguous in member order."""
 
-    shape: tuple[int, ...] = part("members along each dimension; the last one runs fastest")
+    shape: tuple[int, ...] = part("members along each dimension; the last dimension varies fastest")
     chunks: tuple[int, ...] = part("members of a block along each dimension")
 
     @classmethod
@@ -87,7 +87,7 @@ class Blocks(Declared):
         return iter(np.ndindex(*self.counts))
 
     def size(self, index: Sequence[int]) -> tuple[int, ...]:
-        """Return the number of members of a block along each dimension."""
+        """Return the shape of a block: its number of members along each dimension of the grid."""
         return tuple(
             min(chunk, length - i * chunk)
             for i, length, chunk in zip(index, self.shape, self.chunks, strict=True)
@@ -247,7 +247,7 @@ def size_text(size: float) -> str:
 
 
 def identity(spec: Spec) -> dict[str, str]:
-    """Return the properties that results in one store must share, the readable ones first."""
+    """Return the properties that all results in a store must share, human-readable ones first."""
     return {
         "store_format": FORMAT,
         **provenance(hammer=spec.base.hammer, tolerance=spec.base.tolerance),
@@ -293,7 +293,7 @@ def make_plan(spec: Spec) -> Plan:
 
 
 def _try(plan: Plan) -> None:
-    """Raise InputError if the first, middle and last member are all invalid."""
+    """Build the first, middle and last member; raise InputError if all three are invalid."""
     maker = Maker(plan.spec.base)
     faults: list[InputError] = []
     for row in plan.rows([0, plan.members // 2, plan.members - 1]):

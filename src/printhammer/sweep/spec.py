@@ -33,7 +33,7 @@ from printhammer.sweep.tables import read_quantity, read_tables
 
 
 class Spec(Declared):
-    """Parsed specification of a sweep."""
+    """Parsed sweep spec: hammer, drive, axes, outputs and block size."""
 
     where: str = part("name for messages, usually the file")
     text: str = part("TOML")
@@ -156,7 +156,7 @@ def _replaced(hammer: Hammer, constants: Mapping[str, Any]) -> Hammer:
 
 
 def _drive_tables(source: dict[str, Any] | str, folder: Path) -> tuple[dict[str, Any], Path]:
-    """Return the tables of a drive, and the folder of the files that it refers to."""
+    """Return the tables of a spec's drive, and the folder of the files that the drive refers to."""
     if not isinstance(source, str):
         return dict(source), folder
     path = folder / source
@@ -222,7 +222,7 @@ def _firings(base: Base) -> int:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value with its numbers as exact text."""
+    """Convert a value to plain data with floats as exact hexadecimal text, for the digest."""
     if isinstance(value, Mapping):
         return {name: _plain(entry) for name, entry in value.items()}
     if isinstance(value, list):

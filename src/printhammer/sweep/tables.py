@@ -1,4 +1,4 @@
-"""Tables of a spec as written, before units and keys are interpreted.
+"""Schema of a sweep spec: its tables as written, before units and keys are interpreted.
 
 Quantities in a spec always carry their unit, as text or as a table.
 """
@@ -68,7 +68,7 @@ def read_quantity(written: Any, si: str, where: str) -> float:
 
 
 def read_quantities(written: Any, si: str, where: str) -> list[float]:
-    """Parse several quantities into SI: a list of single ones, or values with a common unit."""
+    """Parse several quantities into SI: a list of quantities, or values with a common unit."""
     values: Iterable[Any] = written if isinstance(written, list) else ()
     if isinstance(written, Mapping):
         with located(where, key=where):
@@ -100,25 +100,25 @@ class _Table(BaseModel):
 
 
 class AxisTable(_Table):
-    """Axis: a key with values, or with a range."""
+    """Table `[[axis]]` of a spec: a key with values, or with a range."""
 
-    key: str = Field(description="what it changes, such as 'pack.stiffness', 'drive.rate' or 'state.x'")
-    values: ManyQuantities = Field(None, description="the values themselves")
-    low: OneQuantity = Field(None, description="one end of a range")
-    high: OneQuantity = Field(None, description="the other end")
+    key: str = Field(description="key to change, such as 'pack.stiffness', 'drive.rate' or 'state.x'")
+    values: ManyQuantities = Field(None, description="values of the axis")
+    low: OneQuantity = Field(None, description="first end of a range")
+    high: OneQuantity = Field(None, description="second end of a range")
     count: int | None = Field(None, ge=1, description="number of values of a range, in a grid")
     spacing: Spacing = Field("linear", description="how a range is divided")
 
 
 class StateTable(_Table):
-    """Initial state; by default the rest state."""
+    """Table `[state]` of a spec: initial state; by default the rest state."""
 
-    x: OneQuantity = Field(None, description="displacement; by default that at rest")
+    x: OneQuantity = Field(None, description="displacement; by default the rest position")
     v: OneQuantity = Field(None, description="velocity; by default 0")
 
 
 class TimesTable(_Table):
-    """Times at which the displacement is stored."""
+    """Table of the times at which the displacement is stored."""
 
     start: OneQuantity = Field("0 s", description="first time")
     end: OneQuantity = Field(description="last time")
@@ -126,9 +126,9 @@ class TimesTable(_Table):
 
 
 class OutputsTable(_Table):
-    """Outputs stored for each run."""
+    """Table `[outputs]` of a spec: outputs stored for each run."""
 
-    dots: list[str] | Literal["all"] = Field([], description="what each firing did")
+    dots: list[str] | Literal["all"] = Field([], description="dot of each firing")
     strobes: list[str] | Literal["all"] = Field([], description="state at each firing")
     final: bool = Field(False, description="state at the end of the run")
     displacement: TimesTable | None = Field(None, description="displacement at common times")
@@ -139,9 +139,9 @@ class SpecTable(_Table):
     """Specification of a sweep."""
 
     format: Literal[1] = Field(description="version of the spec format")
-    title: str = Field("", description="one line that says what it is")
+    title: str = Field("", description="one-line description")
     hammer: str = Field(description="name of a shipped hammer, or path of a hammer file")
-    design: Design = Field("grid", description="how the axes are combined")
+    design: Design = Field("grid", description="design of the sweep: how the axes are combined")
     members: int | None = Field(None, ge=1, description="number of members of a Latin hypercube")
     seed: int | None = Field(None, ge=0, description="seed of a Latin hypercube")
     tolerance: float = Field(
@@ -158,12 +158,12 @@ class SpecTable(_Table):
     drive: dict[str, Any] | str = Field(description="the tables of a drive file, or its path")
     state: StateTable = Field(StateTable(), description="initial state")
     constants: dict[str, OneQuantity] = Field({}, description="constants replaced in all members, by key")
-    axis: list[AxisTable] = Field(min_length=1, description="the axes")
-    outputs: OutputsTable = Field(description="what is kept")
+    axis: list[AxisTable] = Field(min_length=1, description="axes of the sweep")
+    outputs: OutputsTable = Field(description="outputs to store")
 
 
 def read_tables(document: dict[str, Any]) -> SpecTable:
-    """Validate the tables of a spec."""
+    """Validate the tables of a spec; errors name the key, its value and the expectation."""
     try:
         return SpecTable.model_validate(document)
     except ValidationError as error:
@@ -181,7 +181,7 @@ def schema() -> dict[str, Any]:
 
 
 def _fault(error: ValidationError) -> InputError:
-    """Convert the first fault to an error with key, value and expectation."""
+    """Convert the first validation error to an `InputError` with key, value and expectation."""
     fault = error.errors(include_url=False)[0]
     key, table = _place(fault["loc"])
     if fault["type"] == "missing":
@@ -200,7 +200,7 @@ def _fault(error: ValidationError) -> InputError:
 
 
 def _place(steps: tuple[int | str, ...]) -> tuple[str, type[BaseModel]]:
-    """Return the key of a fault, such as "axis[1].count", and the table that it belongs to."""
+    """Return the key of a validation error, such as "axis[1].count", and the table that contains the key."""
     key, table = "", SpecTable
     inner: dict[str, type[_Table]] = {
         "axis": AxisTable,

@@ -1,4 +1,4 @@
-"""Computation of blocks: the members of a block are integrated together, in threads."""
+"""Computation of sweep blocks: the members of a block are integrated together, in threads."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def run_chunk(
 ) -> Results:
     """Integrate the members of a block, one per row of axis values, SI; return arrays by name.
 
-    An invalid member, or one that stops early, is a row with a status. `progress` is called from time to time
+    A member that is invalid or stops early is a row with a status. `progress` is called from time to time
     with the fraction done; an exception that it raises stops the work.
     """
     if base.hammer.replace({}).fingerprint != base.hammer.fingerprint:
@@ -195,7 +195,7 @@ _INTERVAL: Final = 0.1  # Interval between progress reports, s; arbitrary
 
 
 class _StopError(Exception):
-    """Stops a block that is no longer needed."""
+    """Raised to stop a block whose results are no longer needed."""
 
 
 def run_local(

@@ -20,14 +20,15 @@ UNITS: Final = {driven: unit for unit, driven in QUANTITY_UNITS.items()}
 """SI unit of each driven quantity."""
 
 DECAY_TIMES: Final = 27.6310211159
-"""Number of decay time constants after which a decaying current is set to zero: 1e-12 of it is left then."""
+"""Number of decay time constants after which a decaying current is set to zero: its value is then 1e-12 of
+the initial one."""
 
 
 class Supply(NamedTuple):
-    """Voltage supply, see `printhammer.kernel.model.layout`."""
+    """Voltage supply of a coil driver; see `printhammer.kernel.model.layout`."""
 
     diode: float = 0.0
-    """Voltage of the diode that carries a chopped current, V."""
+    """Forward voltage of the diode in which a chopped current circulates, V."""
     series: float = 0.0
     """Resistance in series with an ideal source, ohm."""
     capacitance: float = 0.0
@@ -133,5 +134,5 @@ class Waveform(BaseModel):
         return Supply()
 
     def content(self) -> dict[str, FloatArray]:
-        """Return the arrays that identify the waveform besides its fields; none for a formula."""
+        """Return the arrays that identify the waveform besides its fields; empty unless it holds samples."""
         return {}

@@ -114,7 +114,7 @@ def _checked(parts: object) -> tuple[tuple[float, Waveform], ...]:
 
 
 def _over(begun: float, waveform: Waveform, time: float) -> bool:
-    """Whether a waveform that began at `begun` has ended or decayed to its tail at `time`, both in s."""
+    """Whether a waveform that began at `begun`, s, has ended or decayed to its tail by `time`, s."""
     segments = waveform.segments()
     # The circuit of the coil remains after the supply of a driver ends.
     end = waveform.support

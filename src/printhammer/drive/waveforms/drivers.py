@@ -1,4 +1,4 @@
-"""Drivers of a coil with its circuit: a switched supply, and the paths of the decaying current.
+"""Drivers of a coil: a switched voltage supply, and the path of the current while it decays.
 
 The latest firing always replaces earlier ones, because a driver is a single output stage. Voltages are those
 of the supply; a diode, the resistance of the supply and the thresholds of a chopper act in the circuit of the
@@ -80,7 +80,7 @@ class _Driver(Waveform):
         return Supply(diode=self.diode_voltage, coils=self.coils)
 
     def scaled(self, factor: float) -> Self:
-        """Return the driver with its supply voltage scaled by `factor`; currents do not scale with it."""
+        """Return a copy with the supply voltage scaled by `factor`; chopper thresholds are unchanged."""
         return type(self)(**{**self.model_dump(), "voltage": self.voltage * factor})
 
     def _off(self, at: float) -> tuple[float, ...]:
@@ -96,17 +96,17 @@ class _Driver(Waveform):
 
 
 class Rail(_Driver):
-    """Supply on for the width, then off."""
+    """Rail driver: the supply is on for the pulse width, then off."""
 
     shape: ClassVar[str] = "rail"
 
     def segments(self) -> FloatArray:
-        """Return the segment table: on, off."""
+        """Return the segment table: supply on, supply off."""
         return table([self._on(0.0), self._off(self.width)], math.inf)
 
 
 class Chopper(_Driver):
-    """Supply on for the width, chopped between two currents, or off for a fixed time at the upper current.
+    """Chopper: supply on for the width, chopped between two currents or by a fixed off-time.
 
     While it is chopped off, the current circulates through a diode.
     """
@@ -125,13 +125,13 @@ class Chopper(_Driver):
         return self
 
     def segments(self) -> FloatArray:
-        """Return the segment table: chopped, off."""
+        """Return the segment table: supply chopped, supply off."""
         lower = self.lower if self.lower is not None else -(self.off_time or 0.0)
         return table([self._on(0.0, self.upper, lower), self._off(self.width)], math.inf)
 
 
 class PeakAndHold(_Driver):
-    """Full supply for a time, then chopped between two lower currents for the rest of the width."""
+    """Peak-and-hold driver: full supply for the peak time, then chopped between two lower currents."""
 
     shape: ClassVar[str] = "peak-and-hold"
     peak_time: float = measured("s", "tp", "time of the full supply", gt=0.0)
@@ -149,17 +149,19 @@ class PeakAndHold(_Driver):
         return self
 
     def segments(self) -> FloatArray:
-        """Return the segment table: full, chopped, off."""
+        """Return the segment table: full supply, supply chopped, supply off."""
         hold = self._on(self.peak_time, self.hold_upper, self.hold_lower)
         return table([self._on(0.0), hold, self._off(self.width)], math.inf)
 
 
 class Capacitor(_Driver):
-    """Capacitor discharged through the coil for the width, and always charged from the supply."""
+    """Capacitor driver: a capacitor, always being charged, discharges through the coil for the width."""
 
     shape: ClassVar[str] = "capacitor"
     capacitance: float = measured("F", "C", "capacitance", gt=0.0)
-    charging_resistance: float = measured("ohm", "Rc", "resistance from which it is charged", gt=0.0)
+    charging_resistance: float = measured(
+        "ohm", "Rc", "resistance through which the capacitor is charged", gt=0.0
+    )
 
     def supply(self) -> Supply:
         """Return the supply."""
@@ -172,7 +174,7 @@ class Capacitor(_Driver):
         )
 
     def segments(self) -> FloatArray:
-        """Return the segment table: on, off."""
+        """Return the segment table: capacitor connected, supply off."""
         on = (0.0, RESERVOIR, self.voltage, self.series, 0.0, 0.0)
         return table([on, self._off(self.width)], math.inf)
 
@@ -184,19 +186,19 @@ class Bridge(_Driver):
     reverse: float = measured("s", "tr", "time of the reversed supply", gt=0.0)
 
     def segments(self) -> FloatArray:
-        """Return the segment table: on, reversed, off."""
+        """Return the segment table: supply on, supply reversed, supply off."""
         back = (self.width, SWITCHED, -self.voltage, self.series, math.inf, 0.0)
         return table([self._on(0.0), back, self._off(self.width + self.reverse)], math.inf)
 
 
 DRIVERS: tuple[type[Waveform], ...] = (Rail, Chopper, PeakAndHold, Capacitor, Bridge)
-"""Classes of the drivers."""
+"""Waveform classes of the coil drivers."""
 
 _KEPT: Final = 256  # Cached tables; arbitrary
 
 
 class Switched(Waveform):
-    """Drive switched between levels.
+    """Waveform switched between levels, with exponential edges of one time constant.
 
     Attributes
     ----------
@@ -208,7 +210,7 @@ class Switched(Waveform):
     edge : float
         Time constant of the edges, s.
     initial : float
-        Value at the firing, A or N; 0 unless a run begins within a pulse.
+        Value at the firing, A or N; nonzero only if a run begins within a pulse.
     """
 
     shape: ClassVar[str] = "switched"

@@ -1,6 +1,6 @@
 """Sampled waveforms: measured records of a current or force.
 
-Records of a measured current or force: checked samples, and tables with units in the heading.
+Records are validated samples, read from tables with units in the heading.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
     Raises
     ------
     InputError
-        Fewer than two samples, different lengths, a sample not finite, a time negative or not above the one
-        before.
+        There are fewer than two samples, times and values differ in number, a sample is not finite, or a time
+        is negative or does not exceed the preceding time.
     """
     try:
         t = np.asarray(times, dtype=np.float64)
@@ -87,14 +87,14 @@ def checked(times: npt.ArrayLike, values: npt.ArrayLike, quantity: QuantityName,
 def read_csv(path: Path) -> Samples:
     """Read a record from a table of time and current or force.
 
-    The firing is at time 0 of the record. What the record has before is cut off; nothing is driven there. A
-    level that a logic analyser wrote at its edges holds from one edge to the next.
+    The firing is at time 0 of the record. Samples before time 0 are cut off; the drive must be zero there. A
+    level that a logic analyser recorded at its edges holds from one edge to the next.
 
     Raises
     ------
     InputError
-        The file cannot be read, is empty, lacks units, holds something else than finite numbers at
-        increasing times, or something is driven before time 0.
+        The file cannot be read, is empty, lacks units, holds something else than finite numbers at increasing
+        times, or the drive is not zero before time 0.
     """
     what = str(path)
     table = read_table(path, {"time": "s"}, optional=_UNITS, what="the sampled waveform")

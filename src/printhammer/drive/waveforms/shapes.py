@@ -40,7 +40,7 @@ def _rate(time_constant: float) -> float:
 
 
 class _Pulse(Waveform):
-    """Pulse with an amplitude."""
+    """Base class of pulses with an amplitude."""
 
     amplitude: float = quantity("A", "I", "amplitude of the pulse", also=("N", "V"))
 
@@ -64,8 +64,8 @@ class Rectangle(_Pulse):
     """Rectangle with exponential rise and decay: the current of a coil that is switched on and off.
 
     I(tau) = amplitude (1 - exp(-tau / rise)) for 0 <= tau < width, then I(width) exp(-(tau - width) / decay),
-    and zero from `DECAY_TIMES` decay constants after the width on, where 1e-12 of it is left. A rise or decay
-    of 0 is a sharp edge.
+    and zero from `DECAY_TIMES` decay constants after the width on, where 1e-12 of the current is left. A rise
+    or decay of 0 is a sharp edge.
     """
 
     shape: ClassVar[str] = "rectangle"
@@ -112,7 +112,7 @@ class Trapezoid(_Pulse):
 
 
 class Sine(_Pulse):
-    """Endless sine, amplitude sin(2 pi frequency tau + phase) from tau = 0 on, for a periodic drive."""
+    """Endless sine wave, amplitude sin(2 pi frequency tau + phase) from tau = 0 on, for a periodic drive."""
 
     shape: ClassVar[str] = "sine"
     frequency: float = quantity("Hz", "f", "frequency", gt=0.0)
