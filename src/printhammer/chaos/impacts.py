@@ -2,7 +2,7 @@
 
 At a touch the displacement is that of the surface. The remaining state is the velocity and the time since the
 last firing; from touch to touch these two are an iterated map, like the strobe map from firing to firing,
-with the section defined by the armature itself.
+with a section that the armature itself defines.
 
 *Statistics of an impact train.*
 
@@ -41,13 +41,13 @@ Surface = Literal["pack", "backstop"]
 SURFACES: Final = get_args(Surface)
 
 TOUCHES: Final = 1000
-"""Default number of touches."""
+"""Default number of touches of a section."""
 
 _FIRINGS_A_TOUCH: Final = 10  # Default maximum number of firings per requested touch
 
 
 class Section(Result):
-    """States of a hammer at the touches of a surface."""
+    """Poincaré section: states of a hammer at the touches of a surface."""
 
     hammer: Hammer = part("the hammer")
     drive: Drive = part("the drive")
@@ -95,13 +95,13 @@ class Section(Result):
 
     @property
     def per_firing(self) -> float:
-        """Mean number of touches per firing; NaN for a single firing."""
+        """Mean number of touches per firing; NaN if only one firing is covered."""
         fired = self.last - self.first
         return int((self.firing < self.last).sum()) / fired if fired else float("nan")
 
     @property
     def remark(self) -> str:
-        """Remark on a section with fewer touches than requested; else empty."""
+        """Remark that the section has fewer touches than requested, with the reason; else empty."""
         if len(self.t) == self.wanted:
             return ""
         why = "" if self.ok else f"; the run ended early: {self.status}"
@@ -143,7 +143,7 @@ def section(
     Returns
     -------
     Section
-        With a status; a run that ends early, or has too few touches, is not an exception.
+        Section with a status; a run that ends early, or has too few touches, raises no exception.
     """
     counts = _counts(touches, transient, firings)
     check_tolerance(tolerance)
@@ -170,7 +170,7 @@ def sections(
     Parameters
     ----------
     hammers, periods, waveform, overlap
-        Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
+        Hammers or regimes, and the firing of hammers, see `printhammer.run.regime.regimes_of`.
     surface, touches, transient, firings
         As for `section`, for all trains.
 
@@ -188,7 +188,7 @@ def sections(
 def _counts(
     touches: SupportsIndex, transient: SupportsIndex, firings: SupportsIndex | None
 ) -> tuple[int, int, int]:
-    """Return the numbers of touches and of discarded firings, and the maximum number of firings."""
+    """Validate the numbers of touches and of discarded firings; return them with the firing limit."""
     wanted, skipped = read_count(touches, "touches"), read_count(transient, "transient", least=0)
     room = MOST_PULSES - skipped - 1
     limit = min(_FIRINGS_A_TOUCH * wanted, room) if firings is None else read_count(firings, "firings")
@@ -241,18 +241,18 @@ def _section(train: Train, surface: Surface, counts: tuple[int, int, int], toler
 
 
 BINS: Final = 60
-"""Default number of bins of the histogram."""
+"""Default number of bins of the histogram of intervals."""
 
 LAGS: Final = 40
-"""Default largest lag of the autocorrelation; at most a quarter of the intervals."""
+"""Default for the largest lag of the autocorrelation; at most a quarter of the number of intervals."""
 
 _FEWEST: Final = 8  # Smallest number of intervals of a train
 _SAME: Final = 1e-9
-"""Relative difference below which two intervals are equal."""
+"""Relative difference below which all intervals are equal, so that their autocorrelation is undefined."""
 
 
 class ImpactTrain(Result):
-    """Intervals between impacts, and their statistics."""
+    """Times of a train of impacts, with the statistics of the intervals between them."""
 
     times: FloatArray = column("s", "time of the impact", "impact", name="t")
     intervals: FloatArray = part("times between successive impacts, s", more="one fewer", repr=False)
@@ -292,12 +292,12 @@ class ImpactTrain(Result):
     @property
     @derived("s", "time since the impact before", "impact")
     def interval(self) -> FloatArray:
-        """Intervals since the impact before, s; NaN for the first impact."""
+        """Time since the preceding impact, s; NaN for the first impact."""
         return np.concatenate([[np.nan], self.intervals])
 
     @property
     def hammer(self) -> Hammer | None:
-        """The hammer, if known."""
+        """Hammer whose impacts these are; None if the times were given as an array."""
         return None if self.source is None else self.source.hammer
 
     @property
@@ -307,15 +307,15 @@ class ImpactTrain(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the times."""
+        """Provenance of the section from which the times come."""
         return provenance() if self.source is None else self.source.provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return the surface of the touches, for the attributes of the Dataset."""
+        """Return surface and firings of the section, for the attributes of the Dataset."""
         return {name: getattr(self.source, name, None) for name in ("surface", "first", "last", "wanted")}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return times over `impact`, histogram over `bin` and autocorrelation over `lag`."""
+        """Return the Dataset variables: times over `impact`, histogram over `bin`, lags over `lag`."""
         number = np.arange(1, len(self.times) + 1, dtype=np.int32)
         places = {
             "impact": ("1", "number of the impact", "impact", number),
@@ -343,11 +343,11 @@ def impact_train(
     ----------
     touches : Section, Regime, Hammer or array
         A section from `printhammer.section`; or a regime, or a hammer with the keywords `firing`, whose
-        section is computed; or at least nine times of impacts, s, ascending.
+        section is computed; or at least nine impact times, s, ascending.
     window : float or str, optional
         Length of the windows for the Fano factor, s, or text with a unit; by default ten periods of the
-        drive, or ten mean intervals without a drive. In a window of one period every train with one dot per
-        period appears perfectly regular.
+        drive, or ten mean intervals without a drive. With a window of one period, every train with one dot
+        per period would appear perfectly regular.
     bins : int, optional
         Number of bins of the histogram, between the shortest and the longest interval.
     lags : int, optional
@@ -410,14 +410,14 @@ def autocorrelation(series: FloatArray, longest: int) -> FloatArray:
 
 
 def _range(intervals: FloatArray) -> tuple[float, float]:
-    """Return the ends of the histogram, at least a thousandth of the mean apart."""
+    """Return the range of the interval histogram, s, at least a thousandth of the mean interval wide."""
     low, high = float(intervals.min()), float(intervals.max())
     room = max(0.0, 0.5 * (1e-3 * float(intervals.mean()) - (high - low)))
     return low - room, high + room
 
 
 def _fano(times: FloatArray, length: float) -> tuple[int, float]:
-    """Count windows of a length, s, and compute the Fano factor of the impacts in them."""
+    """Return the number of windows of a length, s, and the Fano factor of the impacts in them."""
     # Windows start half an interval before the first impact, so that impacts of a clock avoid the edges.
     begin = times[0] - 0.5 * (times[-1] - times[0]) / (len(times) - 1)
     windows = int((times[-1] - begin) // length)

@@ -1,4 +1,4 @@
-"""Attractors: identification from the strobe states of trains, and assignment of trains to them."""
+"""Attractors: identification from the strobe states of pulse trains; assignment of further trains to them."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray
 
 MATCH: Final = 1e-2
-"""Distance, in half-widths of the window, up to which periodic orbits count as the same attractor."""
+"""Largest distance of periodic orbits that count as one attractor, in half-widths of the strobe window."""
 
 CLOUD: Final = 2000
 """Number of points that represent a strange attractor."""
 
 SETTLING: Final = 1000
-"""Number of firings discarded before these points, so that they lie on the attractor."""
+"""Number of firings discarded before the points of a strange attractor, so that they lie on it."""
 
 REACH: Final = 0.99
-"""Quantile of the nearest distances between the two halves of these points that defines the reach."""
+"""Quantile of the nearest-neighbour distances of a strange attractor's points that defines its reach."""
 
 INSIDE: Final = 0.95
-"""Smallest fraction of a train's points within reach, for the train to be on a strange attractor."""
+"""Fraction of a train's points that have to lie within reach of a strange attractor for a match."""
 
 ATTEMPTS: Final = 12
-"""Maximum number of aperiodic trains that are followed for long to find strange attractors."""
+"""Maximum number of aperiodic trains followed for 3000 firings in the search for strange attractors."""
 
 POLISHED: Final = 12
 """Maximum number of unsettled trains per batch whose orbits are located by Newton's method."""
 
 
 class Attractor(Declared):
-    """A periodic orbit or a strange attractor."""
+    """Attractor of a pulse train: a periodic orbit or a strange attractor."""
 
     name: str = part('"period-q" or "strange"')
     period: int | None = part("period q; None for a strange attractor")
@@ -76,7 +76,7 @@ class Attractors:
         return other
 
     def judge(self, columns: Columns) -> IntArray:
-        """Match trains to attractors: indices in `found`, -1 if unknown."""
+        """Return the index in `found` of the attractor of each train, -1 if unknown."""
         cycles, _ = self._cycles(columns)
         places = np.full(len(columns), -1, np.int64)
         for q in np.unique(cycles[cycles > 0]).tolist():
@@ -97,9 +97,9 @@ class Attractors:
         return np.stack([x, v], axis=-1) / self.scales[:2]
 
     def _settling(self, points: FloatArray, q: int) -> IntArray:
-        """Match unsettled trains to the orbits that they approach: indices in `found`, -1 if unknown.
+        """Match unsettled trains to the orbits that they approach; return indices in `found`, -1 if unknown.
 
-        The states, of shape (n, points, 2), repeat after q firings.
+        The scaled states, shape (n, points, 2), repeat after q firings.
         """
         places = np.full(len(points), -1, np.int64)
         left = list(range(len(points)))
@@ -122,7 +122,7 @@ class Attractors:
         return places
 
     def _periodic(self, orbits: FloatArray) -> IntArray:
-        """Match orbits of one period, shape (n, q, 2), adding new orbits; return indices in `found`."""
+        """Match orbits of one period, shape (n, q, 2), to `found` or append them; return indices."""
         q = orbits.shape[1]
         places = self._known(orbits)
         while (left := np.flatnonzero(places < 0)).size:
@@ -133,7 +133,7 @@ class Attractors:
         return places
 
     def _known(self, orbits: FloatArray) -> IntArray:
-        """Match periodic orbits of one period, shape (n, q, 2), to `found`: indices, -1 for new orbits."""
+        """Match orbits of one period, shape (n, q, 2), to `found`; return indices, -1 for new orbits."""
         places = np.full(len(orbits), -1, np.int64)
         for place, attractor in enumerate(self.found):
             if attractor.period == orbits.shape[1]:
@@ -142,7 +142,7 @@ class Attractors:
         return places
 
     def _strange(self, columns: Columns, rows: IntArray, places: IntArray) -> None:
-        """Match aperiodic trains to strange attractors, and identify new attractors from unmatched trains."""
+        """Match aperiodic trains to the strange attractors; identify new ones from the unmatched trains."""
         points = self._scaled(columns.x, columns.v)
         left = rows
         for place in self._trees:
@@ -160,7 +160,7 @@ class Attractors:
                 left = self._within(points, left, followed, places)
 
     def _within(self, points: FloatArray, rows: IntArray, place: int, places: IntArray) -> IntArray:
-        """Label the trains that lie on a strange attractor; return the remaining trains."""
+        """Assign the trains whose points lie on a strange attractor; return the rows of the other trains."""
         if not rows.size:
             return rows
         tree, reach = self._trees[place]
@@ -170,7 +170,7 @@ class Attractors:
         return np.asarray(rows[share < INSIDE])
 
     def _follow(self, columns: Columns, row: int) -> int | None:
-        """Follow one train for long; return the index of its attractor, or None if it is undecided."""
+        """Continue one train for 3000 firings; return the index of its attractor, None if undecided."""
         begin = columns.last[row : row + 1]
         if math.isnan(begin[0, 0]):
             return None
@@ -200,7 +200,7 @@ class Attractors:
 
 
 def _agree(orbits: FloatArray, known: FloatArray) -> BoolArray:
-    """Mask of the orbits, shape (n, q, 2), equal to a known orbit, shape (q, 2), up to a cyclic shift."""
+    """Mask of the orbits, shape (n, q, 2), that equal a known orbit, shape (q, 2), up to a cyclic shift."""
     count = len(known)
     # The point nearest to the first point gives the shift.
     shift = np.abs(known - orbits[:, :1]).max(axis=2).argmin(axis=1)

@@ -1,13 +1,14 @@
 """Basins of attraction: the attractor that each initial state leads to, and the entropy of the boundaries.
 
-Every state of a grid starts a train at the moment of a firing, with the earlier pulses under way. Trains are
-continued, round by round, until their attractors are known. The attractors are found from the cells
-themselves. A cell whose train is periodic, by the rule of `printhammer.chaos.strobe.verdict`, belongs to that
-periodic orbit. Of the aperiodic trains a few are followed for thousands of firings; if the exponent of such a
-train shows it to be strange, its points define a strange attractor, and cells whose points lie among them
-belong to it. Cells that fit neither case after the last round are undecided.
+Every state of a grid starts a train at the moment of a firing, with the pulses of earlier firings still
+active. Trains are continued, round by round, until their attractors are known. The attractors are found from
+the cells themselves. A cell whose train is periodic, by the rule of `printhammer.chaos.strobe.verdict`,
+belongs to the basin of that periodic orbit. A few of the aperiodic trains are followed for thousands of
+firings. If the exponent of such a train shows that it is strange, its points define a strange attractor, and
+cells whose trains have their points among them belong to its basin. Cells that fit neither case after the
+last round are undecided.
 
-Basin entropy measures the uncertainty of the attractor if a state is known only up to a box.
+Basin entropy measures how uncertain the attractor is if the initial state is known only to lie in a box.
 
 A. Daza, A. Wagemakers, B. Georgeot, D. Guéry-Odelin and M. A. F. Sanjuán, Basin entropy: a new tool to
 analyze uncertainty in dynamical systems, Scientific Reports 6 (2016) 31416.
@@ -47,11 +48,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 BOX: Final = 4
-"""Default number of cells along the side of a box."""
+"""Default number of cells along the side of a box of the basin entropy."""
 
 
 class BasinEntropy(Declared):
-    """Basin entropy, in natural logarithms."""
+    """Basin entropy of a plane of cells, in natural logarithms."""
 
     box: int = part("cells along the side of a box")
     boxes: int = part("number N of whole boxes with at least one decided cell")
@@ -74,20 +75,20 @@ class BasinEntropy(Declared):
 
 
 def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEntropy:
-    """Compute the basin entropy of a plane of labels.
+    """Compute the basin entropy of a plane of attractor labels.
 
     Parameters
     ----------
     labels : int array, shape (n, m)
-        Index of the attractor of each cell, from 1 on; cells of unknown attractor, 0 or negative, are left
-        out.
+        Index of the attractor of each cell, from 1 on; cells of unknown attractor, 0 or negative, are
+        excluded.
     box : int, optional
-        Cells along the side of a box; cells beyond the last whole box are left out.
+        Number of cells along the side of a box; cells beyond the last whole box are excluded.
 
     Raises
     ------
     InputError
-        The labels are not a plane of whole numbers, or the box is not from 1 to the shorter side.
+        The labels are not a two-dimensional array of integers, or the box is not from 1 to the shorter side.
     """
     plane = np.asarray(labels)
     if plane.ndim != 2 or not plane.size or plane.dtype.kind not in "iu":
@@ -121,10 +122,11 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
 def uncertainty_exponent(labels: npt.ArrayLike) -> float:
     """Estimate the uncertainty exponent a: the fraction of uncertain cells at distance e grows as e^a.
 
-    The slope of log f against log e for distances of 1, 2, 4, ... cells along either side, up to an eighth of
-    the plane; the dimension of the boundary is 2 - a, so that a is 1 for a smooth one and less for a fractal
-    (S. W. McDonald, C. Grebogi, E. Ott and J. A. Yorke, Physica D 17 (1985) 125). Cells without an attractor
-    do not count. NaN where fewer than three distances have cells on both sides of a boundary.
+    The exponent is the slope of log f against log e for distances of 1, 2, 4, ... cells along either side, up
+    to an eighth of the plane. The dimension of the boundary is 2 - a, so that a is 1 for a smooth boundary
+    and less for a fractal boundary (S. W. McDonald, C. Grebogi, E. Ott and J. A. Yorke, Physica D 17 (1985)
+    125). Cells without an attractor do not count. NaN if the fraction is nonzero for fewer than three
+    distances.
     """
     plane = np.asarray(labels)
     distances = [2**k for k in range(16) if 2**k <= min(plane.shape) // 8]
@@ -150,24 +152,24 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
 _FEWEST_DISTANCES: Final = 3  # Smallest number of distances for a fit of the exponent
 
 SAMPLE: Final = 256
-"""Maximum number of cells integrated again at a tenth of the tolerance, up to an eighth of all; arbitrary."""
+"""Maximum number of cells recomputed at a tenth of the tolerance, and at most an eighth of all; arbitrary."""
 
 FIRINGS: Final = 200
-"""Default number of firings of a round."""
+"""Default number of firings per round of the basin computation."""
 
 ROUNDS: Final = 20
-"""Default maximum number of rounds per cell."""
+"""Default maximum number of rounds per cell; a cell without an attractor after them is undecided."""
 
 CELLS: Final = 128
-"""Default number of cells along each side."""
+"""Default number of cells along each side of the plane of initial states."""
 
 MOST_CELLS: Final = 10_000_000
-"""Number of cells above which a plane is refused, here and by `printhammer.quench_map`."""
+"""Number of cells above which a plane is refused, in `basins` and in `printhammer.quench_map`."""
 
 UNDECIDED: Final = 0
 FAILED: Final = -1
 NO_STATE: Final = -2
-"""Labels of cells that lead to no known attractor, whose run ended early, and where there is no state."""
+"""Labels of cells without a known attractor: `UNDECIDED`, `FAILED` (run ended early) and `NO_STATE`."""
 
 NO_STATE_STATUS: Final = "no state"
 
@@ -179,7 +181,7 @@ Range = tuple[float | str, float | str, SupportsIndex]
 
 
 _ROWS: Final = 12
-"""Maximum number of attractors in a summary."""
+"""Maximum number of attractors listed in a summary."""
 
 
 class Basins(Result, rows="v x"):
@@ -253,7 +255,7 @@ class Basins(Result, rows="v x"):
 
     @property
     def rounding(self) -> str:
-        """Sentence on the number of sampled labels that change at a tenth of the tolerance."""
+        """Sentence that counts the sampled cells whose label changes at a tenth of the tolerance."""
         if not self.compared:
             return ""
         share = 100.0 * self.changed / self.compared
@@ -261,13 +263,13 @@ class Basins(Result, rows="v x"):
 
     @property
     def names(self) -> dict[int, str]:
-        """Names of the labels, by label."""
+        """Name of each cell label: an attractor, "undecided", "run ended early" or "no state"."""
         kinds = {k: attractor.name for k, attractor in enumerate(self.attractors, 1)}
         return {NO_STATE: "no state", FAILED: "run ended early", UNDECIDED: "undecided", **kinds}
 
     @property
     def counts(self) -> dict[int, int]:
-        """Number of cells by label: of every attractor, and of -2, -1 and 0."""
+        """Number of cells by label: each attractor, undecided (0), ended early (-1), no state (-2)."""
         every = (NO_STATE, FAILED, UNDECIDED, *range(1, len(self.attractors) + 1))
         return {label: int((self.labels == label).sum()) for label in every}
 
@@ -275,7 +277,7 @@ class Basins(Result, rows="v x"):
     def shares(self) -> tuple[FloatArray, FloatArray]:
         """Fraction of the cells with a state that lead to each attractor, and its standard error, shape (A,).
 
-        The error is that of as many states drawn at random, sqrt(p (1 - p) / n). Where the boundary is
+        The standard error is that of n independent random states, sqrt(p (1 - p) / n). Where the boundary is
         smooth, a regular grid is more accurate.
         """
         count = int((self.labels != NO_STATE).sum())
@@ -288,7 +290,7 @@ class Basins(Result, rows="v x"):
         return basin_entropy(self.labels, box=box)
 
     def notes(self) -> dict[str, Any]:
-        """Return the basin entropy, for the attributes of the Dataset."""
+        """Return the basin entropies and the uncertainty exponent, for the attributes of the Dataset."""
         entropy = self.entropy(box=min(BOX, *self.labels.shape))
         return {
             "box": entropy.box,
@@ -298,7 +300,7 @@ class Basins(Result, rows="v x"):
         }
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return cells over `v` and `x`, and the properties of the attractors over `attractor`."""
+        """Return the Dataset variables: cells over `v` and `x`, attractor properties over `attractor`."""
         own = super().entries()
         codes = ", ".join(f"{label} {name}" for label, name in self.names.items())
         own["label"] = replace(own["label"][0], attrs={"codes": codes}), self.labels
@@ -316,7 +318,7 @@ class Basins(Result, rows="v x"):
         return own
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row for each cell, with the name of its attractor."""
+        """Convert the plane to a table with one row per cell and the name of its attractor."""
         table = super().to_dataframe()
         table.insert(3, "attractor", [self.names[label] for label in table["label"].tolist()])
         return table
@@ -335,28 +337,28 @@ def basins(
 ) -> Basins:
     """Compute the basins of attraction: which initial states lead to which attractor.
 
-    A state in the pack meets fresh paper at its own depth: on the loading branch where it goes in, on the
-    unloading branch from there where it comes out. A state in the backstop begins with that indentation.
-    Under a voltage all states begin without current, the supply's capacitor charged.
-    Where the law of the magnet does not hold, or behind a rigid backstop, a cell has no state.
+    An initial state inside the pack meets fresh paper, compressed to that depth: it starts on the loading
+    branch if the armature moves inward, else on the unloading branch. A state inside the backstop starts with
+    that indentation. With a voltage drive, all states start without current and with a charged supply
+    capacitor. Cells outside the range of the magnet's law, or behind a rigid backstop, have no state.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer needs the keywords `firing`. States are those at a firing, whatever
-        the phase.
+        The hammer, or a regime; a hammer needs the keywords `firing`. States are taken at a firing,
+        independent of the phase of the regime.
     x, v : tuple, optional
-        Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, the
-        two ends among them; by default the window of `printhammer.run.regime` and 128.
+        Least and largest displacement, m, and velocity, m/s, or text with a unit, and number of values, both
+        ends included; by default the window of `printhammer.run.regime` and 128.
     firings : int, optional
-        Firings of a round, at least 4; the last ones, half of them and at most 128, are classified.
+        Number of firings per round, at least 4; the last half of them, at most 128, is classified.
     rounds : int, optional
-        Rounds that a cell is given, at most.
+        Maximum number of rounds per cell.
 
     Returns
     -------
     Basins
-        With a label for each cell; a run that ends early is not an exception.
+        A label and a status for each cell; a run that ends early raises no exception.
     """
     regime = Regime.of_firing(hammer, firing).at_firings
     count, most = read_count(firings, "firings"), read_count(rounds, "rounds")
@@ -402,7 +404,7 @@ def basins(
 def _decided(
     regime: Regime, cells: FloatArray, counts: tuple[int, int], effort: Effort, attractors: Attractors
 ) -> tuple[IntArray, IntArray, TextArray]:
-    """Return indices of attractors (-1, -2, -3 as `UNDECIDED` and so on), firings and statuses of cells."""
+    """Return attractor indices (-1 undecided, -2 ended early, -3 no state), firings and statuses of cells."""
     firings, most = counts
     places = np.full(len(cells), UNDECIDED - 1, np.int64)
     used = np.zeros(len(cells), np.int64)
@@ -429,7 +431,7 @@ def _decided(
 
 
 def _sample(decided: IntArray, count: int) -> IntArray:
-    """Select rows of decided cells, spread evenly over the plane by multiples of the golden section."""
+    """Select the rows of a sample of decided cells, spread evenly by multiples of the golden section."""
     size = min(SAMPLE, max(count // 8, 1), len(decided))
     shares = (np.arange(1, size + 1) * _GOLDEN) % 1.0
     return np.unique(decided[(shares * len(decided)).astype(np.int64)]) if size else decided[:0]
@@ -453,6 +455,6 @@ def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
 
 
 def check_cells(across: int, up: int) -> None:
-    """Raise InputError for a plane of more than `MOST_CELLS` cells."""
+    """Raise InputError if a plane has more than `MOST_CELLS` cells."""
     if across * up > MOST_CELLS:
         raise InputError(f"{across} x {up} cells", key="cells", expected=f"at most {MOST_CELLS}")

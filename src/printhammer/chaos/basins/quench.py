@@ -5,9 +5,10 @@ again after 660 µs, the hammer is braked and prints no second dot; after 700 µ
 The quench map extends the two cases to a plane: the time between two firings against the width of the second
 pulse, with an unchanged first pulse. Where pulses overlap, their currents add.
 
-A drive fires one waveform. To fire two different pulses without compiling another kernel, the waveform
-contains both, far apart. Of its four firings two contribute pulses to the run, the first pulse at the
-beginning and the second pulse at the second firing; the two others only serve to tell the dots apart.
+A drive fires a single waveform. To fire two different pulses without compiling another kernel, one waveform
+contains both pulses, far apart. The drive has four firings, timed so that only the first pulse, at the start
+of the run, and the second pulse, at the second firing, fall into the run; the other two firings serve only to
+assign the dots.
 """
 
 from __future__ import annotations
@@ -44,19 +45,19 @@ from printhammer.run.window import time_scale
 from printhammer.support.arrays import BoolArray, FloatArray, TextArray
 
 TAIL: Final = 1e-3
-"""Default time after the second firing within which a second dot counts, s."""
+"""Default time after the second firing within which a pack contact counts as the second dot, s."""
 
 _PIECE: Final = 8192  # Number of cells integrated in one batch, which bounds the memory
 _SPACING: Final = 5e-6  # Spacing of the samples of the first run at the default tail, s
 _FINE: Final = 8
 """Number of samples of the refined run on either side of the highest sample of the first run."""
 _PEAK_TOLERANCE: Final = 1e-8
-"""Largest tolerance of the refined run: with that of a display, 5e-7, peaks err by 1e-4 of the way."""
+"""Largest tolerance of the refined run; the display tolerance, 5e-7, misses peaks by 1e-4 of the stroke."""
 _FIRST, _SECOND = 2, 3  # Indices of the firings of the first and the second pulse
 
 
 class QuenchMap(Result):
-    """Effect of a second pulse as a function of the time between firings and of its width."""
+    """Effect of a second pulse as a function of the time between the firings and of its width."""
 
     hammer: Hammer = part("the hammer")
     waveform: Waveform = part("the first pulse; the second has another width")
@@ -94,7 +95,7 @@ class QuenchMap(Result):
         return f"quench map of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Summarise how many second dots are lost, and how the remaining dots differ from the first."""
+        """Summarise how many second dots are lost, and how force and flight time of the others compare."""
         struck, lost = self.struck, int(self.lost.sum())
         first = f"{quantity(self.single_force, 'N')}, flight time {quantity(self.single_flight_time, 's')}"
         rows: list[FactRow] = [
@@ -109,18 +110,18 @@ class QuenchMap(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the map; the waveform is the first pulse, and currents add."""
+        """Provenance of the map: hammer, first pulse as the waveform, added currents, and tolerance."""
         return provenance(hammer=self.hammer, waveform=self.waveform, overlap="add", tolerance=self.tolerance)
 
     @property
     def lost(self) -> BoolArray:
-        """Mask of the lost second dots; False where the run ended early."""
+        """Mask of the cells whose second dot is lost; False where the run ended early."""
         return np.asarray(~self.struck & (self.status == "ok"))
 
     @property
     @derived("1", "second peak, 0 at the backstop and 1 at the pack", "gap width")
     def peak_share(self) -> FloatArray:
-        """Second peak as a fraction of the way from the backstop (0) to the front of the pack (1)."""
+        """Second peak on a scale from 0 at the backstop to 1 at the front of the pack."""
         front = self.hammer.front
         assert front is not None
         return (self.peak - self.hammer.origin) / (front - self.hammer.origin)
@@ -128,7 +129,7 @@ class QuenchMap(Result):
     @property
     @derived("1", "force of the second dot over that of the first alone", "gap width")
     def force_ratio(self) -> FloatArray:
-        """Ratio of the force of the second dot to that of the first pulse alone."""
+        """Ratio of the peak force of the second dot to that of the first pulse alone."""
         return self.force / self.single_force
 
     @property
@@ -139,7 +140,7 @@ class QuenchMap(Result):
 
 
 class TwoPulses(Waveform):
-    """A waveform of two pulses far apart, which serves drives of two different pulses."""
+    """Waveform that contains two different pulses, far apart, so that one drive can fire both."""
 
     shape: ClassVar[str] = "two pulses"
     first: Waveform
@@ -163,12 +164,12 @@ class TwoPulses(Waveform):
 
     @property
     def peak(self) -> float:
-        """Largest absolute value; one for all widths of a map, so that all runs have the same scales."""
+        """Largest absolute value; common to all widths of a map, so that all runs have equal scales."""
         return self.largest
 
 
 class TwoPulseDrive(Drive):
-    """A drive of two different pulses; its run begins at `begin`, with the firing of the first pulse."""
+    """Drive that fires two different pulses; its run starts at `begin`, when the first pulse is fired."""
 
     def __init__(self, waveform: TwoPulses, gap: float) -> None:
         super().__init__(waveform, self.firings(waveform.apart, gap))
@@ -176,16 +177,16 @@ class TwoPulseDrive(Drive):
 
     @staticmethod
     def firings(apart: float, gap: float) -> FloatArray:
-        """Compute the firing times, s: two before the run, and the two from which dots are counted."""
+        """Compute the four firing times, s: two before the run, and the two to which dots are assigned."""
         return np.array([gap, apart, 2.0 * apart, 2.0 * apart + gap])
 
     @property
     def begin(self) -> float:
-        """Time of the first firing in the run, s."""
+        """Start time of the run, s: the firing of the first pulse."""
         return float(self._times[_FIRST])
 
     def with_firings(self, times: FloatArray) -> Self:
-        """Return a copy with other firing times, made by `firings`."""
+        """Return a copy with the given firing times, s, from `firings`."""
         result = copy(self)
         result._times = times
         return result
@@ -213,18 +214,18 @@ def quench_map(
         ends included; by default 128 from 0.5 to 0.9 ms, multiplied by `printhammer.run.window.time_scale` of
         the device.
     widths : tuple, optional
-        As `gaps`, for the width of the second pulse; by default 128 from half to one and a half times that of
-        the first.
+        As `gaps`, for the width of the second pulse; by default 128 from 0.5 to 1.5 times the width of the
+        first.
     waveform : Waveform, optional
         The first pulse; by default the waveform of the hammer. It needs a width.
     tail : float or str, optional
-        Time after the second firing within which a dot counts as the second dot, s, or text with a unit; by
-        default 1 ms, scaled like `gaps`.
+        Time after the second firing within which a pack contact counts as the second dot, s, or text with a
+        unit; by default 1 ms, scaled like `gaps`.
 
     Returns
     -------
     QuenchMap
-        With a status for each cell; a run that ends early is not an exception.
+        The second dot, and a status, for each cell; a run that ends early raises no exception.
     """
     pulse = waveform_of(hammer, waveform)
     width = getattr(pulse, "width", None)
@@ -275,10 +276,10 @@ def quench_map(
 
 
 def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) -> list[TwoPulseDrive]:
-    """Build drives that fire one pulse and then one of several others, for runs of at most `last` seconds.
+    """Build one drive per second pulse, each firing `first` and then that pulse; runs last at most `last` s.
 
-    Runs begin at the time `begin` of a drive, with the rest state; times, s, count from there. The second
-    pulse comes half-way; `with_firings` sets other times.
+    A run begins at the time `begin` of its drive, in the rest state; times, s, count from there. The second
+    pulse is fired after half of `last`; `with_firings` sets other times.
     """
     largest = max(first.peak, *(second.peak for second in seconds))
     # A power of two, so that sums of it with other times are rounded the same way everywhere.
@@ -295,7 +296,7 @@ def two_pulse_drives(first: Waveform, seconds: Sequence[Waveform], last: float) 
 def _piece(
     hammer: Hammer, drives: Sequence[TwoPulseDrive], gaps: FloatArray, tail: float, effort: Effort
 ) -> tuple[npt.NDArray[Any], ...]:
-    """Return second dot, status, peak, force and flight time of several gaps, each for all widths."""
+    """Compute second dot, status, peak, force and flight time for several gaps and all widths."""
     begin, number = 0.0, 1
     every: list[Drive]
     if drives[0].pulses[0].replaces:
@@ -343,9 +344,10 @@ def _piece(
 
 
 def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the largest local maximum of sampled motions after given times, and its time, shape (M,) each.
+    """Find the largest local maximum of each sampled motion after a given time; return it and its time, (M,).
 
-    The samples, shape (M, T), are evenly spaced; NaN where there is none, as is the maximum.
+    The samples, shape (M, T), are evenly spaced; samples after the end of a run are NaN, and so is a maximum
+    that does not exist.
     """
     before, here, following = x[:, :-2], x[:, 1:-1], x[:, 2:]
     bend = before - 2.0 * here + following
@@ -361,7 +363,7 @@ def _highest(grid: FloatArray, x: FloatArray, after: FloatArray) -> tuple[FloatA
 
 
 def _top(t: FloatArray, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Find the largest displacement at which the velocity falls through 0 between samples, shape (M,).
+    """Compute the highest displacement at which the velocity falls through 0 between samples, shape (M,).
 
     NaN without such a crossing. The velocity is interpolated linearly between samples, shape (M, T).
     """

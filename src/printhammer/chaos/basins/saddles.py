@@ -1,4 +1,4 @@
-"""Manifolds of the saddles in a plane of basins, which are the boundaries between basins."""
+"""Manifolds of the saddles in a plane of basins: the stable manifolds are the basin boundaries."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _PIECES: Final = 200  # Number of points of a manifold per longer side of the pl
 def saddle_manifolds(
     planes: Basins, longest: int, *, progress: Progress | None = None
 ) -> tuple[list[Manifolds], int]:
-    """Compute the manifolds of all saddles of up to `longest` firings.
+    """Compute the stable and unstable manifolds of all saddles with a period of up to `longest` firings.
 
     Parameters
     ----------
     planes : Basins
-        Basins of the same hammer and drive.
+        Basins of attraction, which provide hammer, drive and plane.
     longest : int
         Largest orbit period, firings.
     progress : callable, optional
@@ -35,7 +35,7 @@ def saddle_manifolds(
     list of Manifolds
         One entry for each saddle that lies in the plane of the states at a firing.
     int
-        Number of saddles left out because the armature is in the pack at the firing.
+        Number of saddles omitted because the armature is in the pack at the firing.
     """
     spans = np.array([np.ptp(planes.x), np.ptp(planes.v)]) / planes.regime.window.half_widths
     side = float(spans.max())

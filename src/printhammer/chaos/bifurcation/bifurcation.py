@@ -1,7 +1,7 @@
 """Bifurcation diagrams by brute force: the states at the firings, against a parameter.
 
-For each value of a parameter a train is fired, a transient is discarded, and the states at the following
-firings are the column of the diagram at that value: one point for a train of period 1, two for a train of
+For each value of the parameter, a pulse train is fired and a transient is discarded. The states at the
+following firings form the column of the diagram at that value: one point for a train of period 1, two for
 period 2, many for a strange train.
 """
 
@@ -26,28 +26,28 @@ from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
 
 FIRINGS: Final = 1000
-"""Default number of firings of a train."""
+"""Default number of firings per train of a bifurcation diagram."""
 
 _JUDGED: Final = 200
-"""Number of firings after the default transient."""
+"""Number of firings in the diagram, after the default transient."""
 
 REFINE: Final = 2
-"""Default number of times that steps between differing neighbours are halved."""
+"""Default number of times to halve the parameter step between neighbours that differ."""
 
 MOST_STATES: Final = 100_000_000
-"""Number of states above which a diagram is refused."""
+"""Largest number of states in a diagram; a larger diagram is refused."""
 
 Direction = Literal["from rest", "up", "down", "both"]
 DIRECTIONS: Final = get_args(Direction)
 
 
 class InterruptedDiagram(KeyboardInterrupt):
-    """Raised when a diagram is interrupted.
+    """Raised when the computation of a bifurcation diagram is interrupted.
 
     Attributes
     ----------
     diagram : Bifurcation
-        The finished columns; the status of the others is "not run".
+        Diagram with the finished columns; all other columns have the status "not run".
     """
 
     def __init__(self, diagram: Bifurcation) -> None:
@@ -74,7 +74,7 @@ def bifurcation(
 ) -> Bifurcation:
     """Compute a bifurcation diagram of a hammer under a periodic drive.
 
-    At a tolerance for pictures, trains that settle slowly appear as undecided.
+    At the display tolerance, trains that settle slowly are classified as undecided.
 
     Parameters
     ----------
@@ -83,22 +83,24 @@ def bifurcation(
     periods, rates : array, optional
         Times between firings, s, or firings per second, Hz, ascending.
     parameter, values : str and array, optional
-        Alternatively the name of any constant, such as "backstop.damping" or "waveform.amplitude", and its
-        values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
+        Instead of periods or rates: name of a constant, such as "backstop.damping" or "waveform.amplitude",
+        and its values, SI, ascending; see `printhammer.run.regime.Regime.with_`.
     firings, transient : int, optional
-        Number of firings at each value, and of those to discard at the beginning: by default all but 200, at
-        least a third. With few firings, trains that settle slowly are undecided.
+        Number of firings at each value, and number of first firings to discard; by default all but the last
+        200 are discarded, but at least a third. With few firings, trains that settle slowly are undecided.
     direction : str, optional
-        "from rest": every train begins at rest, with no firing before. "up", "down": a train begins where the
-        train at the value before, or after, ended, with the earlier pulses under way; the first train begins
-        at rest. "both": up and down. See `printhammer.chaos.bifurcation.builder`.
+        "from rest": every train begins at rest, without earlier firings. "up", "down": a train starts in the
+        final state of the train at the next lower ("up") or next higher ("down") value, with earlier pulses
+        still active; the first train begins at rest. "both": up and down. See
+        `printhammer.chaos.bifurcation.builder`.
     state : tuple of float, optional
-        Displacement, m, and velocity, m/s, that replace the rest state, with the earlier pulses under way.
+        Displacement, m, and velocity, m/s, that replace the rest state; pulses of earlier firings are still
+        active.
     refine : int, optional
-        Number of times to halve the step between neighbours whose periods differ, or whose orbits lie apart.
+        Number of times to halve the step between neighbours with different periods or distant orbits.
     exponents : bool, optional
         Whether to compute the exponents of aperiodic trains, which separate strange from undecided trains;
-        takes many times as long.
+        this takes many times as long.
     **firing
         How the hammer is fired, as for `printhammer.Regime.of`; period or rate only if another parameter
         varies.
@@ -106,15 +108,15 @@ def bifurcation(
     Returns
     -------
     Bifurcation
-        With a status for each train; a run that ends early is not an exception.
+        Diagram with a status for each train; a run that ends early raises no exception.
 
     Raises
     ------
     InputError
-        An argument is not as described above, the parameter cannot have a value, or the hammer has no rest
-        state and no state is given.
+        An argument is not as described above, the parameter cannot take one of the values, or the hammer has
+        no rest state and no state is given.
     InterruptedDiagram
-        At a KeyboardInterrupt, with the finished columns.
+        The computation was interrupted (KeyboardInterrupt); carries the finished columns.
     """
     name, grid, regime = _parameter(hammer, (periods, rates, parameter, values), firing)
     count = read_count(firings, "firings")
@@ -150,7 +152,7 @@ def bifurcation(
 
 
 def _result(builder: DiagramBuilder) -> Bifurcation:
-    """Build the diagram from the trains run so far."""
+    """Build the diagram from the trains that have been run so far."""
     order = np.argsort(builder.values, kind="stable")
     rows = (len(builder.ways) * order + np.arange(len(builder.ways))[:, np.newaxis]).astype(np.int64)
     table = builder.table
@@ -181,7 +183,7 @@ def _parameter(
     choice: tuple[npt.ArrayLike | None, npt.ArrayLike | None, str | None, npt.ArrayLike | None],
     firing: Firing,
 ) -> tuple[str, FloatArray, Regime]:
-    """Parse the choice of parameter: its name, its values, and the regime in which it is changed."""
+    """Validate the choice of parameter; return its name, its values, and the regime to vary."""
     periods, rates, parameter, values = choice
     if sum(entry is not None for entry in (periods, rates, parameter)) != 1:
         raise InputError("periods, rates and parameter: expected one of them", key="parameter")

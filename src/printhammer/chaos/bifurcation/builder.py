@@ -1,13 +1,14 @@
 """Construction of a bifurcation diagram: trains at given values, refinement between them, exponents.
 
-Carrying of the state from one value of a parameter to the next, in parallel.
+The final state at one value of the parameter is the initial state at the next; this is done in parallel.
 
 Strictly, each train begins where the train before it ended, which is a serial computation. Here the values
 are cut into strands of `STRAND` successive values. The first train of a strand begins at rest, the state is
 carried within the strand, and all strands run in parallel. Then the joints are closed: the first train of a
-strand is run again from the state at which the strand before it ended. If it reaches the same attractor, the
-rest of the strand is kept; if not, it replaces the former result, and the state is carried on from it until
-the same attractor is reached or the strand ends, in which case the next joint is closed anew.
+strand is run again from the final state of the preceding strand. If it reaches the same attractor as before,
+the rest of the strand is kept. If not, it replaces the former result, and its state is carried through the
+strand until a train reaches the same attractor as before. If the strand ends first, the next joint is closed
+anew.
 
 So every train lies on the attractor to which a strictly serial computation leads, up to the resolution of
 `is_same_attractor`. The strands, and hence the result, depend on the values alone, not on threads or chunks.
@@ -49,41 +50,41 @@ STRAND: Final = 16
 """Number of values in a strand."""
 
 SAME: Final = 1e-3
-"""Distance, in half-widths of the window, up to which periodic orbits count as the same."""
+"""Largest distance, in half-widths of the strobe window, of periodic orbits that count as the same."""
 
 _SHIFTED: Final = 0.5
-"""Largest difference of the means of two clouds, in standard deviations, within which they are the same."""
+"""Largest difference of the means of two point sets on the same attractor, in standard deviations."""
 
 
 @dataclass
 class Strand:
-    """Successive trains between which the state is carried."""
+    """Strand of a diagram: successive trains, each starting in the final state of its predecessor."""
 
     rows: list[int]
-    """Rows in the table of all trains, in the order in which the state is carried."""
+    """Row indices in the table of all trains, in the order in which the state is carried."""
     before: int
     """Index of the strand that ends where this strand begins; -1 for the first strand."""
 
 
 @dataclass
 class Trains:
-    """All trains of a diagram: what to run, and the results."""
+    """Table of all trains of a diagram: their regimes and the results of their runs."""
 
     regimes: list[Regime]
-    """Regimes, one per train."""
+    """Regime of each train, in the order of the rows."""
     columns: Columns
-    """States of the trains."""
+    """States of the trains at the recorded firings."""
     cycles: Any
-    """Periods of the trains, 0 for none."""
+    """Period of each train in firings, 0 if aperiodic; shape (M,)."""
     distances: Any
     scales: FloatArray
-    """Scales of displacement, velocity, memory and current for differences, shape (M, 4)."""
+    """Half-widths that scale displacement, velocity and memory, and a typical current, shape (M, 4)."""
     carried: int = field(default=0)
-    """Number of trains that were run again to close the joints."""
+    """Number of trains that were run again to close the joints between strands."""
 
 
 def strands_of(rows: Sequence[int], first: int) -> list[Strand]:
-    """Cut trains, in the order in which the state is carried, into strands numbered from `first` on."""
+    """Divide trains, in the order in which the state is carried, into strands numbered from `first`."""
     cut = [list(rows[k : k + STRAND]) for k in range(0, len(rows), STRAND)]
     return [Strand(part, first + k - 1 if k else -1) for k, part in enumerate(cut)]
 
@@ -95,10 +96,10 @@ def carry(
     run: Callable[[list[int], FloatArray], None],
     trial: Callable[[list[int], FloatArray], tuple[Columns, Any, Any]],
 ) -> None:
-    """Run the trains of the strands of one or several directions, and close their joints.
+    """Run the trains of all strands, in one or several directions, and close the joints between strands.
 
-    `start` is the state with which a strand begins; `run` runs rows of the table from states and stores the
-    results in it, `trial` returns the results instead: columns, periods, distances.
+    `start` is the initial state of a strand. `run` runs the trains of some rows from given states and stores
+    the results in the table; `trial` returns the results instead: columns, periods, distances.
     """
     for k in range(max(len(strand.rows) for strand in strands)):
         long = [strand.rows for strand in strands if k < len(strand.rows)]
@@ -137,9 +138,9 @@ def carry(
 def is_same_attractor(table: Trains, row: int, columns: Columns, place: int, cycle: int) -> bool:
     """Whether a train that was run again reached the same attractor as before.
 
-    Periodic trains did if their orbits agree within `SAME`, aperiodic trains if the means of their points
-    differ by less than half of their standard deviations, and trains whose run ended early if they ended the
-    same way.
+    Two periodic trains are on the same attractor if their orbits agree within `SAME`, two aperiodic trains if
+    the means of their points differ by at most half of their standard deviations, and two trains whose runs
+    ended early if their statuses are equal.
     """
     was = table.columns
     if columns.status[place] != OK or was.status[row] != OK:
@@ -157,12 +158,12 @@ def is_same_attractor(table: Trains, row: int, columns: Columns, place: int, cyc
 
 
 JUMP: Final = 0.2
-"""Distance of neighbouring orbits of one period, in half-widths of the window, that triggers refinement."""
+"""Distance of neighbouring orbits, in half-widths of the strobe window, above which the step is refined."""
 
 
 @dataclass
 class DiagramBuilder:
-    """A diagram under construction; trains are numbered in order of creation, by value and direction."""
+    """Builder of a bifurcation diagram; trains are numbered in order of creation, by value and direction."""
 
     regime: Regime
     name: str
@@ -180,7 +181,7 @@ class DiagramBuilder:
         self.done = self.known = 0
 
     def add(self, values: FloatArray, level: int) -> list[int]:
-        """Add trains at new values; return the indices of the values."""
+        """Add trains at new values of the parameter; return the indices of these values."""
         first = len(self.values)
         regimes = [self.regime.with_(self.name, value) for value in values.tolist()]
         every = [regime for regime in regimes for _way in self.ways]
@@ -202,7 +203,7 @@ class DiagramBuilder:
         return list(range(first, len(self.values)))
 
     def rows(self, places: Sequence[int], way: int) -> list[int]:
-        """Return the rows of the trains at some values in one direction."""
+        """Return the row indices of the trains at some values, by index, in one direction."""
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:
@@ -218,7 +219,7 @@ class DiagramBuilder:
         carry(self.table, strands, self.begin, self.run, self.trial)
 
     def refine(self, level: int) -> None:
-        """Run trains between neighbours that differ, from the final state of the neighbour before."""
+        """Run trains half-way between neighbouring values whose trains differ."""
         order = np.argsort(self.values, kind="stable").tolist()
         pairs = [pair for pair in itertools.pairwise(order) if self.is_different(*pair)]
         middles = [0.5 * (self.values[low] + self.values[high]) for low, high in pairs]
@@ -241,7 +242,7 @@ class DiagramBuilder:
         self.run(rows, np.array(states))
 
     def is_different(self, place: int, neighbour: int) -> bool:
-        """Whether the trains at two values differ, in period or by a jump of the orbit."""
+        """Whether the trains at two values differ in status or period, or by a jump of the orbit."""
         table = self.table
         for way in range(len(self.ways)):
             a, b = self.rows([place, neighbour], way)
@@ -259,7 +260,7 @@ class DiagramBuilder:
         return False
 
     def trial(self, rows: Sequence[int], states: FloatArray) -> tuple[Any, Any, Any]:
-        """Run trains from states; return their states, periods and distances."""
+        """Run trains from given initial states; return states, periods and distances without storing them."""
         regimes = [self.table.regimes[row] for row in rows]
         done = self.done
         effort = replace(self.effort, progress=lambda part, _all: self.report_progress(done + part))
@@ -278,7 +279,7 @@ class DiagramBuilder:
         return columns, cycles, distances
 
     def run(self, rows: Sequence[int], states: FloatArray) -> None:
-        """Run trains from states and store the results."""
+        """Run trains from given initial states and store the results in the table."""
         columns, cycles, distances = self.trial(rows, states)
         put(self.table.columns, rows, columns)
         self.table.cycles[list(rows)] = cycles
@@ -289,7 +290,7 @@ class DiagramBuilder:
         self.done += len(rows)
 
     def is_resting(self, columns: Columns, row: int, regime: Regime) -> bool:
-        """Whether a train without a period up to 64 comes to rest on its backstop in a longer cycle."""
+        """Whether an aperiodic train comes to rest on the backstop in a longer, exact cycle."""
         if not is_memoryless(regime) or columns.status[row] != OK or regime.phase:
             return False
         points = np.column_stack([columns.x[row], columns.v[row]])
@@ -297,10 +298,10 @@ class DiagramBuilder:
         return bool(count and rests_of(regime, points[-count:], self.effort.tolerance))
 
     def compare(self) -> None:
-        """Mark the trains whose period differs at finer tolerances.
+        """Mark the trains whose period differs at finer tolerances; in their cycles rounding decides.
 
-        A ball that comes to rest forgets its past, but between two rests a small error may grow to the size
-        of the motion; rounding then decides the length of its cycle.
+        An armature that comes to rest on the backstop forgets its past, but between two rests a small error
+        may grow to the size of the motion; rounding then decides the length of the cycle.
         """
         table = self.table
         long = table.cycles >= LONG_CYCLE
@@ -318,11 +319,11 @@ class DiagramBuilder:
             self.sensitive[rows] |= cycles != table.cycles[rows]
 
     def report_progress(self, done: int) -> None:
-        """Report the number of finished trains; trains run again to close joints do not count."""
+        """Report the number of finished trains; trains run again to close joints are not counted."""
         self.effort.report(min(done, self.known), self.known)
 
     def measure(self) -> None:
-        """Compute the exponents of the aperiodic trains, over as many firings as there are points."""
+        """Compute the exponents of the aperiodic trains, over as many firings as the diagram shows."""
         columns, table = self.table.columns, self.table
         begun = {}
         for row, regime in enumerate(table.regimes):

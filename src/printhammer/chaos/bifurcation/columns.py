@@ -25,8 +25,8 @@ from printhammer.support.arrays import FloatArray, IntArray, TextArray
 TOLERANCE: Final = 1e-9
 """Default tolerance of diagrams and basins; its noise is far below the agreement that defines a period.
 
-With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble` weakly stable orbits never settle to within 1e-6 of the
-window.
+With `DISPLAY_TOLERANCE` of `printhammer.run.ensemble`, weakly stable orbits never settle to within 1e-6 of
+the half-width of the strobe window.
 """
 
 EFFORT: Final = Effort(TOLERANCE)
@@ -36,11 +36,11 @@ NOT_RUN: Final = "not run"
 _STATUS: Final = "U16"
 
 MOST_STATES: Final = 1 << 19
-"""Number of states that are integrated in one batch, which bounds the memory."""
+"""Maximum number of states computed in one batch, which bounds the memory."""
 
 
 class Columns(Declared):
-    """States of many trains at successive sections."""
+    """States of many trains at successive sections, with the final state of each train."""
 
     x: FloatArray = column("m", "displacement", "train point", more="NaN where a run ended before")
     v: FloatArray = column("m/s", "velocity", "train point", more="likewise")
@@ -68,12 +68,12 @@ class Columns(Declared):
         return len(self.x)
 
     def handed(self, row: int) -> State:
-        """Return the state with which the next train continues."""
+        """Return the final state of a train, from which the next train can continue."""
         return tuple(self.last[row].tolist())
 
 
 def blank_columns(count: int, points: int) -> Columns:
-    """Return columns of trains that have not been run."""
+    """Return the columns of trains that have not been run: NaN, status "not run"."""
     return Columns(
         x=np.full((count, points), np.nan),
         v=np.full((count, points), np.nan),
@@ -86,7 +86,7 @@ def blank_columns(count: int, points: int) -> Columns:
 
 
 def put(columns: Columns, rows: Sequence[int] | IntArray, others: Columns) -> None:
-    """Write the states of other trains into rows of columns."""
+    """Copy the columns of some trains into given rows of other columns."""
     where = np.asarray(rows, dtype=np.int64)
     for name, values in vars(others).items():
         getattr(columns, name)[where] = values
@@ -97,10 +97,10 @@ def run_columns(
 ) -> Columns:
     """Fire many trains and store their states at the last `firings` - `transient` firings.
 
-    States, shape (M, 7), are displacement, velocity, branch of the pack (negative: derived from the state),
-    memory, and under a voltage the electric part of the state (`printhammer.run.start.Beyond`) at the first
-    firing, with the earlier pulses under way; a row of NaN is a train from rest with no firing before
-    (`FROM_REST`).
+    Initial states, shape (M, 7), are displacement, velocity, branch of the pack (negative: derived from the
+    state), memory, and, with a voltage drive, the electric part of the state
+    (`printhammer.run.start.Beyond`). They are taken at the first firing, with pulses of earlier firings still
+    active; a row of NaN is a train from rest without earlier firings (`FROM_REST`).
     """
     points = firings - transient
     columns = blank_columns(len(regimes), points)
@@ -122,7 +122,7 @@ def run_columns(
 def _run(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Run trains of one kind of start: all from rest, all inside the pack, or all elsewhere."""
+    """Run trains whose initial states are all of one kind: at rest, inside the pack, or elsewhere."""
     rest = bool(np.isnan(states[0, 0]))
     # The cells of a basin share one regime; each column of a diagram has its own.
     known = {id(regime): regime for regime in regimes}
@@ -173,9 +173,10 @@ def _run(
 def run_in_stretches(
     regimes: Sequence[Regime], states: FloatArray, firings: int, transient: int, effort: Effort
 ) -> Columns:
-    """Compute the same as `run_columns`, one period at a time, for trains that `is_memoryless` allows.
+    """Compute the columns of `run_columns` one period at a time, for memoryless trains (`is_memoryless`).
 
-    Slower, but exact over long times, see `printhammer.chaos.strobe.train.STRETCH`.
+    The computation is slower, but its rounding error does not grow with time; see
+    `printhammer.chaos.strobe.train.STRETCH`.
     """
     columns = blank_columns(len(regimes), firings - transient)
     begun = [
@@ -216,7 +217,7 @@ def run_in_stretches(
 
 
 def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]:
-    """Build a drive, and the times of its firings from the first to the one after the last requested."""
+    """Build the drive of a train; return it with its firing times, including one beyond the last."""
     if rest and regime.drive is None:
         drive = regime.pulses(firings + 2)
         return drive, drive.times[: firings + 1]
@@ -225,7 +226,7 @@ def _train(regime: Regime, firings: int, rest: bool) -> tuple[Drive, FloatArray]
 
 
 def state_or_rest(regime: Regime, state: State) -> State:
-    """Return a state that was carried over, or `FROM_REST` if this hammer cannot begin with it."""
+    """Return a carried-over state, or `FROM_REST` if it is not a valid initial state of this hammer."""
     if math.isnan(state[0]):
         return FROM_REST
     try:
@@ -238,9 +239,10 @@ def state_or_rest(regime: Regime, state: State) -> State:
 
 
 def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
-    """Compute the scales of displacement, velocity, memory and current of each train, shape (M, 4).
+    """Compute the scales of displacement, velocity, memory and current for each train, shape (M, 4).
 
-    They are the half-widths of the window of each train, see `printhammer.run.regime`, and a typical current.
+    The scales are the half-widths of the strobe window of the train, see `printhammer.run.regime`, and a
+    typical current.
     """
     known: dict[tuple[int, float], tuple[float, ...]] = {}
     rows = []
@@ -258,10 +260,10 @@ def scales_of_columns(regimes: Sequence[Regime]) -> FloatArray:
 def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple[IntArray, FloatArray]:
     """Compute the periods of trains, in firings, by the rule of `printhammer.chaos.strobe.verdict`.
 
-    A period is the smallest q, at most 64 and half of the points, whose states q firings apart agree, 0 if
-    there is no such q. The second array is the largest distance of these states, in half-widths of the
-    window, NaN without q. `fronts` are the positions of the packs, m, infinite without a pack; the scales are
-    those of `scales_of_columns`.
+    The period is the smallest q, at most 64 and half of the points, for which states q firings apart agree; 0
+    if there is no such q. The second array is the largest distance of states q firings apart, in half-widths
+    of the strobe window; NaN for aperiodic trains. `fronts` are the front positions of the packs, m, infinite
+    without a pack; `scales` are from `scales_of_columns`.
     """
     branch = pack_branches(columns.x, columns.branch, fronts[:, np.newaxis])
     states = np.stack([columns.x, columns.v, columns.memory, columns.current], axis=2) / scales[:, np.newaxis]
@@ -289,9 +291,10 @@ def confirm(
     scales: FloatArray,
     effort: Effort,
 ) -> None:
-    """Correct the periods from `cycles_of`, and the distances, where the states alone are ambiguous.
+    """Confirm ambiguous periods from `cycles_of` by Newton's method; correct periods and distances in place.
 
-    See `printhammer.chaos.orbits.settled`; a period that is not confirmed becomes 0.
+    Periods are ambiguous if the states alone do not show them, see `printhammer.chaos.orbits.settled`; an
+    unconfirmed period becomes 0.
     """
     doubtful: list[int] = []
     for q in np.unique(cycles[cycles > 0]).tolist():
@@ -313,8 +316,8 @@ def confirm(
 def orbit_distance(one: FloatArray, other: FloatArray) -> float:
     """Compute the distance of two periodic orbits of the same period, minimised over the phase.
 
-    The distance is the largest difference of a component of the states, shape (q, 2), in units of the scales,
-    for the cyclic shift that makes it least.
+    The distance is the largest difference of any component of the scaled states, shape (q, 2), for the cyclic
+    shift of the smallest distance.
     """
     count = len(one)
     shifted = other[(np.arange(count) + np.arange(count)[:, np.newaxis]) % count]

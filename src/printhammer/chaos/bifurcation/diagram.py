@@ -1,10 +1,9 @@
-"""Bifurcation diagram as a result: its windows, and the routes to its strange trains.
-
-Windows of a bifurcation diagram, and whether a series of period doublings precedes the strange trains.
+"""Bifurcation diagram: states at the firings, windows of equal motion, and routes to strange trains.
 
 A window is an interval of the parameter in which all trains that were run have the same classification. A
 value stands for the interval half-way to its neighbours, so that widths of windows add up to the whole range.
-Between two neighbours there may be more than a diagram shows.
+Between two neighbouring values there may be windows that the diagram does not show. A route is the series of
+windows before the first strange train; it tells whether period doublings lead to chaos.
 """
 
 from __future__ import annotations
@@ -37,14 +36,14 @@ from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArra
 from printhammer.units import from_si
 
 SERIES: Final = (2, 4, 8)
-"""Periods that, one after the other, count as a series of doublings."""
+"""Orbit periods, in firings, of successive windows that count as a series of period doublings."""
 
 MOST_UNDECIDED: Final = 32
-"""Maximum number of aperiodic trains that are not strange on a route, after which the search stops."""
+"""Maximum number of undecided aperiodic trains on a route before the search for a strange train stops."""
 
 
 class Window(Declared):
-    """Window: neighbouring values of the parameter with the same classification; values and width in SI."""
+    """Range of neighbouring parameter values whose trains have the same classification; values in SI."""
 
     verdict: str = part('"period-q", "strange", "superstable" or "undecided"')
     period: int = part("number q; 0 where there is none")
@@ -55,7 +54,7 @@ class Window(Declared):
 
 
 class Route(Declared):
-    """Windows between one end of the range and the first strange train."""
+    """Route to chaos: the windows between one end of the parameter range and the first strange train."""
 
     way: Literal["rising", "falling"] = part("sense of the values of the parameter")
     before: tuple[Window, ...] = part(
@@ -72,21 +71,21 @@ class Route(Declared):
 
     @property
     def periods(self) -> list[int]:
-        """Periods of the windows of the route, without undecided windows."""
+        """Orbit periods of the windows on the route, in firings, without undecided windows."""
         return [window.period for window in self.before if window.period]
 
     @property
     def cascade(self) -> bool:
-        """Whether windows of the periods 2, 4 and 8 follow each other on the route."""
+        """Whether three successive windows on the route have the periods 2, 4 and 8."""
         return bool(doublings(self.before))
 
     @property
     def sentence(self) -> str:
-        """The finding as a sentence, with the value in SI."""
+        """Sentence that states the first strange train and the windows before it, with values in SI."""
         return self.worded("{:.9g}".format)
 
     def worded(self, shown: Callable[[float], str]) -> str:
-        """Write the finding as a sentence, with the value formatted by `shown`."""
+        """Return the sentence on the first strange train, with values formatted by `shown`."""
         values = f"With {self.way} values"
         way = ", ".join(window.verdict for window in self.before)
         if not self.complete:
@@ -103,7 +102,7 @@ class Route(Declared):
 
 
 def cells(values: FloatArray) -> FloatArray:
-    """Compute the width of the interval that each of several ascending values represents."""
+    """Compute the width of the interval that each ascending parameter value represents."""
     if len(values) < 2:
         return np.zeros(len(values))
     edges = np.concatenate([values[:1], 0.5 * (values[1:] + values[:-1]), values[-1:]])
@@ -111,9 +110,9 @@ def cells(values: FloatArray) -> FloatArray:
 
 
 def doublings(windows: Sequence[Window]) -> list[Window]:
-    """Find the first of each three successive windows whose periods are 2, 4 and 8.
+    """Find the first window of every three successive windows with the periods 2, 4 and 8.
 
-    Windows that are undecided do not count: where the period doubles, trains take long to settle.
+    Undecided windows are skipped, since trains take long to settle near a period doubling.
     """
     decided = [window for window in windows if window.verdict != "undecided"]
     threes = zip(decided, decided[1:], decided[2:], strict=False)
@@ -121,7 +120,7 @@ def doublings(windows: Sequence[Window]) -> list[Window]:
 
 
 class Bifurcation(Result, rows="direction column"):
-    """States at the firings against a parameter, in one or several directions."""
+    """Bifurcation diagram: states at the firings against a parameter, in one or several directions."""
 
     regime: Regime = part("hammer, periodic drive and phase; the parameter has other values in each column")
     parameter: str = scalar("", "what is changed, see `printhammer.run.regime.Regime.with_`")
@@ -200,7 +199,7 @@ class Bifurcation(Result, rows="direction column"):
         return f"bifurcation diagram of {self.regime.hammer.name} in {self.parameter}"
 
     def summary(self) -> Summary:
-        """Summarise the windows of each direction, routes to strange trains, hysteresis, undecided trains."""
+        """Summarise windows, routes to strange trains, hysteresis, and undecided trains of all directions."""
         several = len(self.directions) > 1
         value, unit = self._value_text()
         lines = [""]
@@ -218,7 +217,7 @@ class Bifurcation(Result, rows="direction column"):
         )
 
     def _value_text(self) -> tuple[Callable[[float], str], str]:
-        """Return the formatter of parameter values, precise enough to separate neighbours, and the unit."""
+        """Return a formatter for parameter values, precise enough to separate neighbours, and the unit."""
         si = self.regime.quantity(self.parameter).si
         unit = {"s": "ms", "m": "um"}.get(si, si)
         steps = np.diff(self.values)
@@ -227,7 +226,7 @@ class Bifurcation(Result, rows="direction column"):
         return lambda value: f"{from_si(value, si, unit):.{digits}g}", unit
 
     def _windows_grid(self, direction: str) -> Grid:
-        """Tabulate the classifications of one direction: number of windows, total width, widest window."""
+        """Tabulate number, total width and widest window of each classification in one direction."""
         windows = sorted(self.windows(direction), key=lambda window: (window.period or 1000, window.verdict))
         total = sum(window.width for window in windows) or 1.0
         groups = [
@@ -246,7 +245,7 @@ class Bifurcation(Result, rows="direction column"):
         return Grid(columns, direction, most=12)
 
     def _undecided(self) -> list[str]:
-        """List the reasons why trains that ran to the end are undecided, a sentence each."""
+        """List the reasons why trains that ran to the end are undecided, one sentence per reason."""
         undecided = (self.verdicts == "undecided") & (self.status == "ok")
         known = undecided & ~np.isnan(self.exponents)
         settling = known & (self.exponents < -SIGNIFICANT * self.standard_errors)
@@ -267,7 +266,7 @@ class Bifurcation(Result, rows="direction column"):
         ]
 
     def _sensitive(self) -> list[str]:
-        """Report how many periods depend on rounding; an empty list if none does."""
+        """Report how many periods change at finer tolerances; an empty list if none changes."""
         count = int(self.sensitive.sum())
         whose = "1 period changes" if count == 1 else f"{count} periods change"
         return [f"{whose} at a finer tolerance: long cycles hang on the last bits."] if count else []
@@ -275,19 +274,19 @@ class Bifurcation(Result, rows="direction column"):
     @property
     @derived("1", "part of the period between a firing and its point")
     def phase(self) -> float:
-        """Fraction of the period between a firing and its point."""
+        """Time from a firing to the point of the diagram, as a fraction of the period."""
         return self.regime.phase
 
     @property
     @derived("", "verdict", "direction column", name="verdict")
     def verdicts(self) -> TextArray:
-        """Verdicts, shape (D, C), as in `printhammer.chaos.strobe.verdict`.
+        """Classification of each train, shape (D, C), as in `printhammer.chaos.strobe.verdict`.
 
-        "period-q", "strange", "undecided"; or "superstable": the armature comes to rest on the backstop, in
-        a cycle longer than 64 firings.
+        "period-q", "strange", "undecided"; or "superstable": the armature comes to rest on the backstop, in a
+        cycle longer than 64 firings.
 
-        Undecided are trains without a period whose exponent was not computed, or is not positive by three
-        standard errors, and those whose run ended early.
+        A train is undecided if its run ended early, or if it has no period and its exponent was not computed
+        or is not positive by three standard errors.
         """
         names = np.full(self.cycles.shape, "undecided", "U16")
         for q in np.unique(self.cycles[self.cycles > 0]).tolist():
@@ -298,12 +297,12 @@ class Bifurcation(Result, rows="direction column"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the diagram; without a period if the period is the parameter."""
+        """Provenance of the diagram; it omits the period if period or rate is the parameter."""
         known = super().provenance
         return {key: known[key] for key in known if key != "period" or self.parameter not in (PERIOD, RATE)}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return states over `direction`, `column` and `firing`, verdicts over `direction` and `column`."""
+        """Return the Dataset variables: states by direction, column and firing; classifications by train."""
         own = super().entries()
         of = self.regime.quantity(self.parameter)
         note = replace(own["value"][0], unit=of.si, meaning=of.meaning, head=self.parameter)
@@ -311,17 +310,17 @@ class Bifurcation(Result, rows="direction column"):
         return {"verdict": own.pop("verdict"), **own}
 
     def windows(self, direction: str | None = None) -> list[Window]:
-        """Compute the windows of one direction, from the least value of the parameter to the largest.
+        """Compute the windows of one direction, in ascending order of the parameter.
 
-        The direction is by default the first; InputError if the diagram has no such direction.
+        The default is the first direction; InputError if the diagram lacks the direction.
         """
         return self._grouped(self._row(direction), range(len(self.values)))
 
     def routes(self, direction: str | None = None) -> tuple[Route, Route]:
-        """Compute the routes to the first strange train, with the parameter rising and falling.
+        """Compute the routes to the first strange train, for rising and for falling parameter values.
 
-        The direction is as for `windows`. Exponents of aperiodic trains that are not known yet are computed
-        here, from one end of the range up to the first strange train.
+        `direction` is as for `windows`. Missing exponents of aperiodic trains are computed here, from one end
+        of the range up to the first strange train.
         """
         row = self._row(direction)
         names = self.verdicts[row].tolist()
@@ -355,7 +354,7 @@ class Bifurcation(Result, rows="direction column"):
         return self.directions.index(direction)
 
     def _grouped(self, row: int, order: Sequence[int]) -> list[Window]:
-        """Group neighbouring columns, in ascending or descending order, into windows."""
+        """Group neighbouring columns, listed in ascending or descending order, into windows."""
         names, cycles = self.verdicts[row].tolist(), self.cycles[row].tolist()
         widths = cells(self.values)
         windows = []
@@ -368,7 +367,7 @@ class Bifurcation(Result, rows="direction column"):
         return windows
 
     def _is_strange(self, row: int, k: int) -> bool:
-        """Whether an aperiodic train is strange, by its exponent from its last point on."""
+        """Whether an aperiodic train is strange, by the exponent computed from its last point on."""
         x, v = (float(states[row, k, -1]) for states in (self.x, self.v))
         regime = self.regime.with_(self.parameter, float(self.values[k]))
         front = regime.hammer.front
@@ -381,10 +380,10 @@ class Bifurcation(Result, rows="direction column"):
 
 
 def hysteresis(diagram: Bifurcation) -> BoolArray:
-    """Mask of the values at which the directions of a diagram lead to different attractors, shape (C,).
+    """Mask of the parameter values at which the two directions lead to different attractors, shape (C,).
 
-    Periodic trains differ if their periods do, or if their orbits lie further apart than `SAME` of the
-    builder; an aperiodic train differs from periodic ones only. All False for a single direction.
+    Periodic trains differ if their periods differ, or if their orbits are further apart than `SAME` of the
+    builder; an aperiodic train differs from periodic trains only. All False for a single direction.
     """
     different = np.zeros(len(diagram.values), np.bool_)
     if len(diagram.directions) < 2:

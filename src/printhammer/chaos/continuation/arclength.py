@@ -9,9 +9,9 @@ tangent, then Newton's method on
 with the tangent t at z_0 as last row (H. B. Keller, in P. H. Rabinowitz (ed.), *Applications of Bifurcation
 Theory*, Academic Press 1977, 359; E. L. Allgower and K. Georg, *Introduction to Numerical Continuation
 Methods*, SIAM 2003). The system is regular at folds, where the parameter turns back. Lengths are measured in
-scaled variables, u and p each divided by a scale of its own.
+scaled variables, u and p each divided by its scale.
 
-Bifurcations on the way, such as folds and period doublings, are located by
+Bifurcations on the curve, such as folds and period doublings, are located by
 `printhammer.chaos.continuation.branch_points`.
 """
 
@@ -32,17 +32,17 @@ from printhammer.support.arrays import FloatArray
 
 _GROWTH: Final = 1.5  # Factor on the step after a step that was accepted
 _LEAST_COSINE: Final = 0.97
-"""Cosine of the angle between successive tangents below which a step is repeated with half its length."""
+"""Cosine of the angle between successive tangents below which the step is halved and repeated."""
 _FARTHEST: Final = 0.4
-"""Largest distance of a corrected point from its prediction, in steps; beyond it the step is rejected."""
+"""Largest distance of a corrected point from the predicted point, in steps; beyond it a step is rejected."""
 _LEAP: Final = 1.0
-"""Change of a multiplier in one step, relative to 1 + |multiplier|, beyond which the step is halved."""
+"""Change of a multiplier in one step, relative to 1 + |multiplier|, above which the step is halved."""
 _SAME: Final = 1e-6
-"""Scaled distance below which two points are identical."""
+"""Scaled distance below which two points of a curve are identical."""
 
 
 class Stop(Declared):
-    """End of a curve, and the reason for stopping."""
+    """End of a curve of fixed points, with the reason for stopping."""
 
     reason: str = part(
         '"bound"; "closed"; "no value": the map has none beyond; "lost": Newton\'s method does not converge'
@@ -60,19 +60,19 @@ class Stop(Declared):
 
 
 class Curve(Declared):
-    """A curve of fixed points."""
+    """Curve of fixed points of a map with a parameter, with the reasons for stopping at both ends."""
 
     nodes: list[Node] = part("fixed points in order along the curve; `arc` increases")
     stops: tuple[Stop, Stop] = part("reasons for stopping before the first and after the last point")
 
     @property
     def closed(self) -> bool:
-        """Whether the curve returns to its start; its first and last nodes are then the same point."""
+        """Whether the curve returns to its start, so that its first and last nodes are the same point."""
         return self.stops[1].reason == "closed"
 
 
 class Steps(Declared):
-    """Step sizes and iteration limit of a curve, in scaled variables."""
+    """Step sizes and maximum number of steps along a curve, in scaled variables."""
 
     first: float = part("length of the first step", default=0.02)
     smallest: float = part("smallest length", default=1e-7)
@@ -94,7 +94,7 @@ class Steps(Declared):
 
 
 Watch = Callable[[Node, Node], Stop | None]
-"""Callback for each pair of successive nodes; a returned `Stop` ends the curve between them."""
+"""Callback for each pair of successive nodes; a returned `Stop` ends the curve between the two nodes."""
 
 
 def follow(
@@ -109,35 +109,35 @@ def follow(
     row: npt.ArrayLike | None = None,
     watch: Watch | None = None,
 ) -> Curve:
-    """Follow the curve of fixed points through a point by pseudo-arclength continuation.
+    """Follow the curve of fixed points near a given state by pseudo-arclength continuation.
 
     Parameters
     ----------
     family : callable
-        The map.
+        The map with a parameter.
     state : array, shape (n,)
         State near a fixed point.
     parameter : float
-        Parameter of the first point, kept fixed in its correction.
+        Parameter of the first point, held fixed while this point is corrected.
     scales : array, shape (n + 1,)
         Scales that divide the components of the state and, last, the parameter.
     bounds : tuple of float
-        Least and largest parameter; the curve ends there.
+        Least and largest parameter, at which the curve ends.
     steps : Steps, optional
         Step sizes and maximum number of steps.
     directions : str, optional
         Direction from the first point: "up", initially toward larger parameters, "down", or "both".
     row : array, shape (n + 1,), optional
         Scaled direction in which the curve leaves the first point upward, if known, as for a branch born at a
-        bifurcation. The correction of the first point then fixes the component along it instead of the
+        bifurcation. The correction of the first point then fixes the component along `row` instead of the
         parameter.
     watch : callable, optional
-        Called with each node and the next, in the direction of travel; may end the curve.
+        Called with every pair of successive nodes, in the direction of travel; may end the curve.
 
     Returns
     -------
     Curve
-        From its lower to its upper end, with reason and place of both stops.
+        Nodes from the lower to the upper end, with parameter, state and reason of both stops.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def _reversed(nodes: list[Node]) -> list[Node]:
 def _half(
     follower: Corrector, start: Node, bounds: tuple[float, float], steps: Steps, watch: Watch | None
 ) -> tuple[list[Node], Stop]:
-    """Follow a curve along the tangent of its start; nodes after it."""
+    """Follow a curve in one direction from its start; return the nodes after the start, and the stop."""
     nodes: list[Node] = []
     here, length = start, steps.first
     home = follower.point(start)
@@ -236,14 +236,14 @@ def _half(
 
 
 def _is_joined(follower: Corrector, here: Node, ahead: Node, length: float) -> bool:
-    """Whether a corrected point lies on the same curve, judged by its distance and tangent."""
+    """Whether a corrected point lies on the same curve, by its distance, tangent and multipliers."""
     predicted = follower.point(here) + length * here.tangent
     near = float(np.linalg.norm(follower.point(ahead) - predicted)) <= _FARTHEST * length
     return near and float(here.tangent @ ahead.tangent) >= _LEAST_COSINE and not _has_leap(here, ahead)
 
 
 def _has_leap(here: Node, ahead: Node) -> bool:
-    """Return whether the multipliers change by much between two points of the same kind of motion."""
+    """Whether a multiplier jumps between two points with the same sequence of contacts."""
     if here.value.label != ahead.value.label:
         return False
     before, after = here.multipliers, ahead.multipliers
@@ -262,7 +262,7 @@ def _lost(node: Node, trouble: str, *, jumped: bool = False) -> Stop:
 
 
 def _beyond(node: Node, bounds: tuple[float, float]) -> float | None:
-    """Return the bound on which a node lies if its tangent leads out."""
+    """Return the bound that a node has reached if the tangent leads beyond it, else None."""
     if node.parameter <= bounds[0] and node.tangent[-1] < 0.0:
         return bounds[0]
     if node.parameter >= bounds[1] and node.tangent[-1] > 0.0:
@@ -283,7 +283,7 @@ def _bound_stop(node: Node, bound: float) -> Stop:
 
 
 def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float) -> Node | None:
-    """Return the point between two nodes at a parameter, its tangent in the direction of travel."""
+    """Correct the point between two nodes at a given parameter; its tangent is in the direction of travel."""
     share = (parameter - here.parameter) / (ahead.parameter - here.parameter)
     begin = follower.point(here)
     z = begin + share * (follower.point(ahead) - begin)
@@ -297,7 +297,7 @@ def _at_parameter(follower: Corrector, here: Node, ahead: Node, parameter: float
 
 
 def _is_passed(follower: Corrector, here: Node, ahead: Node, home: FloatArray, start: Node) -> bool:
-    """Return whether the curve goes through its start between two nodes."""
+    """Whether a closed curve passes its start between two successive nodes."""
     begin = follower.point(here)
     along = follower.point(ahead) - begin
     share = float((home - begin) @ along) / float(along @ along)

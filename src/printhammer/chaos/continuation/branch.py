@@ -46,7 +46,7 @@ Change = Literal["", "appears", "vanishes", "splits", "merges", "several"]
 
 
 class BranchEvent(Declared, eq=False):
-    """A bifurcation, grazing or change of section on a branch."""
+    """Event on a branch: a bifurcation, a grazing, or a change of the section."""
 
     kind: EventKind = part(
         '"fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are'
@@ -71,7 +71,7 @@ class BranchEvent(Declared, eq=False):
 
     @property
     def message(self) -> str:
-        """The event in a few words."""
+        """Description of the event in a few words, e.g. "grazing: a pack contact appears"."""
         if self.kind == "section":
             return f"a contact nears the section, which moves to the phase {self.phase:.4g}"
         if self.kind != "grazing":
@@ -83,7 +83,7 @@ class BranchEvent(Declared, eq=False):
 
 
 def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
-    """Describe a point of a curve at a section of a phase as an event of a hammer."""
+    """Convert a special point of a curve of fixed points to an event of a branch at a section phase."""
     surface, change = ("", "") if point.sides is None else _grazing(point)
     return BranchEvent(
         kind="grazing" if point.kind == "change" else point.kind,
@@ -101,7 +101,7 @@ def event_of(point: BranchPoint, phase: float = 0.0) -> BranchEvent:
 
 
 def _grazing(point: BranchPoint) -> tuple[str, str]:
-    """Determine on which surface a contact changes, and how it changes as the parameter grows."""
+    """Find the surface of a grazing, and the change of the contacts as the parameter grows."""
     assert point.sides is not None
     ordered = sorted(point.sides, key=lambda node: node.parameter)
     before, after = (node.value.extra for node in ordered)
@@ -122,7 +122,7 @@ def _grazing(point: BranchPoint) -> tuple[str, str]:
 
 
 def _is_parted(touches: list[Touch], length: float) -> bool:
-    """Whether the shortest gap between contacts is shorter than the shortest contact."""
+    """Whether two contacts result from a split contact: the gap is shorter than the shortest contact."""
     durations = [touch.t_out - touch.t_in for touch in touches]
     if len(touches) < 2 or min(durations) == 0.0:
         return False
@@ -140,8 +140,8 @@ def stable_ranges(
 ) -> list[tuple[float, float]]:
     """Compute the ranges of the parameter over which the orbits of a branch are stable, ascending.
 
-    `ends` are the values at which the branch ends, which may lie beyond its first and last orbit. A branch
-    of asymmetric orbits turns back at a pitchfork and stays stable.
+    `ends` are the parameter values at the ends of the branch, which may lie beyond its first and last orbit.
+    A branch of asymmetric orbits turns back at a pitchfork and stays stable.
     """
     limits = [event for event in events if event.kind not in ("grazing", "section")]
     values = along.tolist()
@@ -164,17 +164,17 @@ def stable_ranges(
 
 
 MOST: Final = 1000
-"""Default maximum number of steps in each direction."""
+"""Default maximum number of continuation steps in each direction."""
 
 _DIGITS: Final = ".9g"
 
 
 class Branch(Result):
-    """A curve of periodic orbits in one parameter.
+    """Branch: a curve of periodic orbits in one parameter, with its bifurcations and grazings.
 
     Every array has one row for each orbit, in order along the curve; the values of the parameter need not
     ascend. Reasons for stopping are "bound"; "closed"; "period doubling": the orbit is born there; "grazing"
-    of a rigid backstop; "merged" with an orbit of fewer firings; "no value": a run ends early; "lost":
+    of a rigid backstop; "merged" with an orbit of fewer firings; "no value": a run ended early; "lost":
     Newton's method does not converge; "jump": it converges to another curve; "length": the maximum number of
     steps is reached.
     """
@@ -251,7 +251,7 @@ class Branch(Result):
         return f"{kind}-{self.firings} orbits of {self.regime.hammer.name} along {self.parameter}"
 
     def summary(self) -> Summary:
-        """Summarise where the orbit is stable, and the events of the branch."""
+        """Summarise the stable ranges of the parameter and the events of the branch."""
         stable = [
             f"   {styled('good', 'stable')} from {low:.9g} to {high:.9g} {self.unit}"
             for low, high in self.stable_ranges
@@ -275,7 +275,7 @@ class Branch(Result):
     @property
     @derived("1", "part of the period between a firing and the section")
     def phase(self) -> float:
-        """Phase of the section at the start, as a fraction of the period; see `phases`."""
+        """Phase of the section at the first orbit, as a fraction of the period; see also `phases`."""
         return self.regime.phase
 
     @property
@@ -283,8 +283,8 @@ class Branch(Result):
     def stable(self) -> BoolArray:
         """Mask of the stable orbits, shape (N,): all small perturbations decay.
 
-        At the birth of a branch in a period doubling, where a multiplier is 1, the stability is that of the
-        neighbouring orbit.
+        Where a branch is born at a period doubling, a multiplier is 1; the orbit there takes the stability of
+        its neighbour.
         """
         stable = np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
         for end, beside, stop in ((0, 1, self.stops[0]), (-1, -2, self.stops[1])):
@@ -295,7 +295,7 @@ class Branch(Result):
     @property
     @derived("1", "whether the branch is a closed loop", kind="column", dtype=np.int32)
     def closed(self) -> bool:
-        """Whether the branch is an island: a closed loop, joined to no other branch; its ends coincide."""
+        """Whether the branch is a closed loop, an island that no other branch joins; its ends coincide."""
         return self.curve.closed
 
     @property
@@ -307,7 +307,7 @@ class Branch(Result):
 
     @property
     def message(self) -> str:
-        """Description of the branch and the reasons for stopping at its ends, in one line."""
+        """Description of the branch, and the reasons for stopping at its two ends, in one line."""
         reached = [*self.values.tolist(), *(event.value for event in self.events if event.kind == "fold")]
         low, high = min(reached), max(reached)
         span = f"{self.parameter} from {low:{_DIGITS}} to {high:{_DIGITS}} {self.unit}"
@@ -318,13 +318,13 @@ class Branch(Result):
         return f"{what}; at its first orbit {first}; at its last orbit {last}"
 
     def notes(self) -> dict[str, Any]:
-        """Return the reasons for stopping, for the attributes of the Dataset."""
+        """Return the reasons for stopping and the stable ranges, for the attributes of the Dataset."""
         first, last = (stop.sentence for stop in self.stops)
         stable = [list(pair) for pair in self.stable_ranges]
         return {"first_end": first, "last_end": last, "stable_ranges": stable}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return orbits over `orbit`, `firing` and `multiplier`, and events over `event`."""
+        """Return the Dataset variables: properties of the orbits over `orbit`, events over `event`."""
         own = super().entries()
         own["value"] = replace(own["value"][0], unit=self.unit, meaning=self.parameter), self.values
         for name in ("real", "imag"):
@@ -356,11 +356,11 @@ class Branch(Result):
         return own
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return a row for each orbit and firing."""
+        """Convert the branch to a table with one row per orbit and firing."""
         return branches_table([self], self.attributes).drop(columns="branch")
 
     def orbit(self, number: int) -> Orbit:
-        """Recompute one of the orbits, converged anew at its value of the parameter.
+        """Converge one orbit of the branch again, at its value of the parameter.
 
         Parameters
         ----------
@@ -375,12 +375,12 @@ class Branch(Result):
     def doubled(
         self, event: BranchEvent, *, most: SupportsIndex = MOST, threads: int | None = None
     ) -> Branch:
-        """Follow the branch of twice the period that is born at one of the period doublings.
+        """Follow the branch of twice the period that is born at a period doubling of this branch.
 
         Parameters
         ----------
         event : BranchEvent
-            A period doubling of this branch.
+            A period doubling, from `events`.
         most : int, optional
             Maximum number of steps in each direction.
         threads : int, optional
@@ -389,7 +389,8 @@ class Branch(Result):
         Raises
         ------
         InputError
-            The event is not a period doubling of this branch, or no orbit of twice the period is near.
+            The event is not a period doubling of this branch, or Newton's method finds no orbit of twice the
+            period nearby.
         """
         if event.kind != "period doubling" or event not in self.events:
             raise InputError.of("event", event.kind, "a period doubling of this branch")
@@ -398,19 +399,20 @@ class Branch(Result):
     def crossing(
         self, event: BranchEvent, *, most: SupportsIndex = MOST, threads: int | None = None
     ) -> Branch:
-        """Return the branch that crosses this one at a pitchfork or a transcritical point.
+        """Follow the branch that crosses this branch at a pitchfork or a transcritical point.
 
         Parameters
         ----------
         event : BranchEvent
-            A crossing of this branch.
+            A pitchfork, transcritical or branching point, from `events`.
         most, threads
             As for `doubled`.
 
         Raises
         ------
         InputError
-            The event is no crossing of this branch, or no orbit of another branch is near.
+            The event is not a crossing of this branch, or Newton's method finds no orbit of another branch
+            nearby.
         """
         if event.kind not in CROSSINGS or event not in self.events:
             raise InputError.of("event", event.kind, "a crossing of this branch")
@@ -418,7 +420,7 @@ class Branch(Result):
 
 
 def branches_table(branches: Sequence[Branch], attributes: Mapping[str, Any]) -> pd.DataFrame:
-    """Convert branches to a table with a row for each orbit and firing."""
+    """Convert branches to a table with one row per orbit and firing."""
     import pandas as pd
 
     tables = []

@@ -1,4 +1,4 @@
-"""Special points of a curve of fixed points: folds, period doublings, tori, crossings, changes of motion.
+"""Special points of a curve of fixed points: folds, period doublings, tori, crossings, contact changes.
 
 Each kind has a test function that changes sign at the point (W. J. F. Govaerts, *Numerical Methods for
 Bifurcations of Dynamical Equilibria*, SIAM 2000; Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*,
@@ -13,8 +13,8 @@ of the curve:
 | crossing | determinant of the corrector's matrix, the tangent its last row: pitchfork or transcritical |
 | change | none; the label of the motion differs |
 
-A product mu_i mu_j = 1 of two real multipliers, a neutral saddle, is no bifurcation and is left out. A sign
-that changes twice within one step is not seen.
+A product mu_i mu_j = 1 of two real multipliers, a neutral saddle, is not a bifurcation and is omitted. Two
+sign changes within one step are not detected.
 """
 
 from __future__ import annotations
@@ -45,35 +45,35 @@ from printhammer.support.arrays import FloatArray
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", Crossing, "change", "section"]
 
 BIRTH: Final = "period doubling"
-"""Reason for stopping of an orbit of even period at the period doubling that it is born from."""
+"""Reason for stopping where a branch of even period ends in the period doubling that creates it."""
 
 _ROUNDS: Final = 60  # Iteration limit of bisections and root searches
 _SHARE: Final = 1e-13
-"""Fraction of a step to which a point is located."""
+"""Accuracy to which a special point is located, as a fraction of a continuation step."""
 _REAL: Final = 1e-9  # Imaginary part above which a multiplier is complex
 _ROUNDING: Final = 1e-8
-"""Rounding level of the imaginary part of a real multiplier and of a test function."""
+"""Magnitude of a test function below which its sign change is rounding noise."""
 _SHARE_OF_CHANGE: Final = 1e-10
 _SMALL_MARGIN: Final = 0.05
 _CLOSE_MARGIN: Final = 1e-7
-"""Fraction of a step to which a change is bisected, and range of margins for its interpolation."""
+"""Accuracy of a contact change, in steps; margins below which it is interpolated, and taken as located."""
 _NEAR: Final = 1e-4
-"""Fraction of a step within which a fold and a crossing are the same point."""
+"""Distance, as a fraction of a step, within which a fold and a crossing are the same point."""
 _AMPLITUDE: Final = 1e-2  # First scaled distance from a doubling at which its orbit is sought
 _LEAST_AMPLITUDE: Final = 1e-6
 _CLOSER: Final = 4.0
-"""Smallest scaled distance from a doubling at which its orbit is sought; factor between attempts."""
+"""Smallest scaled distance from a doubling at which the new orbit is sought; ratio of successive attempts."""
 _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
-"""Tolerances for a new orbit: sideways distance as a fraction of that distance, multiplier minus 1."""
+"""Tolerances of a new orbit: sideways offset relative to that distance; deviation of a multiplier from 1."""
 _HALF_NEAR: Final = 0.05
-"""Scaled distance within which an orbit is close to an orbit of half its period."""
+"""Largest scaled distance of an orbit from an orbit of half its period near their common doubling."""
 _HALF_DOUBLES: Final = 0.5
-"""Distance of a multiplier of the latter orbit from -1 within which it may be about to double."""
+"""Largest distance of a multiplier from -1 at which a period doubling is searched for nearby."""
 
 
 class BranchPoint(Declared):
-    """A bifurcation or a change of motion on a curve of fixed points."""
+    """Special point of a curve of fixed points: a bifurcation or a change of the contact sequence."""
 
     kind: Kind = part(
         '"fold", "period doubling", "Neimark-Sacker", "pitchfork", "transcritical", "branching", "change" or'
@@ -93,24 +93,24 @@ class BranchPoint(Declared):
 
     @property
     def parameter(self) -> float:
-        """Parameter at the point."""
+        """Value of the parameter at the special point."""
         return self.node.parameter
 
 
 def doubling_test(jacobian: FloatArray) -> float:
-    """Compute det(J + I), zero where a multiplier is -1."""
+    """Compute the test function det(J + I) of a period doubling, zero where a multiplier is -1."""
     return float(np.linalg.det(jacobian + np.eye(len(jacobian))))
 
 
 def torus_test(jacobian: FloatArray) -> float:
-    """Compute the product over pairs of multipliers of mu_i mu_j - 1; 1 for a single multiplier."""
+    """Compute the Neimark-Sacker test function: product of mu_i mu_j - 1 over multiplier pairs; 1 without."""
     multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
     i, j = np.triu_indices(len(multipliers), 1)
     return float(np.prod(multipliers[i] * multipliers[j] - 1.0).real)
 
 
 def fold_test(jacobian: FloatArray) -> float:
-    """Compute det(J - I), zero where a multiplier is 1."""
+    """Compute the test function det(J - I) of a fold, zero where a multiplier is 1."""
     return float(np.linalg.det(jacobian - np.eye(len(jacobian))))
 
 
@@ -121,19 +121,19 @@ def points_of(
     precision: float,
     margin: Callable[[Node], float] | None = None,
 ) -> list[BranchPoint]:
-    """Locate the special points along a curve, in order.
+    """Locate the special points along a curve of fixed points, in order.
 
     Parameters
     ----------
     family : callable
-        The map.
+        The map with a parameter.
     curve : Curve
         Curve of fixed points, from `printhammer.chaos.continuation.arclength.follow`.
     scales, precision
         Scales and precision with which the curve was followed.
     margin : callable, optional
-        Function that passes through 0 where the label changes. Changes are then located by interpolation, and
-        the map is not evaluated too close to them.
+        Function that passes through 0 where the label of the motion changes. The changes are then located by
+        interpolation, without evaluating the map too close to a change.
 
     Returns
     -------
@@ -175,7 +175,7 @@ def points_of(
 
 
 def _without_folds_at_crossings(points: list[BranchPoint], curve: Curve) -> list[BranchPoint]:
-    """Remove folds at crossings: a curve that turns back at a pitchfork has no separate fold there."""
+    """Remove folds that coincide with crossings: where a curve turns back at a pitchfork there is no fold."""
     crossings = [point for point in points if point.kind in CROSSINGS]
 
     def is_at(point: BranchPoint, crossing: BranchPoint) -> bool:
@@ -193,12 +193,12 @@ def _without_folds_at_crossings(points: list[BranchPoint], curve: Curve) -> list
 
 
 def _has_sign_change(before: float, after: float) -> bool:
-    """Whether a test function changes sign by more than rounding, as matters for area-preserving maps."""
+    """Whether a test function changes sign by more than rounding; area-preserving maps need the threshold."""
     return before * after < 0.0 and max(abs(before), abs(after)) > _ROUNDING
 
 
 def _has_pair(node: Node) -> bool:
-    """Whether a pair of complex multipliers lies close to the unit circle."""
+    """Whether a complex pair of multipliers lies close to the unit circle."""
     pair = np.abs(node.multipliers.imag) > _REAL
     return bool((pair & (np.abs(np.abs(node.multipliers) - 1.0) < 1e-3)).any())
 
@@ -206,10 +206,10 @@ def _has_pair(node: Node) -> bool:
 def zero_between(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Locate the zero of a test function between two nodes: fraction of the distance, and the node there.
+    """Find the zero of a test function between two nodes; return the fraction of the step and the node.
 
-    Alternates bisection and the Illinois variant of regula falsi; None if a fixed point on the way is not
-    found.
+    The method alternates bisection and the Illinois variant of regula falsi. The node is None if Newton's
+    method finds no fixed point at a trial fraction.
     """
     low, high = 0.0, 1.0
     at_low, at_high = test(here), test(ahead)
@@ -243,7 +243,7 @@ def zero_between(
 def _changes(
     follower: Corrector, here: Node, ahead: Node, after: int, margin: Callable[[Node], float] | None
 ) -> list[tuple[float, Kind, BranchPoint]]:
-    """Locate the points between two nodes at which the label changes."""
+    """Locate all points between two nodes at which the label of the motion changes."""
     changes: list[tuple[float, Kind, BranchPoint]] = []
     begin, first = 0.0, here
     while first.value.label != ahead.value.label and len(changes) < _ROUNDS:
@@ -269,7 +269,7 @@ def _change(
     start: tuple[float, Node],
     margin: Callable[[Node], float] | None,
 ) -> tuple[float, tuple[Node, Node], bool]:
-    """Locate the first change of the label: fraction of the distance, nodes on both sides, sharpness."""
+    """Locate the first change of the label; return step fraction, nodes on both sides, and sharpness."""
     low, inside = start
     high, beyond = 1.0, ahead
     m_low = m_high = math.nan
@@ -315,10 +315,10 @@ def follow_doubled(
     """Follow the orbits of twice the period that are born at a period doubling.
 
     The first orbit is sought at a scaled distance `amplitude` from the doubling `point`, in the direction of
-    the eigenvector whose multiplier is -1; its parameter is solved for as well, on whichever side it lies. It
-    is accepted if, to first order, it lies in that direction, with the parameter and the multipliers of the
-    doubling. Otherwise the search is repeated closer to the doubling. `doubled` is the map applied twice; the
-    other arguments are those of `follow`. InputError if there is no such orbit.
+    the eigenvector whose multiplier is -1; its parameter is an unknown, too, and may lie on either side. The
+    orbit is accepted if, to first order, it lies in that direction, with the parameter and the multipliers of
+    the doubling. Otherwise the search is repeated closer to the doubling. `doubled` is the map applied twice;
+    the other arguments are those of `follow`. InputError if there is no such orbit.
     """
     widths = np.asarray(scales, dtype=np.float64)
     jacobian = point.node.value.jacobian
@@ -353,7 +353,7 @@ def follow_doubled(
 
 
 def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> bool:
-    """Whether an orbit lies where an orbit born at the doubling does, to first order."""
+    """Whether an orbit lies, to first order, where an orbit born at the doubling has to lie."""
     aside = float(np.linalg.norm(way - amplitude * row))
     return aside <= _ASIDE * amplitude and float(np.abs(node.multipliers - 1.0).min()) <= _NEW_MULTIPLIER
 
@@ -361,10 +361,10 @@ def _is_born(way: FloatArray, row: FloatArray, amplitude: float, node: Node) -> 
 def birth_of(half: Corrector, here: Node, ahead: Node) -> Stop | None:
     """Locate the period doubling at which a branch of even period ends, if its curve passes one.
 
-    At the doubling the states half a period apart coincide, and the curve continues as its own mirror image,
-    with the same orbits half a period later. `half` corrects onto the curve over half the period, `here` and
-    `ahead` are successive nodes of the curve over the whole period. The stop has the doubling on the former
-    curve as its node.
+    At the doubling, states half a period apart coincide, and the curve retraces the same orbits half a period
+    later. `half` corrects points onto the curve of orbits of half the period; `here` and `ahead` are
+    successive nodes of the curve of the whole period. The node of the returned stop is the doubling on the
+    curve of half the period.
     """
     if here.tangent[-1] * ahead.tangent[-1] >= 0.0:
         return None

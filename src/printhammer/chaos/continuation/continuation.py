@@ -1,10 +1,10 @@
-"""Continuation of a periodic orbit, stable or not, in a constant of the hammer to the ends of its branch.
+"""Continuation of a periodic orbit, stable or not, in one parameter, to the ends of its branch.
 
 A branch is a curve of periodic orbits. Its Floquet multipliers show where and how the orbit loses stability;
 its sequence of contacts shows where a contact appears or vanishes, a grazing. The contact forces of the
 paper's pack and backstop begin smoothly, with the powers 2.7 and 1.5 of the depth, so that the strobe map is
-differentiable at a grazing and the branch continues. On a rigid backstop it is not: there a branch ends at
-its first grazing, which the stop reports.
+differentiable at a grazing and the branch continues. With a rigid backstop the map has a kink at a grazing: a
+branch ends at its first grazing, which the stop reports.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ def continuation(
     Parameters
     ----------
     start : Hammer, Regime or Orbit
-        A periodic orbit from `printhammer.orbits`; or a regime, or a hammer with the keywords `firing`. Its
-        orbit is the orbit near `state` if that is given, else the orbit that a train from rest settles to,
-        else the first orbit of a search. Where an impact lies on the section, the branch is followed at
-        another phase; no result depends on the phase.
+        A periodic orbit from `printhammer.orbits`; or a regime, or a hammer with the keywords `firing`. The
+        starting orbit of a regime or hammer is the orbit near `state` if a state is given, else the orbit
+        that a train from rest settles to, else the first orbit of a search. Where an impact lies on the
+        section, the branch is followed at another phase; no result depends on the phase.
     parameter : str
         "period", "rate", or the dotted key of a constant of the hammer, such as "backstop.damping", of the
         waveform or of a continuous periodic force, such as "waveform.amplitude" or "drive.amplitude".
@@ -60,22 +60,22 @@ def continuation(
         Least and largest value, SI or text with a unit.
     firings : int, optional
         For a hammer or regime: number of firings after which the orbit repeats; by default the period that
-        the train settles to, and 1 if it does not settle or a state is given.
+        the train from rest settles to, or 1 if it does not settle or a state is given.
     state : tuple of float, optional
         For a hammer or regime: displacement, m, and velocity, m/s, at a section, near the orbit.
     most : int, optional
         Maximum number of steps in each direction.
     steps : Steps, optional
-        Step sizes instead of `most`, in half-widths of the strobe window and fifths of the range of the
-        parameter.
+        Step sizes and maximum number of steps, replacing `most`; lengths in half-widths of the strobe window
+        and fifths of the parameter range.
     **firing
         How the hammer is fired, as for `printhammer.Regime.of`; for an orbit only its phase may be given.
 
     Returns
     -------
     Branch
-        Branch in both directions from the start, to the bounds or to another stop, with its reason. Folds are
-        located to about 1e-10 of the range or better, grazings to about 1e-8.
+        Branch in both directions from the start, up to the bounds or to an earlier stop, with the reason.
+        Folds are located to about 1e-10 of the range or better, grazings to about 1e-8.
     """
     if isinstance(start, Orbit):
         fired = [value for name, value in firing.items() if name not in ("phase", "overlap")]
@@ -117,7 +117,7 @@ def continuation(
 def _orbit_to_start_from(
     regime: Regime, firings: int | None, effort: Effort
 ) -> tuple[Regime, FloatArray, int]:
-    """Find the orbit to start from: regime at the phase of a section, state, and number of firings."""
+    """Find the starting orbit; return the regime at the phase of its section, a state, and its firings."""
     judged = (_SETTLE // 2, _SETTLE)
     (settled,) = strobes(regime, points=1, transient=_SETTLE, firings=judged, threads=effort.threads)
     period = None if settled.verdict is None or not settled.ok else settled.verdict.period

@@ -1,4 +1,4 @@
-"""Where two curves of fixed points cross: their location, their kind, and the curve that crosses.
+"""Crossings of two curves of fixed points: location, kind, and continuation of the other curve.
 
 At a crossing the corrector's matrix A = [dG/du - I, dG/dp] has a null space of two dimensions. One
 direction in it is the tangent t of the curve that was followed; q is perpendicular to it. With the left null
@@ -26,32 +26,33 @@ from printhammer.errors import InputError
 from printhammer.support.arrays import FloatArray
 
 Crossing = Literal["pitchfork", "transcritical", "branching"]
-"""Kind of a crossing; "branching" where the second derivatives do not decide."""
+"""Kind of a crossing; "branching" if the second derivatives leave the kind undecided."""
 CROSSINGS: Final[tuple[Crossing, ...]] = get_args(Crossing)
 
 _ROUNDS: Final = 60
 _BRACKET: Final = 1e-5
-"""Fraction of a step within which a crossing is not bracketed any closer; Newton's method fails at it."""
+"""Smallest bracket of a crossing, as a fraction of a step; Newton's method fails at the crossing itself."""
 _DIFFERENCE: Final = 1e-3
-"""Scaled step of the second differences; between 1e-4 and 1e-2 the kinds of the tests are the same."""
+"""Scaled step of the second differences; between 1e-4 and 1e-2 the kinds found in the tests are the same."""
 _FLAT: Final = 1e-6
-"""Mixed second derivative, as a fraction of the largest, below which the other direction is unknown."""
+"""Mixed second derivative, relative to the largest, below which the second direction is undetermined."""
 _UPRIGHT: Final = 0.01
 """Component of a tangent along the parameter below which a curve turns back; arbitrary."""
 _AMPLITUDE: Final = 1e-2
 _LEAST_AMPLITUDE: Final = 1e-5
 _CLOSER: Final = 4.0
-"""Scaled distance from a crossing at which the other curve is sought, the least, and the factor between."""
+"""Smallest scaled distance from a crossing at which the other curve is sought; ratio of attempts."""
 _ASIDE: Final = 0.5
-"""Distance from the prediction, as a fraction of that distance, within which a point lies on that curve."""
+"""Largest distance of a point from its prediction, relative to that distance, for it to be on the curve."""
 
 
 def locate_crossing(
     follower: Corrector, here: Node, ahead: Node, test: Callable[[Node], float]
 ) -> tuple[float, Node | None]:
-    """Locate a crossing between two nodes: fraction of the distance, and the node there; None if not found.
+    """Locate a crossing between two nodes; return the fraction of the step, and the node or None.
 
-    Newton's method fails at the crossing itself: it is bracketed ever closer and interpolated.
+    Since Newton's method fails at the crossing itself, the crossing is bracketed ever closer and
+    interpolated.
     """
     low, high, one, other = 0.0, 1.0, here, ahead
     for _ in range(_ROUNDS):
@@ -100,7 +101,7 @@ def crossing_direction(follower: Corrector, node: Node) -> FloatArray | None:
 
 
 def crossing_kind(follower: Corrector, node: Node) -> Crossing:
-    """Classify a crossing by the tangents of its two curves."""
+    """Classify a crossing by the tangents of its two curves: pitchfork, transcritical or branching."""
     other = crossing_direction(follower, node)
     if other is None:
         return "branching"
@@ -117,10 +118,10 @@ def follow_crossing(
     steps: Steps,
     watch: Watch | None = None,
 ) -> Curve:
-    """Follow the curve that crosses another one at a node of that, in both directions.
+    """Follow, in both directions, the curve that crosses a known curve at one of its nodes.
 
-    Its first point is sought at a scaled distance along its tangent, closer by where there is none. The other
-    arguments are those of `follow`.
+    The first point of the other curve is sought at a scaled distance along the tangent of that curve; if none
+    is found, the distance is reduced. The other arguments are those of `follow`.
 
     Raises
     ------

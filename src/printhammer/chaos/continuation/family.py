@@ -1,7 +1,7 @@
-"""Stroboscopic map of a regime as a map with a parameter, for pseudo-arclength continuation.
+"""Strobe map of a regime as a map with a parameter, for pseudo-arclength continuation.
 
-Beside its value and derivatives the map returns the contacts on the way; their sequence is the label of
-motion.
+Beside image and derivatives, the map returns the contacts between the two states; their sequence is the label
+of the motion.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from printhammer.run.start import initial_state
 from printhammer.support.arrays import FloatArray
 
 _SPACING: Final = 1e-6
-"""Relative parameter step of the slope's finite difference; the slope only steers the corrector."""
+"""Relative parameter step of the slope's finite difference; the slope only steers Newton's method."""
 _MUCH: Final = 1e3
-"""Multiplier above which that step is reduced."""
+"""Multiplier above which the parameter step of the finite difference is reduced in proportion."""
 _BESIDE: Final = 1e-7  # Finite-difference step of the state at gentle touches, in scales of the run
 _GENTLE: Final = 3e-4
-"""Finite-difference step of a state, and speed of a gentle pack touch, in scales of the run."""
+"""Speed of a pack touch, in scales of the run, below which finite differences replace the tangent flow."""
 _IN_PACK: Final = f"{IN_PACK} at the section; another phase of the period can be chosen"
 _MOST_TOUCHES: Final = 100  # Number of contacts in a period above which the map has no value
 _MANY: Final = f"more than {_MOST_TOUCHES} contacts"
@@ -39,7 +39,7 @@ Surface = Literal["pack", "backstop"]
 
 
 def cyclic(surfaces: Iterable[str]) -> str:
-    """Rotate a sequence of touched surfaces, P or B each, to its alphabetically first form."""
+    """Encode touched surfaces as P (pack) or B (backstop), rotated to the alphabetically first sequence."""
     word = "".join("P" if surface == "pack" else "B" for surface in surfaces)
     if len(word) > _MOST_TOUCHES:
         return _MANY
@@ -47,7 +47,7 @@ def cyclic(surfaces: Iterable[str]) -> str:
 
 
 class Touch(Declared):
-    """A contact of an orbit that begins within its period; times since the firing before the section."""
+    """Contact that begins within the period of an orbit; times count from the firing before the section."""
 
     surface: Surface = part('"pack" or "backstop"')
     t_in: float = scalar("s", "time of touch")
@@ -58,14 +58,14 @@ class Touch(Declared):
 
 
 class Passage(Declared):
-    """The contacts of a motion between two sections."""
+    """Contacts of a motion between two sections, with the time between firings."""
 
     touches: tuple[Touch, ...] = part("in order")
     period: float = scalar("s", "time between firings")
     firings: int = part("number of firings on the way")
 
     def of(self, surface: Surface) -> list[Touch]:
-        """Return the touches of one surface."""
+        """Return the touches of one surface, in order of time."""
         return [touch for touch in self.touches if touch.surface == surface]
 
     @property
@@ -90,7 +90,7 @@ class Passage(Declared):
 
 
 class Course(Declared):
-    """Course of a periodic orbit over one period; energies in J."""
+    """States, pack forces and energies, J, of a periodic orbit over one period."""
 
     states: FloatArray = part("displacement, m, and velocity, m/s, at the sections, shape (firings, 2)")
     peak_forces: FloatArray = column(
@@ -145,15 +145,14 @@ class RegimeFamily:
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
     def margin(self, state: FloatArray, parameter: float) -> float:
-        """Compute the signed nearness of a grazing, see `printhammer.chaos.strobe.map.Image`."""
+        """Compute the signed distance from a grazing, see `printhammer.chaos.strobe.map.Image`."""
         problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         return margin_of(problem, problem.run(end))
 
     def _differences(self, problem: Problem, end: float, state: FloatArray) -> FloatArray | None:
-        """Compute the derivative of the map by finite differences of runs.
+        """Compute the derivative of the strobe map, shape (2, 2), by finite differences of runs.
 
-        In a gentle touch the contact is too shallow for the finite differences of its law in the tangent
-        flow.
+        A gentle touch is so shallow that the finite differences of the contact law in the tangent flow fail.
         """
         columns = []
         for move in np.diag(_BESIDE * np.array(problem.scales)):
@@ -181,7 +180,7 @@ class RegimeFamily:
         return None if beside[0] is None else np.asarray((image - beside[0]) / step)
 
     def end_of(self, state: FloatArray, parameter: float) -> FloatArray | None:
-        """Compute the final state alone; None if the run ends early."""
+        """Compute the state at the last section alone, without derivatives; None if the run ends early."""
         try:
             problem, end = self._problem(self.regime.with_(self.name, parameter), state)
         except InputError:
@@ -201,7 +200,7 @@ class RegimeFamily:
         return problem, float(moments[-1])
 
     def course(self, state: FloatArray, parameter: float) -> Course:
-        """Compute the course of an orbit from its state at the section."""
+        """Compute states, forces and energies of an orbit over one period, from its state at the section."""
         regime = self.regime.with_(self.name, parameter)
         problem, end = self._problem(regime, state)
         record = problem.run(end)
@@ -223,7 +222,7 @@ def has_rigid_backstop(regime: Regime) -> bool:
 
 
 def _touches(hammer: Hammer, record: Record, zero: float, length: float) -> tuple[Touch, ...]:
-    """Collect the contacts of an orbit that begin in a record; an open contact ends in the next period."""
+    """List the touches of an orbit that begin in a run; an open contact ends in the next period."""
     position, front = hammer.position, hammer.front
     touches = []
     open_at_start = {int(row[0]): float(row[3]) for row in record.contacts if row[6]}

@@ -1,7 +1,8 @@
-"""Fixed points of a map with a parameter, converged one at a time by Newton's method.
+"""Fixed points of a map with a parameter, one at a time, by Newton's method.
 
 State u and parameter p together are a point z = (u, p). A point is corrected onto the curve of fixed points
-G(u, p) = u in the plane z . row = constant, in scaled variables: u and p each divided by a scale.
+G(u, p) = u within the plane z . row = constant. All variables are scaled: u and p are each divided by a
+scale.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from printhammer.support.arrays import FloatArray
 
 _MOST_CORRECTIONS: Final = 12  # Iteration limit of Newton's method
 _STAGNANT: Final = 1e3
-"""Corrections that no longer shrink are noise of the map if they are below this multiple of the precision."""
+"""Multiple of the precision below which a correction that no longer shrinks counts as converged."""
 
 
 class MapValue(Declared):
-    """A map with a parameter, evaluated at one point."""
+    """Value and derivatives of a map with a parameter at one point."""
 
     image: FloatArray = part("image G(u, p), shape (n,)")
     jacobian: FloatArray = part("derivative dG/du, shape (n, n)")
@@ -44,17 +45,17 @@ class MapValue(Declared):
 
     @classmethod
     def none(cls, count: int, trouble: str) -> MapValue:
-        """Return the placeholder for a value that does not exist, with the reason."""
+        """Return the placeholder for a map value that does not exist, with the reason."""
         nan = math.nan
         return cls(np.full(count, nan), np.full((count, count), nan), np.full(count, nan), (), trouble)
 
 
 MapFamily = Callable[["FloatArray", float], MapValue]
-"""A map with a parameter: state, shape (n,), and parameter in, `MapValue` out."""
+"""Map with a parameter: a callable of the state, shape (n,), and the parameter that returns `MapValue`."""
 
 
 class Node(Declared):
-    """A fixed point on a curve."""
+    """Fixed point on a curve, with the tangent of the curve and the value of the map."""
 
     state: FloatArray = part("state u, shape (n,)")
     parameter: float = part("parameter p")
@@ -78,10 +79,10 @@ class Node(Declared):
 
 
 class Corrector:
-    """Corrects points onto the curves of one map family by Newton's method.
+    """Corrector of points onto the curve of fixed points of a map, by Newton's method.
 
     The components of the state, and last the parameter, are divided by the scales, shape (n + 1,); a point is
-    on a curve where its scaled correction is below the precision.
+    on the curve if its scaled correction is below the precision.
     """
 
     def __init__(self, family: MapFamily, scales: npt.ArrayLike, precision: float) -> None:
@@ -96,11 +97,11 @@ class Corrector:
             )
 
     def scaled(self, state: npt.ArrayLike, parameter: float) -> FloatArray:
-        """Scale a point."""
+        """Divide a state and parameter by the scales; return the vector z, shape (n + 1,)."""
         return np.append(np.asarray(state, dtype=np.float64), parameter) / self.scales
 
     def point(self, node: Node) -> FloatArray:
-        """Scale the point of a node."""
+        """Return the scaled state and parameter of a node, shape (n + 1,)."""
         return self.scaled(node.state, node.parameter)
 
     def derivative(self, value: MapValue) -> FloatArray:
@@ -145,7 +146,7 @@ class Corrector:
         return self.correct(z, np.eye(self.count + 1)[-1])
 
     def onto(self, z: FloatArray) -> Node | None:
-        """Find the fixed point near z by Newton's method with least corrections; None if not found."""
+        """Find the fixed point near z, at its parameter if possible, else close to it; None if not found."""
         node = self.at_parameter(z)
         if node is not None:
             return node
@@ -175,10 +176,10 @@ class Corrector:
 
 
 def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node | None:
-    """Find the point of a curve at a fraction of the distance between two nodes; None if not found.
+    """Find the point of a curve at a fraction of the step between two nodes; None if not found.
 
-    The way is measured along the tangent of the first node; the initial guess is the cubic through both
-    nodes.
+    The fraction is measured along the tangent of the first node; the initial guess is on the cubic Hermite
+    curve through both nodes.
     """
     begin, end = follower.point(here), follower.point(ahead)
     chord = float(np.linalg.norm(end - begin))
@@ -195,7 +196,7 @@ def between(follower: Corrector, here: Node, ahead: Node, share: float) -> Node 
 
 
 def on_chord(begin: Node, end: Node, share: float, arc: float) -> Node:
-    """Return the point at a fraction of the chord between two nodes."""
+    """Interpolate a node linearly at a fraction of the chord between two nodes."""
     state = begin.state + share * (end.state - begin.state)
     return replace(
         begin, state=state, parameter=begin.parameter + share * (end.parameter - begin.parameter), arc=arc

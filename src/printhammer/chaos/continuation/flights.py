@@ -1,8 +1,8 @@
-"""Flights from one touch of a surface to the next, and the touches of an orbit nearest to a grazing.
+"""Flights from one touch of a surface to a later touch, and the touches of an orbit closest to a grazing.
 
 At a touch the displacement is that of the surface; the remaining state variable is the velocity, 0 at a
-grazing. A rigid backstop gives the strobe map a square root there; without the surface close to the touch the
-motion is smooth on both sides of it.
+grazing. With a rigid backstop, the strobe map has a square-root singularity at a grazing. If the surface is
+removed from the model close to the touch, the motion is smooth on both sides of the grazing.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _ROUNDS: Final = 20  # Iteration limit of Newton's method
 _PRECISION: Final = 1e-12  # Scaled correction below which Newton's method has converged
 _STAGNANT: Final = 1e3  # Multiple of the precision below which stagnation counts as convergence
 _SLOWER: Final = (0.98, 0.9, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.005)
-"""Speeds, as fractions of the first, of the impacts with which a branch is continued to its grazing."""
+"""Impact speeds, relative to the initial speed, at which a branch is computed down to its grazing."""
 
 
 class Flight(Declared):
-    """A motion from a touch to the next, some firings later, with the surface removed close to both."""
+    """Motion from one touch to another, some firings later, without the surface close to both touches."""
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
@@ -53,7 +53,7 @@ class Flight(Declared):
 def fly(
     regime: Regime, surface: Surface, phase: float, speed: float, firings: int, tolerance: float
 ) -> Flight:
-    """Compute the flight that leaves a surface at a phase of the drive with a speed, m/s."""
+    """Compute the flight that leaves a surface at a given phase of the drive and speed, m/s."""
     hammer = regime.hammer
     place = hammer.front if surface == "pack" else hammer.position
     assert place is not None
@@ -100,7 +100,7 @@ def fly(
 
 
 def _acceleration(problem: Problem, time: float) -> float:
-    """Compute the acceleration at the start of a run, m/s^2."""
+    """Compute the acceleration of the armature at the start of a run, m/s^2."""
     record = problem.run(problem.start + time)
     (row,) = problem.resample(record, np.array([problem.start]))
     push = row[2] if problem.drive.quantity == "force" else 0.0
@@ -108,7 +108,7 @@ def _acceleration(problem: Problem, time: float) -> float:
 
 
 class NearTouch(Declared):
-    """A touch of a surface by an orbit, or a turning point near a surface."""
+    """Touch of a surface by an orbit, or turning point of an orbit near a surface."""
 
     surface: Surface = part('"pack" or "backstop"')
     phase: float = part("phase of the touch, as a fraction of the period")
@@ -117,7 +117,7 @@ class NearTouch(Declared):
 
 
 def near_touches(regime: Regime, state: FloatArray, firings: int, tolerance: float) -> list[NearTouch]:
-    """List the turning points and rigid-backstop impacts of an orbit, nearest to a grazing first."""
+    """List the turning points and rigid-backstop impacts of an orbit, those closest to a grazing first."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     hammer = regime.hammer
@@ -158,7 +158,7 @@ def touch_at(
     tolerance: float,
     width: float,
 ) -> tuple[float, float] | None:
-    """Find phase of the touch and value of a parameter for the orbit that leaves a surface with a speed.
+    """Solve for touch phase and parameter of the orbit that leaves a surface at a given speed.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def touch_at(
     Returns
     -------
     tuple of float or None
-        None if Newton's method does not converge.
+        Phase of the touch and value of the parameter; None if Newton's method does not converge.
     """
     phase, own = guess
     scales = regime.window.half_widths
@@ -216,11 +216,12 @@ def touch_at(
 def fading(
     regime: Regime, name: str, touch: NearTouch, firings: int, tolerance: float, width: float
 ) -> list[tuple[float, float, float]] | None:
-    """Continue an impact to its grazing: phase, speed and value of the parameter for falling speeds.
+    """Follow an impact down to its grazing; return phase, speed and parameter for decreasing speeds.
 
-    A branch of orbits is smooth in these variables up to the grazing, which is the last entry. In the state
-    at a section its curvature diverges, since the derivative of the strobe map grows as the inverse of the
-    speed. None if the impact does not fade to a grazing nearby. The arguments are those of `touch_at`.
+    A branch of orbits is smooth in these variables up to the grazing, which is the last entry. In terms of
+    the state at a section, the curvature of the branch diverges, since the derivative of the strobe map grows
+    as the inverse of the speed. None if the impact speed does not reach zero nearby. The arguments are those
+    of `touch_at`.
     """
     way = [(touch.phase, touch.speed, float(regime.value(name)))]
     speeds = [touch.speed * share for share in _SLOWER] if touch.speed else []

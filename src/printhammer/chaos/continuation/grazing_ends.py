@@ -1,9 +1,9 @@
-"""Continuation of branches to a grazing of a rigid backstop.
+"""Continuation of branches up to a grazing of a rigid backstop, where they end.
 
-Where the impact of an orbit fades, a multiplier grows as the inverse of its speed, and steps along the branch
-shrink with the square of that speed: in the state at a section the grazing is never reached. With phase and
-speed of the impact as variables the branch is smooth up to the grazing and through it (`flights`); its last
-orbits are computed in these.
+As the impact speed of an orbit falls to zero, a multiplier grows as the inverse of the speed, and the steps
+along the branch shrink with the square of the speed: with the state at a section as unknown, the grazing is
+never reached. In terms of phase and speed of the impact, the branch is smooth up to and through the grazing
+(see `flights`). The last orbits of a branch are therefore computed in these variables.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from printhammer.chaos.strobe.map import state_later
 from printhammer.support.arrays import FloatArray
 
 _GENTLE: Final = 1e-2
-"""Largest distance from a grazing, in half-widths of the window, of a touch that may be at its end."""
+"""Largest distance of a touch from a grazing, in half-widths, for a branch to end in that grazing."""
 _NEAR: Final = 1e-2
-"""Largest distance, in scales of the parameter, from an orbit to the grazing in which it ends."""
+"""Largest distance, in scales of the parameter, from the last orbit to the grazing that ends the branch."""
 _STEEP: Final = 10.0
-"""Smallest multiplier of an orbit whose impact fades: no multiplier crosses the unit circle beyond it."""
+"""Smallest multiplier of an orbit close to its grazing; beyond it no multiplier crosses the unit circle."""
 _CLOSER: Final = 0.7
-"""Speed, as a fraction of that at the last attempt, at which a grazing is sought again."""
+"""Impact speed, relative to that at the last attempt, below which a grazing is sought again."""
 _ON_CURVE: Final = 1e-5
-"""Largest scaled closing error of one of the last orbits."""
+"""Largest scaled closing error of an orbit that is accepted as one of the last of a branch."""
 
 
 def grazing_end(
     family: RegimeFamily, scales: FloatArray, node: Node, *, impacts: bool = False
 ) -> tuple[list[Node], float] | None:
-    """Compute the last orbits of a branch before the grazing in which it ends, and the parameter there.
+    """Compute the last orbits of a branch before the grazing that ends it, and the parameter there.
 
-    `node` is the last known orbit; with `impacts` its turning points are ignored. None if no grazing is
-    close.
+    `node` is the last known orbit; with `impacts`, its turning points are ignored. None if the orbit is not
+    close to a grazing.
     """
     regime, width = family.regime.with_(family.name, node.parameter), float(scales[-1])
     every = near_touches(regime, node.state, family.firings, family.tolerance)
@@ -64,7 +64,7 @@ def _orbits(
     node: Node,
     way: list[tuple[float, float, float]],
 ) -> list[Node] | None:
-    """Convert orbits, as phase and speed of an impact and parameter, to nodes behind another node."""
+    """Convert orbits, given by phase and speed of an impact and parameter, to nodes that follow a node."""
     nodes = [node]
     place = family.regime.hammer.position
     for phase, speed, value in way:
@@ -89,9 +89,9 @@ def _orbits(
 
 
 def fades(family: RegimeFamily, scales: FloatArray) -> Callable[[Node, Node], bool]:
-    """Create the predicate of two successive nodes: whether an impact between them fades toward a grazing.
+    """Build the test of two successive nodes: whether an impact slows down toward a grazing.
 
-    A grazing is located only where the speed of the impact has fallen well below that at the last attempt.
+    A grazing is located only if the impact speed has fallen well below the speed at the last attempt.
     """
     tried = math.inf
 

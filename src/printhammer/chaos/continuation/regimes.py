@@ -1,9 +1,9 @@
 """Map of printing regimes: all periodic orbits of a hammer, followed along the rate.
 
-At several rates stable and unstable orbits are searched for; each orbit that lies on no known branch is
+Stable and unstable orbits are searched for at several rates; each orbit that lies on no known branch is
 followed in both directions. Period doublings and crossings lead to further branches. An island, an orbit that
 exists only between two folds and is joined to no other branch, is a closed loop. Islands that contain none of
-the rates are missed.
+these rates are missed.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.orbit import Orbit
 
 SEEDS: Final = 6
-"""Default number of rates at which orbits are searched for."""
+"""Default number of rates at which periodic orbits are searched for."""
 
 _TOGETHER: Final = 4
 """Number of branches followed in parallel; fixed, so that the result does not depend on threads."""
 _SAME: Final = 1e-4
-"""Distance, in half-widths of the window, within which an orbit lies on a branch."""
+"""Distance, in half-widths of the strobe window, within which an orbit lies on a branch."""
 
 
 class Branches(Result):
@@ -88,7 +88,7 @@ class Branches(Result):
 
     @property
     def message(self) -> str:
-        """Summary of the branches in one line."""
+        """Summary of the number, periods and failures of the branches, in one line."""
         if not self.found:
             return "; ".join(("no branch was found", *self.refused))
         counts = Counter(branch.firings for branch in self.found)
@@ -105,7 +105,7 @@ class Branches(Result):
         return self.found[0].provenance if self.found else super().provenance
 
     def notes(self) -> dict[str, Any]:
-        """Return descriptions and reasons for stopping of the branches, for the attributes of the Dataset."""
+        """Return messages and stable ranges of the branches, for the attributes of the Dataset."""
         first = self.found[0] if self.found else None
         names = ("parameter", "bounds", "phase")
         ends = {f"branch_{i}": branch.message for i, branch in enumerate(self.found)}
@@ -113,11 +113,11 @@ class Branches(Result):
         return {**{name: getattr(first, name, None) for name in names}, **ends, "stable_ranges": stable}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the branches over `branch`, padded with NaN or -1."""
+        """Return the Dataset variables of all branches over `branch`, padded with NaN or -1."""
         return stacked(self.found, "branch", Branch)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Convert the branches to a table with a row for each branch, orbit and firing."""
+        """Convert the branches to a table with one row per branch, orbit and firing."""
         return branches_table(self.found, self.attributes)
 
 
@@ -154,7 +154,7 @@ def regimes(
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime of it, whose rate is ignored.
+        The hammer, or a regime, whose rate is ignored.
     rates : tuple
         Least and largest rate, Hz or text with a unit.
     longest : int, optional
@@ -162,7 +162,7 @@ def regimes(
     seeds : int, optional
         Number of rates, evenly spaced inside the range, at which orbits are searched for.
     doublings : int, optional
-        Number of generations of branches that are followed from period doublings and crossings.
+        Number of generations of new branches to follow, from period doublings and crossings.
     waveform, overlap
         For a hammer: as for `printhammer.Regime.of`.
     most
@@ -171,14 +171,15 @@ def regimes(
     Returns
     -------
     Branches
-        With a sentence for each rate without orbits and each orbit that could not be followed.
+        Branches found, with a sentence for each rate without orbits and each orbit that could not be
+        followed.
 
     Raises
     ------
     InputError
         An argument is not as described above.
     InterruptedBranches
-        At an interrupt (Ctrl-C), with the branches finished by then.
+        The search was interrupted (Ctrl-C); carries the branches finished by then.
     """
     try:
         low, high = (read_positive(rate, "Hz", "rates") for rate in rates)
@@ -214,7 +215,7 @@ def follow_doublings(
     Raises
     ------
     InterruptedBranches
-        At an interrupt (Ctrl-C), with the branches finished by then.
+        The search was interrupted (Ctrl-C); carries the branches finished by then.
     """
     steps = Steps(most=most, precision=PRECISION)
     collected = _Collected(branch.bounds, steps, Effort(branch.tolerance, threads))
@@ -226,7 +227,7 @@ def follow_doublings(
 
 
 class _Collected:
-    """Branches found so far."""
+    """Collection of the branches found so far in a search, and methods that extend it."""
 
     def __init__(self, bounds: tuple[float, float], steps: Steps, effort: Effort) -> None:
         self.bounds, self.steps, self.effort = bounds, steps, effort
@@ -235,19 +236,19 @@ class _Collected:
         self.done: set[tuple[int, int]] = set()
 
     def result(self) -> Branches:
-        """Return all branches, shorter periods first."""
+        """Return all branches collected, shorter periods first."""
         return Branches(tuple(sorted(self.found, key=lambda branch: branch.firings)), tuple(self.refused))
 
     @contextmanager
     def kept_at_interrupt(self) -> Iterator[None]:
-        """Raise `InterruptedBranches` with the branches found so far if the block is interrupted."""
+        """Context that raises `InterruptedBranches` with the branches found so far if it is interrupted."""
         try:
             yield
         except KeyboardInterrupt:
             raise InterruptedBranches(self.result()) from None
 
     def add(self, orbits: list[Orbit]) -> None:
-        """Follow the orbits that lie on no branch yet."""
+        """Follow the branch through each orbit that does not lie on a known branch."""
         left = list(orbits)
         while left:
             left = [orbit for orbit in left if not self.is_known(orbit)]
@@ -259,7 +260,7 @@ class _Collected:
                     self.found.append(branch)
 
     def followed(self, orbit: Orbit) -> Branch | str:
-        """Follow the branch through an orbit; return the branch, or the reason for a failure."""
+        """Follow the branch through an orbit; return the branch, or the reason why that failed."""
         bounds = read_bounds(orbit.regime, RATE, self.bounds)
         tracer = Tracer(orbit.regime, RATE, bounds, self.effort.alone)
         try:
@@ -268,19 +269,19 @@ class _Collected:
             return f"{orbit.name} at {orbit.regime.rate:.9g} Hz: {error}"
 
     def is_known(self, orbit: Orbit) -> bool:
-        """Whether an orbit lies on a known branch."""
+        """Whether an orbit lies on a branch already found."""
         alike = [branch for branch in self.found if branch.firings == orbit.firings]
         return any(_is_on(branch, orbit) for branch in alike)
 
     @staticmethod
     def switch_of(branch: Branch, event: BranchEvent) -> Callable[..., Branch] | None:
-        """Select the method that follows another branch from an event, or None where no branch begins."""
+        """Return the method that follows another branch from an event; None if no branch begins there."""
         if event.kind == "period doubling":
             return branch.doubled
         return branch.crossing if event.kind in CROSSINGS else None
 
     def switch(self, level: int) -> None:
-        """Follow the branches that begin at period doublings and crossings of all branches so far."""
+        """Follow the branches that begin at period doublings and crossings of the branches found so far."""
         for number, branch in enumerate(list(self.found)):
             for place, event in enumerate(branch.events):
                 follow = self.switch_of(branch, event)
@@ -301,7 +302,7 @@ class _Collected:
 
 
 def _state_at(orbit: Orbit, phase: float) -> FloatArray:
-    """Return the state of an orbit at another phase of the period."""
+    """Return the state of an orbit, (m, m/s), at a section of another phase."""
     if phase == orbit.phase:
         return orbit.section
     motion = orbit.motion()
@@ -310,7 +311,7 @@ def _state_at(orbit: Orbit, phase: float) -> FloatArray:
 
 
 def _has_end_at(branch: Branch, value: float, state: FloatArray) -> bool:
-    """Whether a branch ends in a period doubling there."""
+    """Whether a branch ends in a period doubling at a given parameter value and state."""
     scales = np.append(branch.regime.window.half_widths, (branch.bounds[1] - branch.bounds[0]))
     place = np.append(state, value)
     return any(
@@ -321,12 +322,12 @@ def _has_end_at(branch: Branch, value: float, state: FloatArray) -> bool:
 
 
 def _is_on(branch: Branch, orbit: Orbit) -> bool:
-    """Whether an orbit lies on a branch."""
+    """Whether an orbit lies on a branch, at the section of any of its segments."""
     return any(_is_at_section(branch, orbit, float(phase)) for phase in np.unique(branch.phases))
 
 
 def _is_at_section(branch: Branch, orbit: Orbit, phase: float) -> bool:
-    """Whether an orbit lies on the segments of a branch at a section of this phase."""
+    """Whether an orbit lies on those segments of a branch whose section has a given phase."""
     value, state = orbit.regime.value(branch.parameter), _state_at(orbit, phase)
     half_widths = branch.regime.window.half_widths
     values = branch.values

@@ -1,4 +1,4 @@
-"""Branch tracing: continuation of periodic orbits across changes of section; properties of the orbits."""
+"""Branch tracing: continuation of periodic orbits across changes of section, and orbit properties."""
 
 from __future__ import annotations
 
@@ -35,27 +35,27 @@ PRECISION: Final = 1e-10
 """Scaled correction of Newton's method below which an orbit has converged; see `arclength`."""
 
 _PARTS: Final = 5.0
-"""Ratio of the range of the parameter to its scale; the scales of the state are half-widths."""
+"""Ratio of the parameter range to the scale of the parameter; the state is scaled by half-widths."""
 _LOST: Final = ("lost", "jump", "no value")
 GRAZING: Final = "grazing"
 _AT_GRAZING: Final = "it grazes the rigid backstop, where the strobe map has no derivative"
 _SHORTER: Final = 1e-6
-"""Scaled closing error after a fraction of the firings, below which an orbit has that shorter period."""
+"""Scaled closing error after a fraction of the firings, below which an orbit has the shorter period."""
 _DIGITS: Final = ".9g"
 _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different sections
 _SAME_PHASE: Final = 1e-3
-"""Phases of sections, as fractions of the period, within this distance are the same."""
+"""Difference of two section phases, as a fraction of the period, below which they are the same."""
 _CLEAR: Final = 1e-3
-"""Scaled distance from a lost end beyond which an impact at the section does not disturb derivatives."""
+"""Scaled distance from a lost end within which orbits are removed: an impact nears their section."""
 _LEAST_CHORD: Final = 1e-5
-"""Smallest scaled distance of two orbits whose chord defines the direction of a branch."""
+"""Smallest scaled distance of two orbits whose chord defines the direction of the branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
 
 
 def read_bounds(
     regime: Regime, parameter: str, bounds: tuple[float | str, float | str]
 ) -> tuple[float, float]:
-    """Parse the ends of a range of a parameter, SI; InputError unless they are two ascending numbers."""
+    """Parse the bounds of a parameter, SI; InputError unless they are two ascending numbers."""
     unit = regime.quantity(parameter).si
     try:
         low, high = bounds
@@ -69,7 +69,7 @@ def read_bounds(
 
 @dataclass
 class Tracer:
-    """Tracer of all branches in one parameter of one regime."""
+    """Tracer of the branches of one regime in one parameter."""
 
     regime: Regime
     parameter: str
@@ -81,13 +81,13 @@ class Tracer:
         self.scales = np.append(self.regime.window.half_widths, part)
 
     def family(self, firings: int) -> RegimeFamily:
-        """Return the strobe map over a number of firings."""
+        """Return the strobe map over a number of firings, as a function of state and parameter."""
         return RegimeFamily(self.regime, self.parameter, firings, self.effort.tolerance)
 
     def branch(
         self, state: FloatArray, firings: int, steps: Steps, progress: Progress | None = None
     ) -> Branch:
-        """Trace the branch through an orbit."""
+        """Trace the branch through an orbit, in both directions."""
         family = self.family(firings)
         curve = follow(
             family,
@@ -109,9 +109,9 @@ class Tracer:
     ) -> tuple[list[tuple[RegimeFamily, list[Node]]], Stop]:
         """Continue a branch past a section change; return the new segments and the reason for stopping.
 
-        A branch is lost where an impact meets its section. Each segment begins or ends with the last orbit of
-        the segment before it, at the phase where that is farthest from its contacts. Orbits too close to the
-        end are removed from `nodes`.
+        A branch is lost where an impact meets its section. Each new segment starts with the last orbit of the
+        preceding segment, at the phase at which this orbit is farthest from its contacts. Orbits too close to
+        the lost end are removed from `nodes`.
         """
         pieces: list[tuple[RegimeFamily, list[Node]]] = []
         while stop.reason in _LOST and len(pieces) < _MOST_SECTIONS and len(nodes) > 1:
@@ -152,7 +152,7 @@ class Tracer:
         return pieces, stop
 
     def before_end(self, nodes: list[Node]) -> list[Node]:
-        """Remove the orbits so near the end of a branch that the impact there spoils their derivatives."""
+        """Remove the orbits so close to a lost end that an impact at the section spoils derivatives."""
         places = np.array([np.append(node.state, node.parameter) for node in nodes]) / self.scales
         away = np.linalg.norm(places - places[0], axis=1) > _CLEAR
         return nodes[min(int(np.argmax(away)) if away.any() else 0, len(nodes) - 2) :]
@@ -160,11 +160,12 @@ class Tracer:
     def way_at(
         self, family: RegimeFamily, nodes: list[Node], quiet: tuple[Regime, FloatArray]
     ) -> FloatArray | None:
-        """Compute the direction, in scaled variables, in which a branch continues at another section.
+        """Compute the scaled direction in which a branch continues at a section of another phase.
 
-        `nodes` begin with the last orbit, which is at the state `quiet` there. The direction is that of the
-        chord from an earlier orbit: a contact on the section leaves no derivative there, and at a fold the
-        sign of the parameter is ambiguous. None if no orbit is far enough away, or if a run ends early.
+        The first of the `nodes` is the last orbit; `quiet` is the regime at the new phase and the state of
+        this orbit there. The direction is that of the chord from an earlier orbit, since the tangent is
+        useless: a contact at the section has no derivative, and at a fold the sign of the parameter is
+        ambiguous. None if no orbit is far enough away, or if a run ends early.
         """
         last = nodes[0]
         end = np.append(quiet[1], last.parameter) / self.scales
@@ -180,12 +181,12 @@ class Tracer:
         return None
 
     def at_phase(self, phase: float) -> Tracer:
-        """Return a copy at another section."""
+        """Return the tracer with its section at another phase."""
         same = phase == self.regime.phase
         return self if same else replace(self, regime=replace(self.regime, phase=phase))
 
     def grazed(self, family: RegimeFamily, curve: Curve) -> Curve:
-        """Continue a curve that ends near a grazing of a rigid backstop up to the grazing."""
+        """Extend a curve that ends near a grazing of a rigid backstop up to the grazing."""
         if not has_rigid_backstop(self.regime):
             return curve
         nodes, stops = curve.nodes, list(curve.stops)
@@ -204,14 +205,14 @@ class Tracer:
         return Curve(nodes, (stops[0], stops[1]))
 
     def followed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Return the branch that begins at a period doubling, or crosses at a branch point."""
+        """Follow the branch that is born at a period doubling, or that crosses at a branch point."""
         if event.phase != self.regime.phase:
             return self.at_phase(event.phase).followed(firings, event, most, threads)
         way = self.doubled if event.kind == "period doubling" else self.crossed
         return way(firings, event, most, threads)
 
     def crossed(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Return the branch that crosses the branch of an orbit with `firings` firings, at an event."""
+        """Follow the branch that crosses the branch of orbits of `firings` firings at an event."""
         family, steps = self.family(firings), Steps(most=most, precision=PRECISION)
         curve = follow_crossing(
             family,
@@ -225,7 +226,7 @@ class Tracer:
         return self.described([(family, curve.nodes)], curve.stops, steps, threads)
 
     def doubled(self, firings: int, event: BranchEvent, most: int, threads: int | None) -> Branch:
-        """Follow the branch born at a period doubling of an orbit of `firings` firings."""
+        """Follow the branch born at a period doubling of orbits of `firings` firings."""
         family = self.family(2 * firings)
         steps = Steps(most=most, precision=PRECISION)
         curve = follow_doubled(
@@ -249,7 +250,7 @@ class Tracer:
         return self.described([(family, nodes)], (born, curve.stops[1]), steps, threads)
 
     def at(self, value: float, state: FloatArray, firings: int) -> FloatArray | None:
-        """Find the orbit near a state at one value of the parameter; None if not found."""
+        """Find the orbit near a state at a given value of the parameter; return its state, or None."""
         follower = Corrector(self.family(firings), self.scales, PRECISION)
         node = follower.at_parameter(follower.scaled(state, value))
         return None if node is None else np.asarray(node.state)
@@ -259,7 +260,7 @@ class Tracer:
         return f"{self.parameter} = {value:{_DIGITS}} {self.regime.quantity(self.parameter).si}"
 
     def watch(self, firings: int, steps: Steps, effort: Effort) -> Any:
-        """Build the callback that decides between two nodes whether the branch ends there."""
+        """Build the callback that decides, between two nodes, whether the branch ends."""
         half, whole = None, self.family(firings)
         if firings % 2 == 0:
             half = Corrector(self.family(firings // 2), self.scales, steps.precision)
@@ -295,10 +296,9 @@ class Tracer:
         return end is not None and bool(np.abs((end - node.state) / self.scales[:2]).max() < _SHORTER)
 
     def merged(self, shorter: list[RegimeFamily], here: Node, ahead: Node) -> Stop:
-        """Return the stop of a branch that has gone over to an orbit of fewer firings.
+        """Return the stop of a branch that has jumped to an orbit of fewer firings.
 
-        Near a period doubling the curves of both orbits lie so close that a step may lead from one to the
-        other.
+        Near a period doubling, the curves of both periods are so close that a step may jump between them.
         """
         longest = max(shorter, key=lambda part: part.firings)
         half = Corrector(longest, self.scales, PRECISION)
@@ -319,7 +319,7 @@ class Tracer:
         steps: Steps,
         threads: int | None,
     ) -> Branch:
-        """Build the branch, with the properties of all orbits, from segments at their own sections."""
+        """Build the branch and the properties of its orbits from segments at sections of their own."""
         family = pieces[0][0]
         # A segment begins with the last orbit of the segment before it.
         owned = [
@@ -393,7 +393,7 @@ class Tracer:
         )
 
     def symmetry_of(self, family: RegimeFamily, node: Node) -> str:
-        """Return whether an orbit is its own mirror image; "" where the device has no such symmetry."""
+        """Return whether an orbit is its own mirror image: "symmetric", "asymmetric", or ""."""
         regime = family.regime.with_(self.parameter, node.parameter)
         image = mirror_image(regime, node.state, self.effort.tolerance)
         if image is None or not np.isfinite(image).all():

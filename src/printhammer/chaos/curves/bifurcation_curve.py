@@ -1,8 +1,8 @@
 """Bifurcation curves in the plane of two parameters, from an event of a branch or a saved curve.
 
-`BifurcationCurve` holds the points at which an orbit bifurcates, and the points of codimension two.
+A `BifurcationCurve` consists of the points at which an orbit bifurcates, with the points of codimension two.
 
-`settled_plane` computes the periods of trains from rest over the plane, as an ensemble.
+`settled_plane` computes the periods of trains from rest on a grid of the plane, as an ensemble.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ if TYPE_CHECKING:
     from printhammer.chaos.curves.systems import Place
 
 SAME: Final = 1e-3
-"""Distance of a multiplier from the unit circle within which it counts as on it."""
+"""Distance of a multiplier from the unit circle within which it counts as lying on the circle."""
 
 
 class BifurcationCurve(Result, rows="point"):
-    """A curve in the plane of two parameters on which a periodic orbit bifurcates.
+    """Curve in the plane of two parameters on which a periodic orbit bifurcates.
 
-    Every array has a row for each point, in order along the curve.
+    Every array has one row per point, in order along the curve.
     """
 
     regime: Regime = part("hammer and periodic drive at the start")
@@ -128,7 +128,7 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
     def limits(self) -> BoolArray:
-        """Mask of the points where stability is lost, the other multiplier in the unit circle, (N,)."""
+        """Mask of the points where stability is lost, the other multiplier inside the circle, (N,)."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)
@@ -174,7 +174,7 @@ class BifurcationCurve(Result, rows="point"):
         )
 
     def at(self, name: str, value: float | str) -> list[tuple[float, float]]:
-        """Find both parameters where the curve passes a value of one of them.
+        """Find all points of the curve at which one of the two parameters has a given value.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class BifurcationCurve(Result, rows="point"):
         }
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the points over `point`, and trains from rest over `value` and `main`."""
+        """Return the Dataset variables: curve over `point`, trains from rest over `value` and `main`."""
         own = super().entries()
         for k, (name, axis) in enumerate((("first", "main"), ("second", "value"))):
             own[name] = Column(self.units[k], self.names[k], ("point",), name=name), getattr(self, name)
@@ -222,7 +222,7 @@ class BifurcationCurve(Result, rows="point"):
 
 
 GRID_TOLERANCE: Final = 1e-9
-"""Tolerance of the trains from rest."""
+"""Integration tolerance of the trains from rest on the grid of both parameters."""
 
 _FIRINGS: Final = 300  # Number of firings of a train from rest
 _JUDGED: Final = 64  # Number of last firings that are classified
@@ -237,8 +237,8 @@ def settled_plane(
 ) -> tuple[tuple[FloatArray, FloatArray], IntArray]:
     """Compute the periods, in firings, of trains from rest over a grid of both parameters.
 
-    Returns the values of the first parameter, (m,), of the second, (n,), and the periods, (n, m): 0 without a
-    period, -1 where the run ended early. InputError if the numbers of values are negative.
+    The result contains the values of the first parameter, (m,), of the second, (n,), and the periods, (n, m):
+    0 without a period, -1 if the run ended early. InputError if a number of values is negative.
     """
     if min(grid) < 0:
         raise InputError.of("grid", grid, "two numbers of values, not negative")
@@ -258,13 +258,13 @@ def settled_plane(
 
 
 def _period(states: States, train: Train) -> int:
-    """Return the period of a train in firings, 0 if unknown."""
+    """Return the period to which a train settles, in firings; 0 if unknown."""
     ends_at = states.settled(train, states.distances(train))
     return 0 if ends_at is None or ends_at.period is None else ends_at.period
 
 
 MOST: Final = 200
-"""Default maximum number of steps of a curve in each direction."""
+"""Default maximum number of continuation steps of a curve in each direction."""
 
 
 def bifurcation_curve(
@@ -284,23 +284,25 @@ def bifurcation_curve(
     Parameters
     ----------
     source : Branch, Reopened or path
-        A branch from `printhammer.continuation`, or a file. Of a file with several branches the first is
-        used; a curve in a file is followed anew from one of its points. The parameter of the source is the
+        A branch from `printhammer.continuation`, or a file with branches or a curve. The first branch of a
+        file is used; a curve is followed anew from one of its points. The parameter of the source is the
         first parameter.
     second : str
-        The second parameter, such as "backstop.damping" or "waveform.amplitude".
+        Name of the second parameter, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
-        Its least and largest value, SI or text with a unit.
+        Least and largest value of the second parameter, SI or text with a unit.
     event : BranchEvent, int or str, optional
-        Start of the curve: an event of the branch, or its index, from 0 on; a kind, for its first event; or
-        "first" or "last", for a branch that ends in a grazing. By default the first event that can be
-        followed. For a curve in a file the index of a point, "first" or "last".
+        Start of the curve: an event object of the branch; the index of an event, from 0; a kind of event, for
+        the first event of that kind; or "first" or "last", for the grazing at that end of the branch. By
+        default the first event that can be followed. For a curve in a file: the index of a point, "first" or
+        "last".
     regime : Regime, optional
-        For a file: the hammer and how it is fired.
+        For a file: the regime, which is not stored there (hammer and periodic drive).
     first : tuple, optional
         Least and largest value of the first parameter, by default those of the branch.
     grid : tuple of int, optional
-        Numbers of values of the two parameters at which trains from rest are classified (default: none).
+        Numbers of values of the two parameters at which the periods of trains from rest are computed
+        (default: none).
     most : int, optional
         Maximum number of steps in each direction.
     threads : int, optional
@@ -309,8 +311,8 @@ def bifurcation_curve(
     Returns
     -------
     BifurcationCurve
-        Every point is converged by Newton's method to a correction of 1e-12 of the scales, or to the noise of
-        the map where that is larger.
+        Curve whose points are converged by Newton's method to a scaled correction of 1e-12, or to the noise
+        of the map if that is larger.
     """
     start = start_of(source, event, regime)
     unit = start.regime.quantity(start.first).si

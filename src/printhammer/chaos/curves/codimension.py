@@ -11,10 +11,10 @@
 | resonant grazing | grazing, fold, doubling | the element 12 of A^n |
 | degenerate grazing | grazing | the acceleration at the touch |
 
-At a resonant grazing of a rigid backstop, A the derivative of the strobe map without the touch, the square
-root of n passages has no effect on the trace (A. P. Ivanov, J. Sound Vib. 162 (1993) 562; J. Molenaar, J. G.
-de Weger and W. van de Water, Nonlinearity 14 (2001) 301). There folds and doublings of the orbits with one
-touch in n periods begin.
+A is the derivative of the strobe map without the touch. At a resonant grazing of a rigid backstop, the
+square-root term of the map over n passages has no effect on the trace (A. P. Ivanov, J. Sound Vib. 162 (1993)
+562; J. Molenaar, J. G. de Weger and W. van de Water, Nonlinearity 14 (2001) 301). At these points, folds and
+doublings of the orbits with one touch in n periods begin.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from printhammer.chaos.curves.systems import Place, Plane
 
 RESONANCES: Final = 3
-"""Largest number of passages of a grazing orbit that is tested for a resonance."""
+"""Largest number of passages for which a grazing orbit is tested for a resonance."""
 
 _LEVEL: Final = 1e-3
-"""Component of a unit tangent below which a curve is stationary in a parameter."""
+"""Component of a unit tangent along a parameter below which a curve is stationary in this parameter."""
 _VANISHES: Final = 0.1
-"""Component of a tangent, relative to its neighbours, below which it vanishes at a cusp."""
+"""Tangent component at a cusp, relative to the components at neighbouring nodes, that counts as zero."""
 _ROUNDS: Final = 20  # Iteration limit of Newton's method
 _MOVE: Final = 1e-6  # Finite-difference step of Newton's method, in scaled variables
 _PRECISION: Final = 1e-11  # Scaled residual below which Newton's method has converged
@@ -51,7 +51,7 @@ _NOISE: Final = 1e-8  # Magnitude below which a test function or a tangent compo
 
 
 class CodimensionTwo(Declared):
-    """A point of codimension two on a bifurcation curve."""
+    """Point of codimension two on a bifurcation curve, at which two degeneracies coincide."""
 
     kind: str = part(
         'such as "cusp", "fold-flip" or "kind, such as "cusp", "fold-flip" or "resonant grazing""'
@@ -66,7 +66,7 @@ class CodimensionTwo(Declared):
 
     @property
     def message(self) -> str:
-        """Short description of the event."""
+        """Kind of the point in a few words, with the number of passages of a resonant grazing."""
         return f"{self.kind} of {self.passages} passages" if self.passages > 1 else self.kind
 
 
@@ -135,7 +135,7 @@ def points_along(
     """Locate the points of codimension two on a curve, in order.
 
     `coefficients` are the normal-form coefficients of a period doubling at the nodes; `coefficient` computes
-    one.
+    the coefficient at any further point.
     """
     points: list[CodimensionTwo] = []
     tests = _tests(kind, rigid)
@@ -172,8 +172,8 @@ def points_along(
 def _is_stationary(node: Node, here: Node, ahead: Node) -> bool:
     """Whether a curve is stationary in both parameters at a node between two others.
 
-    Each component of the tangent is compared with its value beside the node, since a parameter with a wide
-    range has small components everywhere.
+    Each component of the tangent is compared with its values at the neighbouring nodes, since the component
+    of a parameter with a wide range is small everywhere.
     """
     components = np.abs([each.tangent[-2:] for each in (node, here, ahead)])
     beside = np.maximum(_VANISHES * components[1:].max(axis=0), _NOISE)
@@ -193,7 +193,7 @@ def meeting(
     plane : Plane
         Plane of the two parameters, with the period of the grazing orbit in firings.
     surface : str
-        Surface that is touched.
+        Surface that the orbit grazes: "pack" or "backstop".
     guess : array, shape (3,)
         Initial guess: phase of the touch, first and second parameter.
     test : callable
@@ -236,5 +236,5 @@ def _missed(
 
 
 def resonance_test(passages: int) -> Callable[[FloatArray], float]:
-    """Return the test function of a resonant grazing of a number of passages."""
+    """Return the test function of a resonant grazing: element 12 of the derivative's n-th power."""
     return lambda jacobian: float(np.linalg.matrix_power(jacobian, passages)[0, 1])

@@ -1,18 +1,18 @@
-"""Effect of a bifurcation on the neighbouring orbits: coefficients of normal forms.
+"""Effect of a bifurcation on neighbouring orbits: coefficients of normal forms.
 
 *Period doubling.* With A = J, A q = -q, p A = -p, p . q = 1, and the second and third derivatives B and C of
 the strobe map
 
     c = p . (C(q, q, q) + 3 B(q, (I - A)^-1 B(q, q))) / 6
 
-(Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer 2004, equation 5.35). With c > 0 it is
-supercritical: the orbits of twice the period are stable where the single one is not. B and C are differences
-of J along q, in half-widths of the window.
+(Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer 2004, equation 5.35). If c > 0 the
+doubling is supercritical: the orbits of twice the period are stable where the orbit of the single period is
+not. B and C are differences of J along q, in half-widths of the strobe window.
 
 *Grazing of a rigid backstop.* A touch of depth h adds the velocity (1 + e) sqrt(2 a h), with the acceleration
 a at the touch, so that the strobe map has a square root (A. B. Nordmark, J. Sound Vib. 145 (1991) 279). To
-first order the touching orbits lie where the square root of the depth is positive, and those without the
-touch where they stay off the surface.
+first order, orbits with the touch exist where the square root of the depth is positive, and orbits without
+the touch where they stay off the surface.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
     from printhammer.chaos.curves.systems import Place, Plane
 
 MOST_PERIODS: Final = 4
-"""Largest number of passages of a grazing for which an orbit with one touch is tested."""
+"""Largest number of periods per touch for which the orbits at a grazing are tested."""
 
 _SPACINGS: Final = (2e-3, 2e-4, 5e-5)  # Finite-difference steps tried, the largest first, in half-widths
 _AGREE: Final = 0.05
-"""Relative difference of coefficients from a spacing and from half of it, within which they are accepted."""
+"""Relative difference of coefficients at a step and at half the step, below which they are accepted."""
 _DOUBLES: Final = 1e-4
-"""Distance of a multiplier from -1 within which the doubling is accurate enough."""
+"""Largest distance of a multiplier from -1 at which a doubling is located well enough for its coefficient."""
 _FEW: Final = 1e-9  # Relative magnitude below which a denominator is singular
 
 
 def doubling_coefficient(plane: Plane, place: Place) -> float:
-    """Compute c of an orbit that doubles its period; NaN if finite differences are inconclusive."""
+    """Compute the coefficient c of a period doubling; NaN if the finite differences are inconclusive."""
     regime = replace(plane.at(place.first, place.second), phase=place.phase)
     quiet = quiet_section(regime, place.state, plane.firings, plane.tolerance)
     if quiet is None:
@@ -97,12 +97,12 @@ def root_coefficient(plane: Plane, place: Place) -> float:
 
 
 def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
-    """Determine the sides of a grazing of a rigid backstop, in the first parameter, on which orbits exist.
+    """Determine on which sides of a grazing, in the first parameter, orbits with and without the touch exist.
 
     Returns
     -------
     tuple of int
-        Side of the orbit without the touch, then of the orbits with one touch in 1, 2, 3 and 4 of its
+        Side on which the orbit without the touch exists, then the orbits with one touch in 1, 2, 3 and 4
         periods: 1 for larger values of the parameter, -1 for smaller values, 0 for neither side.
     """
     matrix, root = place.jacobian, root_coefficient(plane, place)
@@ -115,9 +115,11 @@ def grazing_sides(plane: Plane, place: Place) -> tuple[int, ...]:
 
 
 def _touching_side(matrix: FloatArray, slope: FloatArray, kick: FloatArray, periods: int) -> int:
-    """Determine the side on which an orbit with one touch in `periods` periods exists.
+    """Determine the side on which an orbit with one touch in `periods` periods exists: 1, -1 or 0.
 
-    In units of the square root of the depth, u_0 = (0, v) and the shift of the parameter solve
+    In units of the square root of the depth, a touch adds the kick k. The state before the kick, u_0 = (0,
+    v), and the shift m of the parameter solve A^n (u_0 + k) + (I + A + ... + A^(n-1)) s m = u_0, with s the
+    slope of the map in the parameter. Between touches the orbit has to stay off the surface.
     """
     power = np.linalg.matrix_power(matrix, periods)
     summed = sum((np.linalg.matrix_power(matrix, k) for k in range(periods)), np.zeros((2, 2))) @ slope

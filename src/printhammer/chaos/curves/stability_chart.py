@@ -1,11 +1,12 @@
-"""Stability chart: the region of two parameters where an orbit is stable, and its boundaries.
+"""Stability chart: the region of two parameters in which an orbit is stable, with its boundaries.
 
-An orbit loses its stability at a fold, a period doubling or a Neimark-Sacker point, each a curve in the plane
-(`printhammer.chaos.curves.systems`). The chart also shows, on a grid, the periods that trains from rest
+An orbit loses its stability at folds, period doublings or Neimark-Sacker points, which form curves in the
+plane (`printhammer.chaos.curves.systems`). The chart also shows, on a grid, the periods that trains from rest
 settle to; a stable orbit need not be reached from rest.
 
-Curves start where the branch in the first parameter meets a stability limit, and where branches along the
-second parameter, from orbits of the former, do. A closed curve that none of these branches meets is missed.
+The curves start at the stability limits of a branch in the first parameter, and of branches in the second
+parameter that start from orbits of the first branch. A closed curve that none of these branches meets is
+missed.
 """
 
 from __future__ import annotations
@@ -48,11 +49,11 @@ GRID: Final = (48, 32)
 """Default numbers of values of the two parameters at which trains from rest are classified."""
 
 _ACROSS: Final = (0.02, 0.98)
-"""Fractions of the range of the first parameter at which branches in the second parameter start."""
+"""Positions in the range of the first parameter, as fractions, at which branches in the second one start."""
 
 
 class StabilityChart(Result):
-    """Region in the plane of two parameters where an orbit is stable, and its boundaries."""
+    """Stability chart: curves that bound the stable region of an orbit, and periods of trains from rest."""
 
     regime: Regime = part("hammer and periodic drive of the branch it came from")
     names: tuple[str, str] = scalar("", "the two constants")
@@ -77,7 +78,7 @@ class StabilityChart(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the chart, with the period of the orbit and the name of the hammer."""
         return f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
 
     def summary(self) -> Summary:
@@ -87,7 +88,7 @@ class StabilityChart(Result):
     @property
     @derived("", "what was found")
     def message(self) -> str:
-        """Summary of the chart in one line."""
+        """Summary in one line: number of curves by kind, and where trains from rest settle."""
         kinds = [curve.kind for curve in self.curves]
         counts = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
         share = float(np.mean(self.settled == self.firings)) if self.settled.size else 0.0
@@ -115,7 +116,7 @@ class StabilityChart(Result):
         )
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return trains from rest over `value` and `main`, curves over `curve` and `point`."""
+        """Return the Dataset variables: trains from rest over `value` and `main`, curves over `curve`."""
         # At least one of each: a dimension of length 0 has another meaning in the classic NetCDF format.
         most, count = max((len(curve.first) for curve in self.curves), default=1), max(len(self.curves), 1)
         table = np.full((2, count, most), np.nan)
@@ -155,26 +156,28 @@ def stability_chart(
     Parameters
     ----------
     branch : Branch, Regime or Hammer
-        Branch from `printhammer.continuation`, usually along the rate; its parameter is the first parameter,
-        in its bounds. For a regime, or a hammer with the keywords `firing`, the branch along `first` is
-        computed.
+        Branch from `printhammer.continuation`, usually along the rate; its parameter and bounds are the first
+        parameter and its range. For a regime, or a hammer with the keywords `firing`, the branch along
+        `first` is computed.
     second : str
-        The second parameter, such as "backstop.damping" or "waveform.amplitude".
+        Name of the second parameter, such as "backstop.damping" or "waveform.amplitude".
     bounds : tuple
         Least and largest value of the second parameter, SI or text with a unit.
     first : tuple, optional
-        For a regime or hammer: the first parameter, its least and its largest value.
+        For a regime or hammer: name, least and largest value of the first parameter.
     grid : tuple of int, optional
-        Numbers of values of the two parameters at which trains from rest are classified; (0, 0) for none.
+        Numbers of values of the two parameters at which the periods of trains from rest are computed; (0, 0)
+        for none.
     most : int, optional
         Maximum number of steps of a curve in each direction.
 
     Returns
     -------
     StabilityChart
-        Curves on which the orbit of the branch loses its stability, one through each limit that lies on no
-        other curve, and the periods of trains from rest. Limits are sought along the branch, and along the
-        second parameter from two of its orbits; a curve that meets neither is missed.
+        Curves on which the orbit of the branch loses its stability, one through each stability limit that
+        lies on no other curve, and the periods of trains from rest. Limits are sought along the branch, and
+        along branches in the second parameter from two of its orbits; a curve that meets none of these
+        branches is missed.
     """
     if isinstance(branch, Branch):
         if first is not None or firing:
@@ -216,13 +219,13 @@ def stability_chart(
 
 
 def _limits(branch: Branch) -> list[BranchEvent]:
-    """List the events at which a branch loses its stability: the other multiplier is in the unit circle."""
+    """List the events at which a branch loses its stability, the other multiplier being inside the circle."""
     lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
     return [event for event in lost if event.kind in TESTS]
 
 
 class _Chart:
-    """The curves of one chart."""
+    """Curve finder of one chart: locates stability limits and traces the curves through them."""
 
     def __init__(self, branch: Branch, second: str, bounds: tuple[float, float], steps: Steps) -> None:
         self.branch, self.steps = branch, steps
@@ -231,7 +234,7 @@ class _Chart:
         self.value = branch.regime.value(second)
 
     def across(self, effort: Effort) -> list[tuple[float, list[Start]]]:
-        """Locate the limits of branches in the second parameter, at several values of the first."""
+        """Locate the stability limits of branches along the second parameter, from orbits of the branch."""
         branch, values = self.branch, self.branch.values
         low, high = float(values.min()), float(values.max())
         # A stable orbit is preferred: stability is lost at its limits.
@@ -256,11 +259,11 @@ class _Chart:
         return effort.quiet.mapped(along, list(numbers), length=1)
 
     def second(self, start: Start) -> float:
-        """Return the value of the second parameter at a start."""
+        """Return the value of the second parameter at the start of a curve."""
         return self.value if start.other is None else start.other
 
     def curves(self, starts: list[Start], effort: Effort) -> tuple[list[BifurcationCurve], list[str]]:
-        """Trace a curve through each start that lies on no earlier curve."""
+        """Trace a curve through every start that does not lie on a curve already traced."""
         curves: list[BifurcationCurve] = []
         refused: list[str] = []
         left = starts
@@ -277,7 +280,7 @@ class _Chart:
         return curves, refused
 
     def curve(self, start: Start) -> BifurcationCurve | str:
-        """Trace the curve through an event of the branch; return it, or the reason for a failure."""
+        """Trace the curve through a start; return the curve, or the reason for the failure."""
         try:
             traced = CurveTracer(self.plane, start.kind, self.steps).trace(start, self.second(start), 1)
         except InputError as error:
@@ -285,7 +288,7 @@ class _Chart:
         return curve_of(self.plane, traced, (0, 0), 1)
 
     def is_on(self, curve: BifurcationCurve, start: Start) -> bool:
-        """Whether an event of the branch lies on a curve, between two of its points."""
+        """Whether a start lies on a traced curve of the same kind, between two of its points."""
         if curve.kind != start.kind:
             return False
         second = self.second(start)

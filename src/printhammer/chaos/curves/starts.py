@@ -1,4 +1,4 @@
-"""Start of a curve: an event of a branch, in memory or in a file, or a point of a saved curve."""
+"""Start of a bifurcation curve: an event of a branch, in memory or in a file, or a saved curve's point."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _LIST: Final = ", ".join(KINDS)
 
 @dataclass(frozen=True)
 class Start:
-    """Initial guess of a bifurcation of an orbit, before Newton's method."""
+    """Start of a curve: initial guess of a bifurcation, for Newton's method."""
 
     kind: str
     regime: Regime
-    """Regime with the phase at which the state is known."""
+    """Regime, with the phase of the section at which the state was computed."""
     first: str
     """Name of the parameter along which the bifurcation was found."""
     bounds: tuple[float, float]
@@ -41,29 +41,31 @@ class Start:
     state: FloatArray
     value: float
     other: float | None = None
-    """Value of the second parameter, unless it is that of the regime."""
+    """Value of the second parameter; None for the value of the regime."""
 
 
 def start_of(
     source: Branch | Reopened | str | Path, event: BranchEvent | int | str | None, regime: Regime | None
 ) -> Start:
-    """Determine the start of a curve.
+    """Determine the start of a bifurcation curve from a branch or a saved result.
 
     Parameters
     ----------
     source : Branch, Reopened or path
         A branch, or a file with a branch, branches or a curve.
     event : BranchEvent, int or str, optional
-        An event of the branch; its index in the table of events, from 0 on; "first" or "last", for a branch
-        that ends in a grazing; or a kind, for its first event. By default the first event that can be
-        followed. For a curve the index of a point, "first" or "last"; by default the first point.
+        An event object of the branch; the index of an event in the table, from 0; "first" or "last", for the
+        grazing at that end of the branch; or a kind, for the first event of that kind. By default the first
+        event that can be followed. For a curve: the index of a point, "first" or "last"; by default the first
+        point.
     regime : Regime, optional
-        For a file: the hammer and how it is fired.
+        For a file: the regime, which is not stored there (hammer and periodic drive).
 
     Raises
     ------
     InputError
-        There is no such event, the file contains another kind of result, or it is of another hammer.
+        The event does not exist, the file contains another kind of result, or the result belongs to another
+        hammer.
     """
     if isinstance(source, Branch):
         if regime is not None:
@@ -109,7 +111,7 @@ def _of_branch(branch: Branch, event: BranchEvent | int | str | None) -> Start:
 
 
 def _number(kinds: Sequence[str], located: list[bool], event: int | str | None, whose: str) -> int:
-    """Return the index of the selected event."""
+    """Return the index of the event selected by index, kind or default; InputError if there is none."""
     known = ", ".join(dict.fromkeys(kinds)) or "none"
     if isinstance(event, int | np.integer):
         if not 0 <= event < len(kinds):

@@ -4,8 +4,8 @@ An orbit of the strobe map G with two parameters p and r loses its stability whe
 
     G(u, p, r) = u,   f(J(u, p, r)) = 0,   f = det(J - I), det(J + I) or det(J) - 1.
 
-These are the fixed points of the map (u, p) -> (G, p + f) with the parameter r: beside the state at the
-section the parameter p is unknown, and the curve is followed by `printhammer.chaos.continuation.arclength`
+These are the fixed points of the map (u, p) -> (G, p + f) with the parameter r. The unknowns are the state u
+at the section and the parameter p, and the curve is followed by `printhammer.chaos.continuation.arclength`
 (Yu. A. Kuznetsov, *Elements of Applied Bifurcation Theory*, Springer 2004, section 10.3).
 
 Grazings, and orbits with impacts on a rigid backstop, use the touch as the section.
@@ -17,16 +17,17 @@ velocity v. A touch with zero velocity is a grazing,
 
     G((b, 0); s, p, r) = (b, 0),
 
-two equations for s and p by r. An orbit that leaves a rigid backstop with the velocity v, and comes back
-after its firings with w, obeys G((b, v); s, p, r) = (b, w), v = -e w, and with the derivative M of that way
+two equations for s and p as functions of r. An orbit that leaves a rigid backstop with the velocity v, and
+returns after its firings with the velocity w, obeys G((b, v); s, p, r) = (b, w), v = -e w, and, with the
+derivative M of this map
 
     f = 0,   J = S M,   S = [[-e, 0], [(a_out + e a_in) / w, -e]],
 
-where S is the saltation matrix of the impact with the accelerations on both sides of it. A rigid backstop
-gives the strobe map of a fixed section a square root at a grazing, where S is infinite. Here all functions
-are smooth, also w f, and v may pass through 0; to that end the motion close to the touch is computed without
-the surface. The state jumps where an impact meets a fixed section; with the section at the touch this does
-not happen.
+where S is the saltation matrix of the impact with the accelerations on both sides of it. With a fixed
+section, a rigid backstop gives the strobe map a square-root singularity at a grazing, where S is infinite,
+and the state jumps where an impact meets the section. With the section at the touch, all functions including
+w f are smooth, and v may pass through 0, because the motion close to the touch is computed without the
+surface.
 """
 
 from __future__ import annotations
@@ -68,14 +69,14 @@ KINDS: Final = (*TESTS, GRAZING)
 """Kinds of bifurcation that can be followed."""
 
 SPACING: Final = 1e-6
-"""Step size of finite differences, in scales; they only steer Newton's method."""
+"""Step size of finite differences, in scales; its error only affects the convergence of Newton's method."""
 _PARTS: Final = 5.0
-"""Ratio of the range of a parameter to its scale; the scales of the state are half-widths."""
+"""Ratio of a parameter's range to its scale; the state is scaled by half-widths of the strobe window."""
 
 
 @dataclass(frozen=True)
 class Plane:
-    """Plane of two parameters, with the orbits above it."""
+    """Plane of two parameters of a regime, with ranges, orbit period and tolerance."""
 
     regime: Regime
     names: tuple[str, str]
@@ -90,18 +91,18 @@ class Plane:
         return np.array([*self.regime.window.half_widths, *widths])
 
     def at(self, first: float, second: float) -> Regime:
-        """Return the regime with these parameters; InputError if they are impossible."""
+        """Return the regime with given values of both parameters; InputError if the values are invalid."""
         return self.regime.with_(self.names[1], float(second)).with_(self.names[0], float(first))
 
 
 def check_two(first: str, second: str) -> None:
-    """Check that two parameters differ; a rate is the same parameter as its period."""
+    """Raise InputError if two parameters are the same; rate and period count as one parameter."""
     if second == first or {first, second} == {PERIOD, RATE}:
         raise InputError.of("second", second, f"another constant than that of the branch, {first}")
 
 
 class Place(Declared):
-    """A point of a curve in the plane, with the orbit there."""
+    """Point of a bifurcation curve in the plane of two parameters, with the orbit at this point."""
 
     first: float = part("value of the first constant, SI")
     second: float = part("value of the second constant, SI")
@@ -124,14 +125,14 @@ class Place(Declared):
 
 
 class MultiplierSystem:
-    """Extended map of orbits with a critical multiplier; unknowns are the state and the first parameter."""
+    """Extended map for an orbit with a critical multiplier; unknowns: the state, the first parameter."""
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind, self.test = plane, kind, TESTS[kind]
         self.scales = plane.scales
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the map of state and first parameter at a value of the second parameter."""
+        """Evaluate the extended map on (state, first parameter) at a value of the second parameter."""
         plane, scales = self.plane, self.scales
         moves = SPACING * scales
         point = np.append(whole, other)
@@ -176,15 +177,15 @@ class MultiplierSystem:
 
 
 def place_of(node: Node) -> Place:
-    """Return the point of the parameter plane that corresponds to a fixed point of an extended map."""
+    """Return the point of the parameter plane that belongs to a fixed point of an extended map."""
     place: Place = node.value.extra
     return place
 
 
 _PHASES: Final = 0.2
-"""Fraction of the period that is scaled like one half-width of the window."""
+"""Scale of the phase of a touch, as a fraction of the period."""
 _IN_TRACE: Final = {"fold": -1.0, "period doubling": 1.0, "Neimark-Sacker": 0.0}
-"""f as a function of trace and determinant of J: factor of the trace; the rest is 1 + det, or det - 1."""
+"""Coefficient of the trace of J in the test function f; the rest of f is 1 + det J, or det J - 1."""
 
 
 def _flight(
@@ -194,16 +195,17 @@ def _flight(
 
 
 class GrazingSystem:
-    """Extended map of orbits that graze a surface; unknowns are phase of the touch and first parameter."""
+    """Extended map for an orbit that grazes a surface; unknowns: phase of the touch, first parameter."""
 
     def __init__(self, plane: Plane, surface: Surface) -> None:
         self.plane, self.kind, self.surface = plane, GRAZING, surface
         self.scales = np.array([_PHASES, *plane.scales[2:]])
 
     def at(self, phase: float, first: float, second: float) -> tuple[Place, FloatArray] | str:
-        """Compute the orbit that leaves a touch, and its miss at the next touch; text if it ends early.
+        """Compute the orbit that leaves a grazing touch, and its miss at the next touch.
 
-        The miss distance is in scales of the state; InputError if the parameters are impossible.
+        The miss is the difference of both states, in scales of the state. A text with the reason is returned
+        if the run ends early; InputError if the parameters are invalid.
         """
         flight = _flight(self.plane, self.surface, phase, 0.0, first, second)
         if flight.trouble:
@@ -215,7 +217,7 @@ class GrazingSystem:
         return place, (flight.end - at) / self.plane.scales[:2]
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the map of (phase, first parameter) at a value of the second parameter."""
+        """Evaluate the extended map on (phase of the touch, first parameter) at a second parameter."""
         steps, point = SPACING * self.scales, np.append(whole, other)
         missed = []
         for phase, first, second in [point, *(point + step for step in np.diag(steps))]:
@@ -240,14 +242,14 @@ class GrazingSystem:
 
 
 class ImpactSystem:
-    """As `MultiplierSystem`, for orbits with impacts on a rigid backstop; unknowns are phase and velocity."""
+    """Extended map for a critical multiplier with rigid impacts; unknowns include phase and velocity."""
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind = plane, kind
         self.scales = np.array([_PHASES, *plane.scales[1:]])
 
     def __call__(self, whole: FloatArray, other: float) -> MapValue:
-        """Evaluate the map of (phase, velocity after the impact, first parameter)."""
+        """Evaluate the extended map on (phase, velocity after the impact, first parameter)."""
         moves, point = SPACING * self.scales, np.append(whole, other)
         try:
             flights = [
@@ -279,11 +281,11 @@ class ImpactSystem:
 
     @property
     def _sign(self) -> float:
-        """Minus the multiplier that is known along the curve; 0 if none is known."""
+        """Coefficient of the trace in f: minus the critical multiplier; 0 for Neimark-Sacker."""
         return _IN_TRACE[self.kind]
 
     def _miss(self, flight: Flight, speed: float) -> FloatArray:
-        """Compute the scaled residuals of the next impact and of the bifurcation condition."""
+        """Compute the scaled residuals: displacement and velocity of the next impact, test function."""
         matrix, e, w = flight.jacobian, flight.rebound, float(flight.end[1])
         determinant = e * e * float(np.linalg.det(matrix))
         trace, rest = self._sign, determinant + (1.0 if self._sign else -1.0)
@@ -296,7 +298,7 @@ class ImpactSystem:
 
 
 def _monodromy(flight: Flight) -> tuple[FloatArray, float]:
-    """Compute the derivative from one impact to just after the next, and its determinant."""
+    """Compute the derivative of the state from after an impact to after the next one, and its determinant."""
     e, w = flight.rebound, float(flight.end[1])
     jump = flight.accelerations[0] + e * flight.accelerations[1]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""Tracing of bifurcation curves: start, extended map, changes of section, and stops."""
+"""Tracing of bifurcation curves: start, choice of the extended map, section changes, and stops."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ if TYPE_CHECKING:
     from printhammer.chaos.curves.starts import Start
 
 PRECISION: Final = 1e-12
-"""Scaled correction of Newton's method below which a point is on the curve."""
+"""Scaled correction of Newton's method below which a point lies on the curve."""
 
 _NOISY: Final = 1e-9
-"""Scaled closing error above which an orbit that Newton's method accepts is rejected."""
+"""Scaled closing error above which a point that Newton's method accepts is rejected."""
 _GENTLE: Final = 1e-6  # Impact speed, in scales, at which a curve ends in a grazing
 _SLOW: Final = 0.05
-"""Impact speeds, in half-widths of the window: at which a curve ends, and below which it may."""
+"""Impact speed, in half-widths of the window, below which a curve may end in a resonant grazing."""
 _FAR: Final = 0.02
-"""Distance in the plane, in scales, within which a point of codimension two ends a curve."""
+"""Distance in the plane, in scales, within which a point of codimension two is the end of a curve."""
 _TURNS: Final = 8
 """Maximum number of section changes along a curve."""
 
@@ -58,7 +58,7 @@ System = MultiplierSystem | ImpactSystem | GrazingSystem
 
 @dataclass
 class Traced:
-    """A traced curve."""
+    """Traced bifurcation curve: nodes, stops, points of codimension two, and coefficients."""
 
     kind: str
     surface: str
@@ -70,11 +70,11 @@ class Traced:
 
     @property
     def places(self) -> list[Place]:
-        """Points of the curve."""
+        """Points of the curve in the parameter plane, in order."""
         return [place_of(node) for node in self.nodes]
 
     def crossings(self, which: int, value: float) -> list[Place]:
-        """Find the points where the curve passes a value of the first parameter (0) or the second (1)."""
+        """Find the points where the first (`which` = 0) or the second parameter (1) has a given value."""
         places: list[Place] = []
         for system, nodes in self.pieces:
             corrector = Corrector(system, system.scales, PRECISION)
@@ -98,14 +98,14 @@ def _is_same(one: Place, other: Place) -> bool:
 
 
 class CurveTracer:
-    """Traces a curve through a plane."""
+    """Tracer of the bifurcation curves of one kind in a plane of two parameters."""
 
     def __init__(self, plane: Plane, kind: str, steps: Steps) -> None:
         self.plane, self.kind, self.steps = plane, kind, steps
         self.rigid = has_rigid_backstop(plane.regime)
 
     def trace(self, start: Start, second: float, threads: int | None) -> Traced:
-        """Trace the curve through a start; InputError if there is none."""
+        """Trace the curve through a start; InputError if Newton's method does not converge there."""
         system, unknown = self.begin(start, second)
         at = f"{self.kind} at {start.first} = {start.value:.9g} {start.regime.quantity(start.first).si}"
         try:
@@ -152,7 +152,7 @@ class CurveTracer:
         return Traced(self.kind, surface, nodes, (first, last), points, coefficients, pieces)
 
     def resonance(self, system: System, here: Node, beyond: Node) -> Node:
-        """Locate the point of a torus curve between two others at which both multipliers become real."""
+        """Locate the resonance of a torus curve between two nodes, where both multipliers become real."""
         sign = float(np.sign(np.trace(place_of(beyond).jacobian)))
         corrector = Corrector(system, system.scales, self.steps.precision)
         _, node = zero_between(
@@ -161,11 +161,11 @@ class CurveTracer:
         return here if node is None else node
 
     def coefficient(self, place: Place) -> float:
-        """Compute the normal-form coefficient of a period doubling."""
+        """Compute the normal-form coefficient of a period doubling at a point of the curve."""
         return doubling_coefficient(self.plane, place)
 
     def begin(self, start: Start, second: float) -> tuple[System, FloatArray]:
-        """Choose the extended map of a curve, and return its unknowns at the start."""
+        """Choose the extended map for a start; return the map and its initial unknowns."""
         plane, tolerance = self.plane, self.plane.tolerance
         regime = replace(plane.at(start.value, second), phase=start.regime.phase)
         near = near_touches(regime, start.state, plane.firings, tolerance)
@@ -187,7 +187,7 @@ class CurveTracer:
         return MultiplierSystem(moved, self.kind), np.append(quiet[1], start.value)
 
     def state_at(self, start: Start, second: float) -> FloatArray:
-        """Compute displacement and velocity of an orbit at the section that its curve uses."""
+        """Compute displacement and velocity of the orbit of a start, at the section used by its curve."""
         system, unknown = self.begin(start, second)
         if isinstance(system, MultiplierSystem):
             return np.asarray(unknown[:2])
@@ -195,7 +195,7 @@ class CurveTracer:
         return np.array([surface, unknown[1]])
 
     def watch(self, system: System) -> Watch:
-        """Build the callback that decides between two points whether the curve ends there."""
+        """Build the callback that decides, between two points, whether the curve ends."""
         low, high = self.plane.bounds[0]
         corrector = Corrector(system, system.scales, self.steps.precision)
         place = system.scales.size - 2
@@ -276,7 +276,7 @@ class CurveTracer:
         return pieces, stop
 
     def meetings(self, nodes: list[Node], begin: int) -> list[CodimensionTwo]:
-        """Locate the points where a fold or doubling curve meets a grazing of a compliant surface."""
+        """Locate the points at which a fold or doubling curve meets a grazing of a compliant surface."""
         if self.rigid or self.kind not in ("fold", "period doubling"):
             return []
         points = []
@@ -294,16 +294,16 @@ class CurveTracer:
 
     @property
     def short(self) -> str:
-        """Kind of the bifurcation in one word."""
+        """Kind of the bifurcation without the word "period": "doubling" for a period doubling."""
         return self.kind.removeprefix("period ")
 
     def distance(self, one: Place, other: Place) -> float:
-        """Compute the scaled distance of two points in the plane."""
+        """Compute the distance of two points in the parameter plane, in scales of the parameters."""
         away = np.array([one.first - other.first, one.second - other.second]) / self.plane.scales[2:]
         return float(np.linalg.norm(away))
 
     def grazing_near(self, place: Place, within: float) -> Place | None:
-        """Find the grazing nearest to an orbit of the curve that satisfies the same test."""
+        """Find the grazing near an orbit of the curve at which the same test function vanishes."""
         regime = replace(self.plane.at(place.first, place.second), phase=place.phase)
         for touch in near_touches(regime, place.state, self.plane.firings, self.plane.tolerance)[:3]:
             guess = np.array([touch.phase, place.first, place.second])
@@ -315,7 +315,7 @@ class CurveTracer:
     def with_ends(
         self, nodes: list[Node], stops: list[Stop], points: list[CodimensionTwo]
     ) -> list[CodimensionTwo]:
-        """Add the points at which the curve ends in a grazing."""
+        """Add the points of codimension two at which the curve ends in a grazing, and mark its stops."""
         if self.kind not in ("fold", "period doubling"):
             return points
         for end, (node, after) in enumerate(((nodes[0], -1), (nodes[-1], len(nodes) - 1))):
@@ -328,7 +328,7 @@ class CurveTracer:
         return points
 
     def end_at(self, place: Place, after: int) -> CodimensionTwo | None:
-        """Find the point of codimension two at which a curve ends, near another point."""
+        """Find the point of codimension two that ends a curve, near its last point; None if not found."""
         speed = float(place.state[1]) / float(self.plane.scales[1])
         if self.rigid and 0.0 < speed < _SLOW:
             guess = np.array([place.phase, place.first, place.second])
@@ -343,12 +343,12 @@ class CurveTracer:
         return None if met is None else point_of(f"{self.short} meets grazing", met, after)
 
     def at_value(self, which: int, value: float) -> str:
-        """Format a value of one of the parameters with its name and unit."""
+        """Format a value of the first (0) or second (1) parameter with its name and unit."""
         name = self.plane.names[which]
         return f"{name} = {value:.9g} {self.plane.regime.quantity(name).si}".removesuffix(" 1")
 
     def in_words(self, stop: Stop, points: list[CodimensionTwo], end: int) -> Stop:
-        """Return a stop whose sentence names the parameters and, if there is one, the point at the end."""
+        """Return a stop whose sentence names the parameters and, if any, the point at the end."""
         at = self.at_value(1, stop.parameter)
         if stop.reason == "grazing" and points:
             point = points[-1 if end else 0]

@@ -1,13 +1,13 @@
-"""Lyapunov exponents of many trains, against the time between firings, and finite-time exponents.
+"""Lyapunov exponents of many trains against the time between firings; finite-time exponents of a train.
 
-Finite-time exponents are the distribution, along one train, of the mean growth over a few firings.
+A finite-time exponent is the mean growth over a few successive firings (a stretch) of one train.
 
-The mean growth over n firings depends on where the stretch begins. Its mean is the Lyapunov exponent; its
-standard deviation falls as n^-1/2 if correlations decay fast, and more slowly if a motion stays near regular
-orbits for long (A. Prasad and R. Ramaswamy, Phys. Rev. E 60 (1999) 2761). The fraction of stretches with a
-negative exponent shows how often neighbouring motions converge for a while, although the train is chaotic.
-Limitation: the stretches are taken from one train; parts of the attractor that it has not visited do not
-contribute.
+The mean growth over n firings depends on where the stretch begins. The mean over all stretches is the
+Lyapunov exponent; the standard deviation falls as n^-1/2 if correlations decay fast, and more slowly if a
+motion stays near regular orbits for a long time (A. Prasad and R. Ramaswamy, Phys. Rev. E 60 (1999) 2761).
+The fraction of stretches with a negative exponent shows how often neighbouring motions converge temporarily,
+although the train is chaotic. Limitation: all stretches are taken from one train; regions of the attractor
+that it has not visited do not contribute.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 class LyapunovChart(Result, rows="period"):
-    """Lyapunov exponents against the period of the train; arrays of one row for each train."""
+    """Lyapunov exponents against the period of the train; every array has one row per train."""
 
     hammer: Hammer = part("the hammer", more="the first one where there are several")
     drive: Drive = part("the drive of the first train")
@@ -82,7 +82,7 @@ class LyapunovChart(Result, rows="period"):
         return f"Lyapunov exponents of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate exponents and classifications, a row for each train, and how often both tests agree."""
+        """Tabulate exponents and classifications of each train, and count how often both tests agree."""
         from printhammer.chaos.exponents.lyapunov import dimension_text, verdict_text
 
         pairs = list(zip(self.growth, self.zero_one, strict=True))
@@ -131,11 +131,11 @@ class LyapunovChart(Result, rows="period"):
         return _chart(points.hammer, points.drive, firings, points.tolerance, rows)
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return all columns over `period`, and the two exponents over `exponent`."""
+        """Return the Dataset variables: all columns over `period`, exponents also over `exponent`."""
         return {**super().entries(), "exponent": EXPONENT}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Convert the chart to a table with a row for each train, exponents in columns."""
+        """Convert the chart to a table with one row per train; both exponents are columns."""
         table = super().to_dataframe()
         for k in (1, 0):
             table.insert(1, f"standard error {k + 1} [{PER_FIRING}]", self.standard_errors[:, k])
@@ -160,14 +160,14 @@ def lyapunovs(
     Parameters
     ----------
     hammers, periods, waveform, overlap
-        Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
+        Hammers or regimes, and the firing of hammers, see `printhammer.run.regime.regimes_of`.
     firings, transient
         As for `lyapunov`, for all trains.
 
     Returns
     -------
     LyapunovChart
-        A row for each train, identical to the last bit to the result of `lyapunov`.
+        Chart with one row per train, bit-identical to the result of `lyapunov`.
     """
     counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     regimes = regimes_of(hammers, periods, waveform=waveform, overlap=overlap)
@@ -179,7 +179,7 @@ def lyapunovs(
 
 
 def _row(train: Lyapunov) -> dict[str, Any]:
-    """Extract the row of a chart from the exponents of a train."""
+    """Extract the values that a chart shows from the exponents of one train."""
     named = ("period", "exponents", "standard_errors", "total", "total_error", "dimension", "dimension_error")
     test = train.zero_one
     return {name: getattr(train, name) for name in (*named, "growth", "status", "smooth")} | {
@@ -201,9 +201,9 @@ def _chart(
 
 
 LENGTHS: Final = (1, 2, 5, 10, 20, 50)
-"""Default numbers of firings of a stretch."""
+"""Default lengths of the stretches of finite-time exponents, in firings."""
 FEWEST: Final = 10
-"""Smallest number of stretches that define a distribution."""
+"""Smallest number of stretches from which a distribution of exponents is computed."""
 LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)  # Quantile levels of the distribution
 
 
@@ -229,21 +229,21 @@ class FiniteTime(Result, rows="length"):
 def finite_time(
     train: Lyapunov | Regime, *, lengths: Sequence[SupportsIndex] = LENGTHS, firings: SupportsIndex = 5000
 ) -> FiniteTime:
-    """Compute the distribution of the largest exponent over stretches of a train.
+    """Compute the distribution of the finite-time exponents over stretches of a train.
 
     Parameters
     ----------
     train : Lyapunov or Regime
-        The exponents of a train, see `printhammer.lyapunov`; or a regime, whose train is followed from rest.
+        Exponents of a train, from `printhammer.lyapunov`; or a regime, whose train from rest is computed.
     lengths : sequence of int, optional
-        Numbers of firings of a stretch, ascending.
+        Lengths of the stretches, in firings, ascending.
     firings : int, optional
         For a regime: number of firings over which growth is averaged.
 
     Returns
     -------
     FiniteTime
-        The distribution for each length.
+        Distribution of the exponents for each length.
 
     Raises
     ------

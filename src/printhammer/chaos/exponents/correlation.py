@@ -1,10 +1,10 @@
 """Correlation dimension of an attractor by the Grassberger-Procaccia algorithm, with an interval.
 
 The correlation sum C(r) is the fraction of pairs of states closer than r; on an attractor of dimension D2 it
-scales as r^D2 for r neither so large that the shape of the attractor matters nor so small that few pairs are
-left (P. Grassberger and I. Procaccia, Physica D 9 (1983) 189). Pairs close in time are left out (J. Theiler,
-Phys. Rev. A 34 (1986) 2427). The dimension is the slope of ln C over ln r on a *plateau*: the widest range
-over which the local slope stays within a tolerance.
+scales as r^D2 if r is neither so large that the shape of the attractor matters nor so small that few pairs
+remain (P. Grassberger and I. Procaccia, Physica D 9 (1983) 189). Pairs close in time are excluded (J.
+Theiler, Phys. Rev. A 34 (1986) 2427). The dimension is the slope of ln C over ln r on a *plateau*: the widest
+range over which the local slope stays within a tolerance.
 
 Limitations: N states do not resolve distances below about N^(-2/D2) of the size of the attractor, and a set
 with gaps has fluctuating slopes for any number of states. The interval therefore covers every slope on the
@@ -28,21 +28,21 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import FloatArray
 
 MOST: Final = 50_000
-"""Largest number of states."""
+"""Largest number of states for the correlation dimension."""
 FEWEST: Final = 200
-"""Smallest number of states."""
+"""Smallest number of states for the correlation dimension."""
 THEILER: Final = 10  # Default of the Theiler window, in steps
 FLAT: Final = 0.1
-"""Default range of local slopes on a plateau."""
+"""Default for the largest range of local slopes on a plateau."""
 
 _PER_OCTAVE: Final = 2  # Number of radii per factor of 2
 _PIECE: Final = 4
-"""Number of radii over which a local slope is fitted."""
+"""Width of the fit of a local slope, in steps of the radius."""
 _SHORTEST: Final = 3 * _PER_OCTAVE
-"""Number of radii of the shortest plateau: a factor of 8."""
+"""Smallest length of a plateau, in steps of the radius; corresponds to a factor of 8."""
 _FEW_PAIRS: Final = 200  # Number of pairs below which a correlation sum is discarded
 _LARGEST: Final = 0.25
-"""Fraction of pairs above which the shape of the attractor matters."""
+"""Fraction of pairs above which a correlation sum is not used: the shape of the attractor matters."""
 _PARTS: Final = 5  # Number of sections of the series whose scatter gives the error
 
 
@@ -69,7 +69,7 @@ class CorrelationDimension(Result, rows="radius"):
 
     @property
     def message(self) -> str:
-        """The dimension with its interval and plateau, or why there is none, in one line."""
+        """The dimension with its interval and plateau, or the reason why there is none, in one line."""
         if math.isnan(self.dimension):
             return f"no plateau over a factor of 8 with slopes within {self.flat:.2g}: no dimension"
         near, far = self.plateau
@@ -91,22 +91,23 @@ def correlation_dimension(
     Parameters
     ----------
     states : array, Strobe or Regime
-        One row, or one number, for each state; 200 to 50,000 states. Of strobe points displacement, velocity
-        and memory of the pack are used. For a regime a thousand points are computed, after a thousand
-        firings; a few thousand are more accurate. The distance is the largest difference of a component.
+        One row, or one number, per state; 200 to 50,000 states. Displacement, velocity and pack memory of
+        strobe points are used. For a regime, a thousand points are computed after a thousand firings; a few
+        thousand points are more accurate. The distance of two states is the largest difference of a
+        component.
     scales : array, optional
         Scales of the components; by default the half-widths of the window of a strobe, and 1 for other
         states.
     theiler : int, optional
-        Theiler window: pairs of states less than this many steps apart are left out.
+        Theiler window: pairs of states less than this many steps apart are excluded.
     flat : float, optional
         Largest range of local slopes on a plateau.
 
     Returns
     -------
     CorrelationDimension
-        The interval covers the local slopes on the plateau, widened by twice the standard error between five
-        sections of the series.
+        Dimension with an interval that covers the local slopes on the plateau, widened by twice the standard
+        error from five sections of the series.
 
     Raises
     ------
@@ -163,9 +164,9 @@ def correlation_dimension(
 
 
 def correlation_sums(states: FloatArray, radius: FloatArray, theiler: int) -> tuple[FloatArray, int]:
-    """Compute the fractions of pairs of states within several distances, and the number of pairs.
+    """Compute the fraction of pairs of states within each of several distances, and the number of pairs.
 
-    Pairs less than `theiler` steps apart are left out.
+    Pairs less than `theiler` steps apart in time are excluded.
     """
     from scipy.spatial import cKDTree
 
@@ -197,7 +198,7 @@ def _slope(radius: FloatArray, sums: FloatArray) -> float:
 
 
 def _plateau(slopes: FloatArray, tolerance: float) -> tuple[int, int] | None:
-    """Find the longest run of slopes within a tolerance, the flattest if tied; return its ends."""
+    """Find the longest run of slopes within a tolerance, the flattest if tied; return its end indices."""
     best: tuple[int, float, int] | None = None
     for first in range(len(slopes)):
         least, most = math.inf, -math.inf

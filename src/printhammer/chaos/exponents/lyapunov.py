@@ -3,7 +3,8 @@
 From firing to firing the tangent flow (docs/tangent.md) stretches one direction of the plane of displacement
 and velocity and contracts the other. The mean logarithms are the exponents lambda_1 >= lambda_2; their sum is
 the mean logarithm of the determinant. A third exponent, that of the memory of the pack, is minus infinity.
-The exponents of the flow in time are these divided by the period, and a zero for the direction of time.
+The exponents of the flow in time are those of the map divided by the period, and a zero for the direction of
+the flow.
 """
 
 from __future__ import annotations
@@ -39,41 +40,41 @@ from printhammer.support.arguments import checked
 from printhammer.support.arrays import FloatArray, IntArray
 
 FIRINGS: Final = 1000
-"""Default number of firings over which growth is averaged."""
+"""Default number of firings over which the growth of perturbations is averaged."""
 
 TRANSIENT: Final = 1000
-"""Default number of firings to discard before them."""
+"""Default number of firings to discard before growth is averaged."""
 
 PER_FIRING: Final = "1/firing"
-"""Unit of exponents."""
+"""Unit of Lyapunov exponents, for columns and scalars."""
 
 EXPONENT: Final = (
     Column("1", "number of the exponent, largest first", ("exponent",), "coordinate", name="exponent"),
     np.array([1, 2], np.int32),
 )
-"""Coordinate of the exponents."""
+"""Coordinate of the Dataset that numbers the exponents, largest first."""
 
 _GROWTH: Final = ("firing", "exponent")
 _RUNNING: Final = ("count", "exponent")
 _COUNTS: Final = 100  # Default number of running estimates
 _CYCLES: Final = 8
-"""Smallest number of cycles whose scatter gives a standard error."""
+"""Smallest number of whole cycles from which a standard error is computed."""
 
 
 def dimension_text(value: float, error: float) -> str:
-    """Format a dimension with its standard error; a dash if it is unknown."""
+    """Format a dimension with its standard error; a dash if the dimension is unknown."""
     if math.isnan(value):
         return "–"
     return f"{value:.4g} ± {error:.1g}" if error else f"{value:.4g}"
 
 
 def verdict_text(verdict: str) -> str:
-    """Format a classification for a summary."""
+    """Format a classification for a summary, with a style that marks undecided ones."""
     return judged(verdict != "undecided", verdict.replace("period-", "period "))
 
 
 class Lyapunov(Result, rows="firing exponent"):
-    """Lyapunov exponents of one train, and two classifications of the motion."""
+    """Lyapunov exponents of one train, with the classifications by strobe points and by the 0-1 test."""
 
     points: Strobe = part(
         "the states at the firings between which growth counts, and the verdict on them",
@@ -143,7 +144,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def hammer(self) -> Hammer:
-        """The hammer."""
+        """Hammer whose exponents these are."""
         return self.points.hammer
 
     @property
@@ -153,7 +154,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def status(self) -> str:
-        """How the run ended."""
+        """Status of the run: "ok", or the reason for its early end."""
         return self.points.status
 
     @property
@@ -163,7 +164,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def verdict(self) -> Verdict:
-        """The classification of the points, with its evidence."""
+        """Classification of the motion by its strobe points, with the evidence."""
         if self.points.verdict is None:
             raise ValueError("the points have not been judged")
         return self.points.verdict
@@ -176,34 +177,34 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def cycle(self) -> int:
-        """Number of firings over which growth is averaged first: the period of a periodic train, else 1."""
+        """Number of firings averaged before the error estimate: the period of a periodic train, else 1."""
         return cycle_of(self.verdict.period, len(self.factors))
 
     @property
     @derived("", "what the largest exponent alone says")
     def growth(self) -> str:
-        """Verdict of the largest exponent alone: "chaotic", "regular", or "undecided" within three errors."""
+        """Classification by the largest exponent alone: "chaotic", "regular" or "undecided"."""
         return _growth(float(self.exponents[0]), float(self.standard_errors[0]), self.smooth)
 
     @property
     def agree(self) -> bool | None:
-        """Whether exponent and 0-1 test agree; None if one of them is undecided."""
+        """Whether the exponent and the 0-1 test agree; None if either is undecided."""
         other = "undecided" if self.zero_one is None else self.zero_one.verdict
         return None if "undecided" in (self.growth, other) else self.growth == other
 
     def running(self, counts: npt.ArrayLike | None = None) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Compute running estimates over the first firings, to show their convergence.
+        """Compute running estimates of the exponents over the first firings, to show their convergence.
 
         Parameters
         ----------
         counts : int array, optional
-            Numbers of firings, from 1 to all, rounded to whole cycles; by default about a hundred, evenly
-            spaced in their logarithm.
+            Numbers of firings, at least 1, rounded to whole cycles; by default about a hundred, spaced
+            logarithmically.
 
         Returns
         -------
         counts : int array, shape (k,)
-            The numbers of firings.
+            Numbers of firings after rounding.
         means : array, shape (k, 2)
             Exponents over these numbers of firings.
         errors : array, shape (k, 2)
@@ -224,7 +225,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the points."""
+        """Provenance of the strobe points, which is that of the exponents."""
         return self.points.provenance
 
     def notes(self) -> dict[str, Any]:
@@ -233,7 +234,7 @@ class Lyapunov(Result, rows="firing exponent"):
         return {**second, "phase": self.points.phase, **self.points.notes()}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return growth and states over `firing`, running estimates over `count`.
+        """Return the Dataset variables: growth and states over `firing`, running estimates over `count`.
 
         The growth of the first firing is NaN.
         """
@@ -264,17 +265,17 @@ def lyapunov(
 ) -> Lyapunov:
     """Compute the Lyapunov exponents of a train, with standard errors, and the 0-1 test for comparison.
 
-    Two tangent vectors are carried along with the motion and orthonormalised at every step (G. Benettin, L.
-    Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they begin up to a hundred
-    firings earlier, to align with their directions. Standard errors are those of means of autocorrelated
-    series, from overlapping batch means (`printhammer.derivatives.states.standard_error`); for a periodic
+    Two tangent vectors are integrated along the motion and orthonormalised at every step (G. Benettin, L.
+    Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21); they start up to a hundred
+    firings earlier, to align with the directions of growth. Standard errors are estimated for autocorrelated
+    series, by overlapping batch means (`printhammer.derivatives.states.standard_error`); for a periodic
     train, from whole cycles.
 
     Parameters
     ----------
     hammer : Hammer or Regime
-        The hammer, or a regime; a hammer needs the keywords `firing`. Growth is taken from firing to firing,
-        whatever the phase.
+        The hammer, or a regime; a hammer needs the keywords `firing`. Growth is measured from firing to
+        firing, independent of the phase.
     firings : int, optional
         Number of firings over which growth is averaged.
     transient : int, optional
@@ -285,7 +286,7 @@ def lyapunov(
     Returns
     -------
     Lyapunov
-        With a status; a run that ends early is not an exception.
+        Exponents with a status; a run that ends early raises no exception.
     """
     counts = read_count(firings, "firings"), read_count(transient, "transient", least=0)
     train = Train.of(Regime.of(hammer, **firing).at_firings, sum(counts) + 1, state)
@@ -324,12 +325,12 @@ def kaplan_yorke(factors: FloatArray) -> tuple[float, float]:
 
 
 def cycle_of(period: int | None, firings: int) -> int:
-    """Return the number of firings to average over first, so that a cycle does not count as scatter."""
+    """Return the period if the train has enough whole cycles, else 1, so that a cycle adds no scatter."""
     return period if period is not None and firings >= _CYCLES * period else 1
 
 
 def whole_cycles(factors: FloatArray, cycle: int) -> FloatArray:
-    """Average growth over whole cycles, shape (n // cycle, 2), without an incomplete cycle at the start."""
+    """Average the growth over whole cycles, shape (n // cycle, 2); an incomplete first cycle is dropped."""
     return np.asarray(factors[len(factors) % cycle :].reshape(-1, cycle, 2).mean(axis=1))
 
 
@@ -379,7 +380,7 @@ def exponents_of_train(train: Train, counts: tuple[int, int], tolerance: float) 
 
 
 def _points(train: Train, first: int, last: int, exponent: Exponent, tolerance: float) -> Strobe:
-    """Classify the states that the tangent flow passed."""
+    """Build the strobe points of the run that computed the exponents, with their classification."""
     firing = np.arange(first, last + 1)
     x, v, mode, memory, *electric = exponent.states.T
     branch = np.where(np.isfinite(mode), np.nan_to_num(mode), -1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Recurrence plots and recurrence quantification: when, and in what patterns, a motion returns.
+"""Recurrence plots and recurrence quantification: when and in what patterns a motion returns.
 
 The recurrence matrix has a point at (i, j) where the states i and j lie within a threshold of each other. Its
 diagonal lines are stretches during which the motion repeats an earlier stretch; its vertical lines, stretches
@@ -26,16 +26,16 @@ MOST: Final = 4096
 """Largest number of states; the matrix then has 16 million points."""
 
 RATE: Final = 0.05
-"""Default recurrence rate if no threshold is given."""
+"""Default recurrence rate, used if neither a threshold nor a rate is given."""
 
 SHORTEST: Final = 2
-"""Default length, in points, of the shortest line."""
+"""Default for the length of the shortest line, in points."""
 
 _ROWS: Final = 256  # Rows of the distance matrix computed at once, which bounds the memory
 
 
 class Recurrence(Result):
-    """A recurrence plot and its quantification."""
+    """Recurrence plot of a series of states, and its quantification."""
 
     matrix: BoolArray = column(
         "1", "whether two states lie within the threshold of each other", "i j", name="recurs", dtype=np.int8
@@ -73,7 +73,7 @@ class Recurrence(Result):
 
     @property
     def quantities(self) -> dict[str, float]:
-        """Quantities by name."""
+        """Quantities of the recurrence quantification analysis, by name."""
         names = (
             *("rate", "determinism", "mean_diagonal", "longest_diagonal", "entropy"),
             *("laminarity", "trapping", "longest_vertical"),
@@ -95,22 +95,21 @@ def recurrence(
     Parameters
     ----------
     states : array, Strobe or Regime
-        One row, or one number, for each state; at most 4096 states. Of strobe points displacement, velocity
-        and memory of the pack are used. For a regime a thousand points are computed, after a thousand
-        firings.
+        One row, or one number, per state; at most 4096 states. Displacement, velocity and pack memory of
+        strobe points are used. For a regime, a thousand points are computed after a thousand firings.
     threshold : float, optional
-        Largest distance of states that count as the same, in units of the scales. The distance is the largest
+        Largest distance of two recurrent states, in units of the scales. The distance is the largest
         difference of a component.
     rate : float, optional
-        Recurrence rate from which the threshold follows, instead of `threshold`; 0.05 if neither is given.
-        Where many distances are equal, the rate comes out larger; so it does for strobe points that agree as
-        closely as a classification requires.
+        Recurrence rate from which the threshold is computed, instead of `threshold`; 0.05 if neither is
+        given. The actual rate is larger if many distances are equal, or if strobe points agree within the
+        tolerance of the classification.
     scales : array, optional
         Scales of the components; by default the half-widths of the window of a strobe, and 1 for other
         states.
     theiler : int, optional
-        Theiler window: pairs of states less than this many steps apart are left out, so that a slow motion is
-        not a recurrence.
+        Theiler window: pairs of states less than this many steps apart are excluded, so that a slow motion
+        does not count as a recurrence.
     shortest : int, optional
         Length of the shortest line, in points.
 
@@ -122,8 +121,8 @@ def recurrence(
     Raises
     ------
     InputError
-        There are too many or too few states, they are not finite, as for a strobe whose run ended early; both
-        threshold and rate are given; or the scales do not fit.
+        There are too many or too few states, they are not finite (e.g. a run ended early), both threshold and
+        rate are given, or the scales have the wrong shape.
     """
     points = points_of(states, {})
     rows, units = rows_of(points, scales, MOST)
@@ -145,7 +144,7 @@ def recurrence(
 
 
 def counted(matrix: BoolArray, threshold: float, theiler: int, shortest: int) -> Recurrence:
-    """Quantify the lines of a recurrence matrix: symmetric, true on the main diagonal."""
+    """Quantify the diagonal and vertical lines of a symmetric recurrence matrix."""
     count = len(matrix)
     # The matrix is symmetric: one half of it contains all diagonal lines.
     diagonals = np.sort(
@@ -173,13 +172,13 @@ def counted(matrix: BoolArray, threshold: float, theiler: int, shortest: int) ->
 
 
 def run_lengths(points: BoolArray) -> IntArray:
-    """Compute the lengths of the runs of true values, in order."""
+    """Compute the lengths of the runs of True values in a boolean array, in order."""
     steps = np.diff(np.concatenate([[0], points.astype(np.int8), [0]]))
     return np.asarray(np.flatnonzero(steps == -1) - np.flatnonzero(steps == 1), dtype=np.int64)
 
 
 def _distances(scaled: FloatArray) -> FloatArray:
-    """Compute the distances of all pairs: the largest difference of a component."""
+    """Compute the distances of all pairs of states: the largest difference of a component."""
     count = len(scaled)
     distances = np.empty((count, count))
     for first in range(0, count, _ROWS):
@@ -200,7 +199,7 @@ def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
 def rows_of(
     states: npt.ArrayLike | Strobe, scales: npt.ArrayLike | None, most: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return states, shape (n, m) with n up to `most`, and the scales of their components."""
+    """Return the states as an array, (n, m) with n up to `most`, and the scales of their components."""
     if isinstance(states, Strobe):
         rows = np.column_stack([states.x, states.v, states.memory])
         units = states.window.half_widths[[0, 1, 0]]

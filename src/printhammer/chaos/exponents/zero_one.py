@@ -1,4 +1,4 @@
-"""The 0-1 test for chaos in a series of numbers: a second opinion without a tangent flow.
+"""The 0-1 test for chaos in a series of numbers, which needs no tangent flow.
 
 The numbers phi(1), phi(2), ... drive a point in a plane, each in a direction that advances by an angle c,
 
@@ -33,33 +33,33 @@ ANGLES: Final = 100
 """Default number of angles c."""
 
 RANGE: Final = (math.pi / 5.0, 4.0 * math.pi / 5.0)
-"""Range of the angles: nearer to 0 and pi, short cycles resonate."""
+"""Range of the angles c, rad; closer to 0 or pi, short cycles resonate."""
 
 SEED: Final = 1983
-"""Default seed of the angles."""
+"""Default seed of the random generator of the angles."""
 
 REGULAR: Final = 0.2
 CHAOTIC: Final = 0.8
-"""Values of K up to which a series is regular, and from which on it is chaotic.
+"""Values of K: up to the first a series is regular, from the second on it is chaotic.
 
-K^2 is the fraction of the variance of M_c(n) that a straight line explains: less than a twentieth, or about
-two thirds and more.
+K^2 is the fraction of the variance of M_c(n) that a straight line explains: at most a twentieth for a regular
+series, about two thirds or more for a chaotic series.
 """
 
 FEWEST: Final = 100
-"""Smallest length of a series; the mean square displacement is computed up to a tenth of it."""
+"""Smallest length of a series; its mean square displacement is computed up to a tenth of the length."""
 
 SETTLING: Final = 0.5
-"""A series is a transient if its changes shrink by this factor from the first quarter to the last."""
+"""Ratio of the last to the first quarter's standard deviation below which a series is a transient."""
 
 LONGEST_CYCLE: Final = 64
-"""Largest cycle length q of a series; at most a quarter of its length."""
+"""Largest cycle length of a series that is tested; at most a quarter of its length."""
 
 CYCLES: Final = 5
-"""Number of cycles q over which growth must occur to count as chaos; within one cycle, any path may grow."""
+"""Number of cycles over which growth must occur to count as chaos; within one cycle, any path may grow."""
 
 FOLLOWS: Final = 0.7
-"""A series is deterministic if images of neighbours are closer than this fraction of any two images."""
+"""Mean distance of images of neighbours, relative to any two, below which a series is deterministic."""
 
 _CUT: Final = 10  # The displacement is computed up to the length divided by this (Gottwald and Melbourne)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered
@@ -68,7 +68,7 @@ _TOGETHER: Final = 1 << 20
 
 
 class ZeroOne(Result):
-    """Result of the 0-1 test of a series."""
+    """Result of the 0-1 test: the correlations K_c, their median K, and the classification."""
 
     k: float = scalar(
         "1",
@@ -106,17 +106,17 @@ class ZeroOne(Result):
 
     @property
     def phrase(self) -> str:
-        """The outcome in one line."""
+        """K with the numbers of angles and of data, in one line."""
         # Avoids a negative zero.
         k = round(self.k, 3) + 0.0
         return f"K = {k:.3f}, median of {len(self.angles)} angles over {self.length} numbers"
 
     def notes(self) -> dict[str, Any]:
-        """Return the angle that is shown, for the attributes of the Dataset."""
+        """Return the angle whose path is stored, for the attributes of the Dataset."""
         return {"shown_angle": float(self.angles[self.shown])}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return correlations over `angle`, displacements over `step` and the path over `number`."""
+        """Return the Dataset variables: correlations over `angle`, displacements and path over steps."""
         places = {"step": ("number of steps", len(self.displacement)), "number": ("place", self.length)}
         return super().entries() | {
             name: (
@@ -137,22 +137,22 @@ def zero_one(
 ) -> ZeroOne:
     """Apply the 0-1 test to a series, or to the displacements of strobe points.
 
-    Periodic components make M_c(n) oscillate, and hide slow growth. The test of 2009 subtracts the
+    Periodic components make M_c(n) oscillate, which hides slow growth. The test of 2009 subtracts the
     contribution of the mean, (mean)^2 (1 - cos n c)/(1 - cos c). Here the mean is subtracted from the series
-    itself, which is the same in the limit and loses no digits; from a series that nearly repeats every q
-    numbers the mean of each q-th number is subtracted, so that chaos within narrow bands is seen in short
+    itself, which is equivalent in the limit and loses no digits. If a series nearly repeats every q numbers,
+    the mean of every q-th number is subtracted, so that chaos within narrow bands is detected in short
     series, too.
 
-    The remainder of a settled series is rounding noise, which wanders like chaos. So an oscillation of the
-    size of `resolution` is added, (resolution)^2 sin(n sqrt 2), as J. H. P. Dawes and M. C. Freeland (2008,
-    unpublished; see the review of 2016) do to damp weak noise: only growth beyond it counts. A series whose
-    changes die out is a transient, on which the test cannot decide.
+    The remainder of a settled series is rounding noise, which performs a random walk as chaos does. Therefore
+    an oscillation (resolution)^2 sin(n sqrt 2) is added to M_c(n), as proposed by J. H. P. Dawes and M. C.
+    Freeland (2008, unpublished; see the review of 2016) to damp weak noise: only growth beyond this
+    oscillation counts. A series whose changes die out is a transient, for which the test is undecided.
 
     Parameters
     ----------
     series : array, Strobe, Regime or Hammer
         At least 100 numbers; or strobe points, whose displacements are used; or a regime, or a hammer with
-        the keywords `firing`, for which a thousand points are computed, after a thousand firings.
+        the keywords `firing`, whose thousand strobe points after a thousand firings are computed.
     resolution : float, optional
         Amplitude below which changes are ignored, in the unit of the series. By default 1e-12 of the largest
         absolute value; for strobe points the agreement of a classification, 1e-6 of the half-width of the
@@ -160,20 +160,20 @@ def zero_one(
     angles : int, optional
         Number of random angles.
     seed : int, optional
-        Seed of the angles.
+        Seed of the random generator of the angles.
     **firing
         How a hammer is fired, as for `printhammer.Regime.of`.
 
     Returns
     -------
     ZeroOne
-        With a classification; "undecided" for a strobe whose run ended early.
+        Test result with a classification; "undecided" if the run of a strobe ended early.
 
     Raises
     ------
     InputError
-        The series is too short, has no shape (n,) or holds numbers that are not finite; the resolution is
-        negative.
+        The series is too short, is not one-dimensional or contains numbers that are not finite, or the
+        resolution is negative.
     """
     many = read_count(angles, "angles")
     points = points_of(series, firing)
@@ -230,7 +230,7 @@ def zero_one(
 
 
 def _judged(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[str, str]:
-    """Return the classification and, if it is "undecided", the reason."""
+    """Classify a series by K and its transient; return the classification and the reason if undecided."""
     if k <= REGULAR:
         return "regular", ""
     quarter = rest.size // 4
@@ -253,19 +253,19 @@ def _paths(rest: FloatArray, angles: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 def _displacements(paths: npt.NDArray[np.complex128], resolution: float) -> FloatArray:
-    """Compute mean square displacements up to a tenth of the length, with weak noise damped."""
+    """Compute the mean square displacements of paths up to a tenth of their length, with noise damped."""
     moved = mean_square_displacements(paths, paths.shape[1] // _CUT)
     steps = np.arange(1, moved.shape[1] + 1)
     return np.asarray(moved + resolution**2 * np.sin(math.sqrt(2.0) * steps))
 
 
 def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArray]:
-    """Estimate the cycle length of a series, and return the series without the means over the cycle.
+    """Estimate the cycle length of a series; return it and the series without its means over the cycle.
 
     The cycle length q, 1 for the mean alone, minimises the criterion of G. Schwarz (Ann. Statist. 6 (1978)
     461), n ln(residual variance) + q ln(n), and the means of every q-th number are subtracted. Changes up to
-    the resolution are ignored. A residual that is not deterministic is noise on a cycle, which by itself
-    wanders like chaos; then the cycle is not subtracted.
+    the resolution are ignored. If the residual is not deterministic, it is noise on a cycle, which alone
+    would look like chaos; the cycle is then not subtracted.
     """
     worth = []
     for q in range(1, min(LONGEST_CYCLE, numbers.size // _PASSES) + 1):
@@ -280,9 +280,9 @@ def without_cycle(numbers: FloatArray, resolution: float) -> tuple[int, FloatArr
 
 
 def _is_deterministic(rest: FloatArray, q: int) -> bool:
-    """Whether neighbours at the same phase of a cycle of q numbers are neighbours one number later.
+    """Whether neighbours at the same phase of a cycle of q numbers remain neighbours one step later.
 
-    Neighbours are determined by their numbers alone, or together with the numbers before.
+    Neighbours are determined in two ways: by the numbers alone, or together with the preceding numbers.
     """
     shares = []
     for before in (0, 1):
@@ -325,7 +325,7 @@ def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> Fl
 
 
 def _correlations(displacements: FloatArray) -> FloatArray:
-    """Compute the correlation of each row with 1, 2, ...; 0 for a constant row."""
+    """Compute the correlation K_c of each row with 1, 2, ...; 0 for a constant row."""
     count = displacements.shape[1]
     away = np.arange(count) - 0.5 * (count - 1)
     rows = displacements - displacements.mean(axis=1, keepdims=True)
