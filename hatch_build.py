@@ -35,7 +35,7 @@ class LoweredModules(BuildHookInterface[Any]):
 
         def ship(module: Module) -> None:
             path = Path(folder.name, module.shipped.name)
-            path.write_bytes(lzma.compress(module.bitcode(), preset=9))
+            path.write_bytes(lzma.compress(module.content(), preset=9))
             place = module.shipped.relative_to(Path(self.root, "src"))
             build_data["force_include"][str(path)] = place.as_posix()
 

@@ -25,6 +25,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict
 
 import printhammer as ph
+from printhammer.kernel.compile.bindings import syntax_text
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "measured"
@@ -181,27 +182,16 @@ def files_of(room: str) -> list[Path]:
 def _statements(room: str) -> tuple[str, ...]:
     counted = [file for file in files_of(room) if file.exists() and file not in UNCOUNTED]
     trees = [ast.parse(file.read_text("utf-8")) for file in counted]
-    return tuple(text for tree in trees for node in tree.body if (text := _seen(node)))
+    return tuple(text for tree in trees for node in tree.body if (text := syntax_text(node, _other_text)))
 
 
-def _seen(node: Any) -> str:
-    """Return the text of a syntax tree, the same in all versions of Python; empty for what does not count."""
-    if isinstance(node, list):
-        return "[" + ",".join(filter(None, map(_seen, node))) + "]"
-    if not isinstance(node, ast.AST):
-        return repr(node)
-    if isinstance(node, UNSEEN) or _is_text(node) or _is_for_types(node):
+def _other_text(node: ast.AST) -> str | None:
+    """Return the text of a node of which something does not count, None for others."""
+    if isinstance(node, UNSEEN) or _is_for_types(node):
         return ""
     if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
-        return f"Raise({_seen(node.exc.func)})"
-    fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
-    kept = (f"{name}={_seen(value)}" for name, value in fields if name not in ("ctx", "kind", "type_comment"))
-    return f"{type(node).__name__}({','.join(kept)})"
-
-
-def _is_text(node: ast.AST) -> bool:
-    value = node.value if isinstance(node, ast.Expr) else None
-    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+        return f"Raise({syntax_text(node.exc.func, _other_text)})"
+    return None
 
 
 def _is_for_types(node: ast.AST) -> bool:

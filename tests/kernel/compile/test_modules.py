@@ -45,17 +45,17 @@ def bitcode_of(value: int) -> bytes:
 
 
 def test_a_module_is_made_once(folder: Path) -> None:
-    assert Module("spring", "its source", lambda: bitcode_of(1)).bitcode() == bitcode_of(1)
-    assert Module("spring", "its source", unmade).bitcode() == bitcode_of(1)
-    assert Module("spring", "other source", lambda: bitcode_of(2)).bitcode() == bitcode_of(2)
-    assert Module("pack", "its source", lambda: bitcode_of(3)).bitcode() == bitcode_of(3)
+    assert Module("spring", "its source", lambda: bitcode_of(1)).content() == bitcode_of(1)
+    assert Module("spring", "its source", unmade).content() == bitcode_of(1)
+    assert Module("spring", "other source", lambda: bitcode_of(2)).content() == bitcode_of(2)
+    assert Module("pack", "its source", lambda: bitcode_of(3)).content() == bitcode_of(3)
 
 
 def test_a_module_that_ships_is_not_made(folder: Path) -> None:
     module = Module("spring", "its source", unmade)
     before = module.identity()
     module.shipped.write_bytes(lzma.compress(bitcode_of(1)))
-    assert module.bitcode() == bitcode_of(1)
+    assert module.content() == bitcode_of(1)
     # Machine code of the one that was made here is not that of the one that ships.
     assert module.identity() != before
 
@@ -71,7 +71,7 @@ def test_a_shipped_module_that_cannot_be_read_is_made_again_and_said_once(
     monkeypatch.setattr(cache, "listeners", {sentences.append})
     module = Module("spring", "its source", lambda: bitcode_of(2))
     module.shipped.write_bytes(content)
-    assert [module.bitcode(), module.bitcode()] == [bitcode_of(2)] * 2
+    assert [module.content(), module.bitcode()] == [bitcode_of(2)] * 2
     (sentence,) = sentences
     assert sentence == f"{module.shipped}: the module cannot be read; it is made anew"
 

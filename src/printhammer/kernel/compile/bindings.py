@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import importlib
 import inspect
@@ -9,9 +10,12 @@ import sys
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from printhammer.kernel.compile.cache import File
 from printhammer.kernel.model.laws import LAW_FUNCTIONS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     from printhammer.kernel.model.laws import Laws
 
 
@@ -45,8 +49,8 @@ def bindings_of(laws: Laws) -> Bindings:
             names[function] = getattr(module, function, None) or getattr(absent, function)
         used = {name for function in functions for name in _modules_of(names[function])}
         others = sorted(used - {module.__name__, absent.__name__})
-        text = b"".join(_source(each) for each in (absent, module, *(sys.modules[other] for other in others)))
-        digests[role] = hashlib.sha256(text).hexdigest()
+        sources = (absent, module, *(sys.modules[other] for other in others))
+        digests[role] = code_digest(inspect.getsource(each) for each in sources)
         choices[f"HAS_{role.upper()}"] = bool(name)
         for role_of_choice, choice in (("pack", "MEMORY"), ("backstop", "RIGID")):
             if role == role_of_choice:
@@ -54,8 +58,42 @@ def bindings_of(laws: Laws) -> Bindings:
     return Bindings(names, choices, digests)
 
 
-def _source(module: ModuleType) -> bytes:
-    return inspect.getsource(module).encode()
+def code_digest(sources: Iterable[str]) -> str:
+    """Return a digest of the code of source texts, to which docstrings, comments and layout add nothing.
+
+    It is kept under the digest of the texts: parsing the kernel takes a tenth of a second.
+    """
+    texts = list(sources)
+    name = hashlib.sha256("\0".join(texts).encode()).hexdigest()[:24]
+
+    def make() -> bytes:
+        code = "\n".join(syntax_text(ast.parse(text)) for text in texts)
+        return hashlib.sha256(code.encode()).hexdigest().encode()
+
+    return File(f"{name}.digest").get(make).decode()
+
+
+def syntax_text(node: Any, replaced: Callable[[ast.AST], str | None] = lambda _node: None) -> str:
+    """Return the text of a syntax tree without docstrings, the same in all versions of Python.
+
+    `replaced` returns another text for a node, or None; a node whose text is empty is left out.
+    """
+    if isinstance(node, list):
+        return "[" + ",".join(filter(None, (syntax_text(each, replaced) for each in node))) + "]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+        return ""
+    text = replaced(node)
+    if text is not None:
+        return text
+    fields = ((name, value) for name, value in ast.iter_fields(node) if value not in (None, []))
+    kept = (
+        f"{name}={syntax_text(value, replaced)}"
+        for name, value in fields
+        if name not in ("ctx", "kind", "type_comment")
+    )
+    return f"{type(node).__name__}({','.join(kept)})"
 
 
 def helpers_of(function: FunctionType) -> dict[str, FunctionType]:

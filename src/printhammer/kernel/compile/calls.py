@@ -93,18 +93,24 @@ def _flat(value: Any) -> Iterator[Any]:
         yield value
 
 
-def calling_code(entry: str, signature: Signature, name: str) -> str:
+def calling_code(entry: str, signature: Signature, name: str, *, bare: bool = False) -> str:
     """Return the text of a module with a function that takes a block and calls the function `entry` with it.
 
     It returns 0, or the number of the slot whose array is not as the signature says, or -1 for an exception.
-    The results follow the arguments in the block.
+    The results follow the arguments in the block. Where no Python is, arrays are `bare`: the address of the
+    elements, then the length along each axis, eight bytes each.
     """
     code: list[str] = []
     passed: list[tuple[str, str]] = []
     letters = [letters for _, letters in _slots(signature, "")]
+    slots = 0
     for i, kind in enumerate(letters):
-        code.append(f"%p{i} = getelementptr i8, ptr %block, i64 {_SLOT * i}")
-        if len(kind) == 2:
+        code.append(f"%p{i} = getelementptr i8, ptr %block, i64 {_SLOT * slots}")
+        slots += 1
+        if len(kind) == 2 and bare:
+            passed += _bare_array_code(i, kind, code)
+            slots += int(kind[1])
+        elif len(kind) == 2:
             passed += _array_code(i, kind, code)
         else:
             code.append(f"%v{i} = load {_NUMBERS[kind][1]}, ptr %p{i}")
@@ -116,7 +122,7 @@ def calling_code(entry: str, signature: Signature, name: str) -> str:
 declare i32 @{entry}({types})
 define i64 @{name}(ptr %block) {{
 %raised = alloca ptr
-%result = getelementptr i8, ptr %block, i64 {_SLOT * len(letters)}
+%result = getelementptr i8, ptr %block, i64 {_SLOT * slots}
 {body}
 %code = call i32 @{entry}({values})
 ; The code -2 says that the result is None.
@@ -130,12 +136,8 @@ ret i64 %returned
 
 
 def _array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
-    """Append the code that checks the array in a slot and reads its fields; return what is passed for it.
-
-    Numba's functions take two owners, unused here, number and size of the elements, their address, shape and
-    strides.
-    """
-    dtype, size = _ELEMENTS[kind[0]]
+    """Append the code that checks the array in a slot and reads its fields; return what is passed for it."""
+    dtype, _size = _ELEMENTS[kind[0]]
     count = int(kind[1])
 
     def field(name: str, place: str, offset: int, type_: str = "i64") -> str:
@@ -169,7 +171,33 @@ def _array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
     shape, strides = field("shape", array, _SHAPE, "ptr"), field("strides", array, _STRIDES, "ptr")
     lengths = [field(f"length{axis}", shape, 8 * axis) for axis in range(count)]
     steps = [field(f"step{axis}", strides, 8 * axis) for axis in range(count)]
-    items = "1"
+    return _passed(i, kind, code, data, lengths, steps)
+
+
+def _bare_array_code(i: int, kind: str, code: list[str]) -> list[tuple[str, str]]:
+    """Append the code that reads address and lengths of an array in C order; return what is passed for it."""
+    count = int(kind[1])
+    data, lengths = f"%data.{i}", [f"%length{axis}.{i}" for axis in range(count)]
+    code.append(f"{data} = load ptr, ptr %p{i}")
+    for axis, length in enumerate(lengths):
+        code.append(f"{length}.at = getelementptr i8, ptr %p{i}, i64 {_SLOT * (axis + 1)}")
+        code.append(f"{length} = load i64, ptr {length}.at")
+    steps = [str(_ELEMENTS[kind[0]][1])]
+    for axis in range(count - 1, 0, -1):
+        code.append(f"%step{axis}.{i} = mul i64 {steps[0]}, {lengths[axis]}")
+        steps.insert(0, f"%step{axis}.{i}")
+    return _passed(i, kind, code, data, lengths, steps)
+
+
+def _passed(
+    i: int, kind: str, code: list[str], data: str, lengths: list[str], steps: list[str]
+) -> list[tuple[str, str]]:
+    """Return what is passed for an array, types and values.
+
+    Numba's functions take two owners, unused here, number and size of the elements, their address, shape and
+    strides.
+    """
+    items, size = "1", _ELEMENTS[kind[0]][1]
     for axis, length in enumerate(lengths):
         code.append(f"%items{axis}.{i} = mul i64 {items}, {length}")
         items = f"%items{axis}.{i}"

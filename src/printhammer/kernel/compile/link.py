@@ -97,9 +97,9 @@ def _values(template: Any, choices: Mapping[str, int]) -> str:
     return "\n".join(lines)
 
 
-def emit(module: Any) -> bytes:
-    """Return machine code of a module for this processor."""
-    machine = _machine()
+def emit(module: Any, machine: Any = None) -> bytes:
+    """Return machine code of a module, for this processor if no other `machine` is the target."""
+    machine = machine or _machine()
     # That of the machine where it was lowered may be another.
     module.triple, module.data_layout = machine.triple, str(machine.target_data)
     options = llvm.create_pipeline_tuning_options(speed_level=3)

@@ -16,12 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.kernel.compile import calls, link
+from printhammer.kernel.compile.web import build as web
+from printhammer.kernel.compile.bindings import code_digest
 from printhammer.kernel.compile.cache import Code, File, say_once
 from printhammer.kernel.compile.signatures import RESULTS, signature_of
 from printhammer.kernel.model.laws import LAW_FUNCTIONS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from printhammer.kernel.compile.bindings import Bindings
 
@@ -60,13 +62,12 @@ one_at_a_time: Final = threading.RLock()
 @cache
 def _digest_of(places: tuple[str, ...]) -> str:
     """Return the digest of the sources in folders of the kernel."""
-    digest = hashlib.sha256()
-    for place in (*places, "compile/opening.py", "compile/signatures.py", "compile/templates.py"):
-        path = KERNEL / place
-        for file in sorted(path.glob("*.py")) if path.is_dir() else (path,):
-            # Without the carriage returns of a checkout on another system.
-            digest.update(file.read_bytes().replace(b"\r\n", b"\n"))
-    return digest.hexdigest()
+    paths = [
+        KERNEL / place
+        for place in (*places, "compile/opening.py", "compile/signatures.py", "compile/templates.py")
+    ]
+    files = [file for path in paths for file in (sorted(path.glob("*.py")) if path.is_dir() else (path,))]
+    return code_digest(file.read_text("utf-8") for file in files)
 
 
 @cache
@@ -84,6 +85,9 @@ def _lowering() -> str:
 class Module:
     """Bitcode of a template or of the laws of a part; `make` lowers it."""
 
+    suffix = ".bc"
+    is_readable = staticmethod(link.is_readable)
+
     def __init__(self, kind: str, sources: str, make: Callable[[], bytes]) -> None:
         self.name = f"{kind}_{hashlib.sha256(sources.encode()).hexdigest()[:24]}"
         self._make = make
@@ -91,21 +95,32 @@ class Module:
     @property
     def shipped(self) -> Path:
         """The file of the wheel that it is in, if it ships."""
-        return SHIPPED / f"{self.name}.bc.xz"
+        return SHIPPED / f"{self.name}{self.suffix}.xz"
 
     def identity(self) -> str:
         """Return a name that is unique to the content of the module, without reading it."""
         return self.name if self.shipped.exists() else f"{self.name}_{_lowering()}"
 
-    def bitcode(self) -> bytes:
-        """Return the bitcode, from the wheel, from disk, or made now."""
+    def content(self) -> bytes:
+        """Return the content, from the wheel, from disk, or made now."""
         if self.shipped.exists():
             with suppress(OSError, EOFError, lzma.LZMAError):
                 content = lzma.decompress(self.shipped.read_bytes())
-                if link.is_readable(content):
+                if self.is_readable(content):
                     return content
             say_once(f"{self.shipped}: the module cannot be read; it is made anew")
-        return File(f"{self.name}_{_lowering()}.bc").get(self._make)
+        return File(f"{self.name}_{_lowering()}{self.suffix}").get(self._make)
+
+
+class WebModule(Module):
+    """Entry points of a kernel as one module of WebAssembly."""
+
+    suffix = ".wasm"
+
+    @staticmethod
+    def is_readable(content: bytes) -> bool:
+        """Whether the content begins as a module of WebAssembly does."""
+        return content.startswith(web.MAGIC)
 
 
 def template_of(entry: str, variant: Mapping[str, bool]) -> Module:
@@ -208,5 +223,33 @@ class Entry:
 
     def _make(self) -> bytes:
         calling = calls.calling_code(link.ENTRY, self._signature, link.CALL)
-        laws = [module.bitcode() for module in self._laws]
-        return link.emit(link.link(self._template.bitcode(), laws, self._choices, calling))
+        return link.emit(self._linked(calling))
+
+    def _linked(self, calling: str) -> Any:
+        laws = [module.content() for module in self._laws]
+        return link.link(self._template.content(), laws, self._choices, calling)
+
+    @property
+    def sources(self) -> tuple[Any, ...]:
+        """What a module of WebAssembly depends on."""
+        return self.name, self._template.name, [law.name for law in self._laws], sorted(self._choices.items())
+
+    def web_object(self) -> bytes:
+        """Return the entry point as an object of WebAssembly."""
+        calling = calls.calling_code(link.ENTRY, self._signature, link.CALL, bare=True)
+        return web.emit(self._linked(calling), self.name)
+
+    def description(self) -> dict[str, Any]:
+        """Return the arguments and the number of results of the entry point, for a module of WebAssembly."""
+        return {"arguments": web.description_of(self._signature), "results": RESULTS[self.name]}
+
+
+def web_module_of(entries: Sequence[Entry]) -> WebModule:
+    """Return the module of WebAssembly of entry points; making it needs the extra `page`."""
+
+    def make() -> bytes:
+        description = {"laws": entries[0].code.label, "entries": {each.name: each.description() for each in entries}}
+        return web.join({each.name: each.web_object() for each in entries}, description)
+
+    sources = _digest_of(("compile/link.py", "compile/calls.py", "compile/web/build.py"))
+    return WebModule("web", repr(([each.sources for each in entries], sources)), make)

@@ -1,0 +1,111 @@
+"""WebAssembly modules: emitted by llvmlite for wasm32, linked by the linker that the wheel `ziglang` holds.
+
+Each entry point becomes one object, from the same bitcode as its machine code. The linker joins the objects
+of a kernel with the mathematical functions that they call, from zig's C library, which is musl. The module
+imports nothing, so that every browser computes the same bits; it exports its memory, its entry points, which
+take the address of a block of arguments (:func:`printhammer.kernel.compile.calls.calling_code`), and the
+address `__heap_base` from which memory is free. Its custom section `printhammer` is a JSON object that
+describes the arguments; `call.mjs` reads that and calls.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import llvmlite.binding as llvm
+
+from printhammer.errors import PrinthammerError, missing_extra
+from printhammer.kernel.compile import link
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from printhammer.kernel.compile.calls import Signature
+
+SECTION: Final = "printhammer"
+"""Name of the custom section."""
+MAGIC: Final = b"\0asm\1\0\0\0"
+"""First bytes of a module of WebAssembly."""
+
+_FEATURES: Final = "+bulk-memory,+mutable-globals,+nontrapping-fptoint,+sign-ext,+simd128"
+"""Features of WebAssembly 2.0, which browsers have had since 2023."""
+_STACK: Final = 1 << 20
+"""Size of the stack, bytes; several times what an entry point uses."""
+
+
+@cache
+def _machine() -> Any:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    return llvm.Target.from_triple("wasm32-unknown-unknown").create_target_machine(opt=3, features=_FEATURES)
+
+
+def emit(module: Any, name: str) -> bytes:
+    """Return the object of a linked module, whose function `CALL` gets the symbol `name`."""
+    module.get_function(link.CALL).name = name
+    return link.emit(module, _machine())
+
+
+def join(objects: Mapping[str, bytes], description: Mapping[str, Any]) -> bytes:
+    """Return the module of WebAssembly of objects by name, with its description.
+
+    Raises
+    ------
+    InputError
+        The extra `page` is not installed.
+    PrinthammerError
+        The linker fails.
+    """
+    if find_spec("ziglang") is None:
+        raise missing_extra("a module of WebAssembly needs ziglang", "page")
+    with tempfile.TemporaryDirectory() as folder:
+        files = [Path(folder, f"{name}.o") for name in objects]
+        for file, content in zip(files, objects.values(), strict=True):
+            file.write_bytes(content)
+        whole = Path(folder, "whole.wasm")
+        options = [
+            "--no-entry",
+            "--strip-all",
+            f"-z,stack-size={_STACK}",
+            *(f"--export={name}" for name in (*objects, "__heap_base")),
+        ]
+        # A reactor has no main function, which would import what a program needs from its system.
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", "wasm32-wasi", "-mexec-model=reactor"]
+        command += ["-nostartfiles", "-O2", *(f"-Wl,{option}" for option in options)]
+        command += [*map(str, files), "-o", str(whole)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise PrinthammerError(f"zig cannot link a module of WebAssembly: {done.stderr.strip()}")
+        return whole.read_bytes() + _section(SECTION, json.dumps(description).encode())
+
+
+def description_of(signature: Signature) -> Any:
+    """Return a signature for JSON: letters, lists, and objects for tuples whose elements have names."""
+    if isinstance(signature, str):
+        return signature
+    if hasattr(signature, "_asdict"):
+        return {name: description_of(element) for name, element in signature._asdict().items()}
+    return [description_of(element) for element in signature]
+
+
+def _section(name: str, content: bytes) -> bytes:
+    """Return a custom section, in the binary format of WebAssembly."""
+    text = name.encode()
+    payload = _unsigned(len(text)) + text + content
+    return b"\0" + _unsigned(len(payload)) + payload
+
+
+def _unsigned(number: int) -> bytes:
+    """Return a number as LEB128."""
+    encoded = bytearray()
+    while number > 0x7F:
+        encoded.append(number & 0x7F | 0x80)
+        number >>= 7
+    return bytes([*encoded, number])
