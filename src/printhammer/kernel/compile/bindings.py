@@ -7,7 +7,7 @@ import hashlib
 import importlib
 import inspect
 import sys
-from types import FunctionType, ModuleType
+from types import FunctionType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from printhammer.kernel.compile.cache import File
@@ -82,7 +82,11 @@ def syntax_text(node: Any, replaced: Callable[[ast.AST], str | None] = lambda _n
         return "[" + ",".join(filter(None, (syntax_text(each, replaced) for each in node))) + "]"
     if not isinstance(node, ast.AST):
         return repr(node)
-    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+    if (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    ):
         return ""
     text = replaced(node)
     if text is not None:

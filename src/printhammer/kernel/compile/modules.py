@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from printhammer.kernel.compile import calls, link
-from printhammer.kernel.compile.web import build as web
 from printhammer.kernel.compile.bindings import code_digest
 from printhammer.kernel.compile.cache import Code, File, say_once
 from printhammer.kernel.compile.signatures import RESULTS, signature_of
+from printhammer.kernel.compile.web import build as web
 from printhammer.kernel.model.laws import LAW_FUNCTIONS
 
 if TYPE_CHECKING:
@@ -248,7 +248,10 @@ def web_module_of(entries: Sequence[Entry]) -> WebModule:
     """Return the module of WebAssembly of entry points; making it needs the extra `page`."""
 
     def make() -> bytes:
-        description = {"laws": entries[0].code.label, "entries": {each.name: each.description() for each in entries}}
+        description = {
+            "laws": entries[0].code.label,
+            "entries": {each.name: each.description() for each in entries},
+        }
         return web.join({each.name: each.web_object() for each in entries}, description)
 
     sources = _digest_of(("compile/link.py", "compile/calls.py", "compile/web/build.py"))
