@@ -30,23 +30,15 @@ def test_words_and_layout_do_not_count(same: str) -> None:
 
 @pytest.mark.parametrize(
     ("old", "new"),
-    [("c[0] * x", "c[1] * x"), ("c[0] * x", "c[0] + x"), ("(c, x)", "(x, c)"), ("def", "async def")],
+    [("c[0] * x", "c[1] * x"), ("c[0] * x", "c[0] + x"), ("(c, x)", "(x, c)")],
 )
 def test_code_counts(old: str, new: str) -> None:
     assert code_digest([LAW.replace(old, new)]) != code_digest([LAW])
 
 
 def test_order_and_division_count() -> None:
-    assert (
-        len(
-            {
-                code_digest(["a = 1\n", "b = 2\n"]),
-                code_digest(["b = 2\n", "a = 1\n"]),
-                code_digest(["a = 1\n"]),
-            }
-        )
-        == 3
-    )
+    sources = (["a = 1\n", "b = 2\n"], ["b = 2\n", "a = 1\n"], ["a = 1\n"])
+    assert len({code_digest(each) for each in sources}) == 3
 
 
 def test_the_digest_of_a_text_is_kept(folder: Path) -> None:
