@@ -1,5 +1,5 @@
 """Print quality: single dots (`dots`), safe rates and yields (`rates`), and printed pages (`page`).
 
-Every computation takes a hammer and a pattern, simulates ensembles, and returns a frozen result that can be
-tabulated and plotted.
+Each computation simulates a hammer on a dot pattern, in ensembles, and returns an immutable result that can
+be tabulated and plotted.
 """

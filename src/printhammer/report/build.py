@@ -1,4 +1,4 @@
-"""Writing of a report for a hammer.
+"""Write a report: evaluate the claims, draw the figures, and publish page and files atomically.
 
 A report appears atomically: it is written to a hidden folder, which is moved to its place at the end.
 """
@@ -35,7 +35,7 @@ _PICTURE: Final = re.compile(r"figure\d\d\.(svg|pdf|png)")
 
 
 def check_place(out: str | Path) -> None:
-    """Check that a folder contains nothing but an earlier report, which a new report replaces."""
+    """Check that a folder holds no files in the way of a report, except an earlier report to be replaced."""
     folder = Path(out)
     pictures = folder / PICTURES
     drawn = sorted(pictures.iterdir()) if pictures.is_dir() else []
@@ -145,7 +145,7 @@ def write_report(
     Returns
     -------
     Report
-        The judged claims, the figures, and the files.
+        The evaluated claims, the figures, and the written files.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def write_report(
 
 
 def claims_json(results: list[JudgedClaim], rates: BaseRates | None = None) -> str:
-    """Return the claims as JSON: a list of objects with name, kind, value, band, verdict and more."""
+    """Return the evaluated claims as JSON: a list of objects with name, kind, value, band and verdict."""
     entries = []
     for result in results:
         share = rates.share(result.claim.name) if rates is not None else None
@@ -244,7 +244,7 @@ def _draw(
 
 
 def _provenance(hammer: Hammer, context: Context) -> dict[str, Any]:
-    """Return versions and settings, including those of a representative single motion."""
+    """Return software versions and settings of the report, and the provenance of one sample motion."""
     import platform
 
     import matplotlib as mpl

@@ -1,4 +1,4 @@
-"""Contents of a report: judged claims, drawn figures, results of the reconstruction.
+"""Contents of a report: evaluated claims, drawn figures, results of the reconstruction.
 
 `cited_figures` and `linked_source` find the figures that a claim cites.
 
@@ -49,7 +49,7 @@ class Report(Declared):
     files: list[Path] = part("what was written", default_factory=list)
 
     def count(self, verdict: str) -> int:
-        """Return the number of claims with a verdict."""
+        """Return the number of claims with a given verdict, such as "holds"."""
         return sum(result.verdict == verdict for result in self.results)
 
     @property
@@ -65,21 +65,21 @@ class Report(Declared):
 
     @property
     def search(self) -> Search | None:
-        """Search for the constants of this hammer, if any."""
+        """Record of the search that found the constants of this hammer; None for another hammer."""
         search = self.reconstruction.search
         return search if search is not None and search.shipped == self.hammer.fingerprint else None
 
     @property
     def family(self) -> Family | None:
-        """Family of hammers that satisfy the claims equally well, if any."""
+        """Family of hammers that satisfy the claims about as well as this hammer; None for another hammer."""
         return self.reconstruction.family if self.reconstructed else None
 
 
 CITATION: Final = re.compile(r"Figs?\. (?:[\d, and]*\d)")
-"""Pattern of a reference to figures in a source."""
+"""Regular expression that matches a citation of figures, such as "Figs. 3 and 4"."""
 
 SECTIONS: Final = {"Poincaré plots": 11}
-"""Sections of the paper that are about a single figure."""
+"""Figure number of each section of the paper that is about a single figure."""
 
 
 def cited_figures(source: str) -> set[int]:
@@ -105,7 +105,7 @@ def linked_source(source: str, drawn: set[int]) -> Any:
 
 
 class Miss(Declared):
-    """Measured value outside its band, as text."""
+    """Measured value outside the band of its claim, as text."""
 
     words: str = part("what was measured")
     value: str = part("what it is")
@@ -114,7 +114,7 @@ class Miss(Declared):
 
 
 def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
-    """Return the measured values outside the band of a claim; empty if none were measured."""
+    """List the measured values of a claim that lie outside its band; empty if nothing was measured."""
     missed: list[Miss] = []
     if value is None:
         return missed
@@ -131,7 +131,7 @@ def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:
 
 
 def agreement(value: Any, band: list[str]) -> str:
-    """Return the number of words in a list that agree with the band, as text."""
+    """Format how many words of a list equal those in the band, such as "9 of 12 as printed"."""
     words = value if isinstance(value, (list, tuple)) else []
     same = sum(one == other for one, other in zip(words, band, strict=False))
     return f"{same} of {len(band)} as printed"

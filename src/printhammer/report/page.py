@@ -31,7 +31,7 @@ VERDICTS: Final = ("holds", "fails", "not yet")
 
 
 def page(report: Report) -> str:
-    """Return the HTML page of a report."""
+    """Render the HTML page of a report."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -55,7 +55,7 @@ def page(report: Report) -> str:
 
 
 def view(report: Report) -> dict[str, Any]:
-    """Return the data that page and PDF show of a report, as texts and positions on tracks."""
+    """Return the data of a report for page and PDF, as texts and positions on horizontal scales."""
     drawn = {drawing.number for drawing in report.drawings}
     constants = report.hammer.constants.values()
     by_kind = {kind: dict.fromkeys(VERDICTS, 0) for kind in KINDS}
@@ -84,7 +84,7 @@ def view(report: Report) -> dict[str, Any]:
 
 
 def _parts(hammer: Hammer) -> list[dict[str, Any]]:
-    """Return the constants by part."""
+    """Group the constants of a hammer by part, each group with the part's law."""
     laws = {role: part.law for role, part in hammer.parts.items()}
     if hammer.waveform is not None:
         laws["waveform"] = hammer.waveform.shape
@@ -98,7 +98,7 @@ def _parts(hammer: Hammer) -> list[dict[str, Any]]:
 
 
 def _judged_lines(result: JudgedClaim) -> list[dict[str, Any]]:
-    """Return the measured values of a claim that have bands, as text."""
+    """Format the measured values of a claim that have bands: name, value, band, and whether it is met."""
     value, missed = result.value or {}, set(result.missed)
     lines = []
     for name, wanted in result.claim.band.items():
@@ -111,7 +111,7 @@ def _judged_lines(result: JudgedClaim) -> list[dict[str, Any]]:
 
 
 def _claim(result: JudgedClaim, report: Report, drawn: set[int]) -> dict[str, Any]:
-    """Return a claim with its values as text, those with bands separate from the others."""
+    """Return a claim with its values as text; values with bands are listed separately."""
     value, band = result.value or {}, result.claim.band
     rest = {name: entry for name, entry in value.items() if name not in band}
     plain = {

@@ -60,7 +60,7 @@ def write_pdf(report: Report, path: Path) -> None:
 
 
 def _contents(report: Report) -> dict[str, Any]:
-    """Return the data of the template."""
+    """Collect the data that the Typst template of a report receives."""
     hammer, shown = report.hammer, view(report)
     shown = {key: shown[key] for key in _SHOWN}
     if shown["search"] is not None:

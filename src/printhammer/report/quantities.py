@@ -1,4 +1,4 @@
-"""Measured values and bands as text: SI with a convenient prefix, and inch-pound units."""
+"""Measured values and bands as text: in SI units with prefixes, and in inch-pound units."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def split_name(name: str) -> tuple[str, str]:
 
 
 def words_of(name: str) -> str:
-    """Return a name as words."""
+    """Convert a name with underscores to words."""
     return name.replace("_", " ")
 
 
@@ -70,7 +70,7 @@ def value_text(value: Any, unit: str, *, other: bool = True) -> str:
 
 
 def band_text(band: Any, unit: str) -> str:
-    """Format a band: the required value."""
+    """Format the band of a claim as text: a range, a bound, or the required value."""
     if isinstance(band, dict):
         return " and ".join(_WORDS[side].format(_limit(limit, unit)) for side, limit in band.items())
     if isinstance(band, list) and band and isinstance(band[0], str):

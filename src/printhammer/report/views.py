@@ -1,4 +1,4 @@
-"""Data for the templates of a report: results of search and family, as text and positions on tracks."""
+"""Data for the templates of a report: search and family results as text and positions on scales."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SAME: Final = 1e-9
 
 
 def share_view(share: Share, floor: float | None = None) -> dict[str, Any]:
-    """Relative difference up to which two constants count as equal; larger than errors of unit conversion."""
+    """Return a fraction with its interval, as text and as positions in percent of a scale."""
     low, high = share.interval
 
     def place(part: float) -> float:
@@ -147,7 +147,7 @@ def predictions_view(report: Report) -> dict[str, Any] | None:
 
 
 def failing_view(report: Report) -> list[dict[str, Any]]:
-    """Return the failing claims: distance from the band, reason, and the best hammer met for each."""
+    """Return the failing claims, each with its distance from the band, the reason, and the best hammer."""
     search = report.search
     rows = []
     for result in report.results:
@@ -192,7 +192,7 @@ def _best_view(best: BestFor, claim: Claim, hammer: Hammer) -> dict[str, Any]:
 
 
 def timings_view(report: Report) -> dict[str, Any]:
-    """Return the computation times of figures and claims, the slowest first."""
+    """Return the computation times of figures and claims, s, the slowest first."""
     entries: list[tuple[str, str, float]] = [
         (f"Figure {drawing.number}", f"figure-{drawing.number}", drawing.seconds)
         for drawing in report.drawings
@@ -211,7 +211,7 @@ def timings_view(report: Report) -> dict[str, Any]:
 
 
 _ROOM: Final = 4.0
-"""Margin of a track at each end, in percent; arbitrary."""
+"""Margin at each end of a scale, in percent of its length; arbitrary."""
 
 
 def family_view(report: Report) -> dict[str, Any] | None:
@@ -249,7 +249,7 @@ def _conclusions(family: Family) -> list[dict[str, Any]]:
 
 
 def _dots(values: Iterable[float], ends: tuple[float, float] | None = None) -> list[str]:
-    """Return positions on a track, in percent, linear between the smallest and the largest value."""
+    """Return positions on a scale, in percent, linear between the smallest and the largest value."""
     values = list(values)
     low, high = ends or (min(values, default=0.0), max(values, default=0.0))
     span = high - low

@@ -1,1 +1,1 @@
-"""Dots: what is fired and when, how dots are judged, and how the hammer settles after them."""
+"""Dots: drive strategies, comparison of dots with the single-pulse dot, and settling after a dot."""

@@ -39,18 +39,18 @@ FEWEST: Final = 6  # Consecutive dots without a backstop touch that count as buz
 _PULSES: Final = 9  # Number of pulses of a train, as in the paper
 _PERIODS: Final = 96  # Number of even intervals tried
 _DELAY_STEP: Final = 2e-6
-"""Spacing of the delays searched, s."""
+"""Spacing of the grid of trial delays, s."""
 
 _DELAYS: Final = 400  # Maximum number of delays searched; a slow hammer gets a wider spacing instead
 
 PATIENCE: Final = 3.0
-"""Time to wait for a dot after its firing, in times from firing to departure of the single pulse."""
+"""Time to wait for a dot, as a multiple of the single pulse's time from firing to departure from the pack."""
 
 _ZOOMS, _PER_ZOOM = 2, 4  # Number of refinements, and factor on the spacing of each
 
 
 class Run(Declared):
-    """Longest run of consecutive dots within the force range and without a backstop touch in between.
+    """Longest run of consecutive dots within the force range, without a backstop touch in between.
 
     Each firing of the run makes one dot.
     """
@@ -60,7 +60,7 @@ class Run(Declared):
     clear: bool = part(
         "whether no dot is lost and the backstop is not touched from the first dot of the train, which starts"
         " from rest, to the last dot of the run",
-        more="the whole burst stays clear, not only the dots that count",
+        more="the whole burst, not only the run, stays clear of the backstop",
     )
     touches: tuple[int, int, int] = part(
         "backstop touches before the first dot of the run, between its first and last dot, and after its last"
@@ -70,17 +70,17 @@ class Run(Declared):
 
     @property
     def count(self) -> int:
-        """Number of dots in the run; 0 if no dot counts."""
+        """Number of dots in the run; 0 if no dot is within the force range."""
         return len(self.forces)
 
     @property
     def weakest(self) -> float:
-        """Smallest of the relative peak forces of the run; 0 if it is empty."""
+        """Smallest peak force of the run, as a fraction of the single-pulse force; 0 if the run is empty."""
         return min(self.forces, default=0.0)
 
     @property
     def touches_text(self) -> str:
-        """The backstop touches as a sentence for a report."""
+        """Sentence for a report: number of backstop touches before, within and after the run."""
         before, between, after = self.touches
         return (
             f"Touches of the backstop: {before} before the first dot that counts, {between} between it and"
@@ -89,7 +89,7 @@ class Run(Declared):
 
 
 class BuzzTrain(Run):
-    """A simulated train of pulses and its longest run of dots that count."""
+    """A simulated pulse train, with its longest run of dots within the force range."""
 
     kind: Literal["uniform", "delayed"] = part(
         '"uniform": pulses one period apart; "delayed": each a constant delay after leaving the pack'
@@ -100,12 +100,12 @@ class BuzzTrain(Run):
 
 
 class BuzzSearch(Declared):
-    """Result of a search for buzz printing."""
+    """Result of a search for a buzz printing train: the best train, or the reason for the failure."""
 
     train: BuzzTrain | None = part("the best train, if it prints enough dots; otherwise None")
     reason: str = part("why no train prints enough dots, in one sentence; otherwise empty")
     best: BuzzTrain | None = part(
-        "the best train simulated, equal to `train` on success; None if no dot of any train counts"
+        "the best train simulated, equal to `train` on success; None if no train has a dot in the force range"
     )
     reference_force: float = part("peak force of the single-pulse dot, N; 0 if the single pulse makes no dot")
     tried: int = part("number of trains simulated")
@@ -121,13 +121,14 @@ def find_buzz_train(
 ) -> BuzzSearch:
     """Search for a pulse train that prints without touching the backstop.
 
-    The search is a grid search over one number, refined around the three best values. Even trains come first,
-    since they need no sensor: periods from half the flight time of a single pulse up to its return to the
-    backstop. If no even train both prints enough dots and stays clear from its first dot on, delayed trains
-    follow: delays from 0, at the departure from the pack, up to the return, every 2 us or 400 delays,
-    whichever is coarser. A delayed train is built firing by firing. A dot is waited for three times as long
-    as a single pulse takes from firing to departure. Trains are ranked by whether they have enough dots, then
-    whether they stay clear, then by the number of dots, then by the weakest dot. The search is deterministic.
+    The search is a grid search over one number, the period or the delay, refined around the three best
+    values. Even trains come first, since they need no sensor: periods from half the flight time of a single
+    pulse up to its return to the backstop. If no even train both prints enough dots and stays clear from its
+    first dot on, delayed trains follow: delays from 0, at the departure from the pack, up to the return,
+    every 2 us or 400 delays, whichever is coarser. A delayed train is built firing by firing. A dot is waited
+    for three times as long as a single pulse takes from firing to departure. Trains are ranked by whether
+    they have enough dots, then whether they stay clear, then by the number of dots, then by the weakest dot.
+    The search is deterministic.
 
     Parameters
     ----------
@@ -144,8 +145,8 @@ def find_buzz_train(
 
     Returns
     -------
-    The train, or the reason for the failure and the best train simulated.
-        The train, or the reason why there is none and the best attempt.
+    BuzzSearch
+        The train, or the reason for the failure and the best train simulated.
 
     Raises
     ------
@@ -156,9 +157,10 @@ def find_buzz_train(
 
 
 def longest_run(motion: Motion, reference_force: float, forces: tuple[float, float] = FORCES) -> Run:
-    """Return the longest run of dots with a peak force, over `reference_force` (N), within `forces`.
+    """Return the longest run of dots whose peak force, as a fraction of `reference_force`, is in `forces`.
 
-    The first run wins a tie. Without a dot that counts, every touch is reported as before the run.
+    `reference_force` is in N. The first run wins a tie. Without any dot in the range, every touch is reported
+    as before the run.
     """
     returns = [contact.t_in for contact in touches(motion)]
     best: list[tuple[int, float, float]] = []
@@ -193,7 +195,7 @@ def longest_run(motion: Motion, reference_force: float, forces: tuple[float, flo
 def delayed_train(hammer: Hammer, delay: float, pulses: int = _PULSES) -> tuple[float, ...]:
     """Compute the firing times, s, of a train that fires a constant delay after each departure from the pack.
 
-    The train is shorter than `pulses` if a firing makes no dot, since no departure follows.
+    The train has fewer than `pulses` firings if a firing makes no dot, since no departure follows.
     """
     leaving = _leaving(_run(hammer, [0.0], None))
     return (0.0,) if leaving is None else delayed_trains([hammer], [delay], [PATIENCE * leaving], pulses)[0]
@@ -259,7 +261,7 @@ def _leaving(motion: Motion) -> float | None:
 
 
 class _Search:
-    """The search for one hammer, with its settings and its best train so far."""
+    """Search for a buzz printing train of one hammer: its settings, and the best train so far."""
 
     def __init__(
         self, hammer: Hammer, pulses: int, fewest: int, forces: tuple[float, float], max_current: float
@@ -312,11 +314,11 @@ class _Search:
 
     @property
     def _done(self) -> bool:
-        """Whether a train is good enough to end the search."""
+        """Whether the best train is good enough to end the search: enough dots, and clear of the backstop."""
         return self.best is not None and self.best.clear and self.best.count >= self.fewest
 
     def _scan(self, grid: np.ndarray, trial: Callable[[Sequence[float]], list[BuzzTrain]]) -> None:
-        """Simulate a grid and, unless a train is good enough, finer grids around the three best trains."""
+        """Simulate a grid of trains and, unless one is good enough, finer grids around the best three."""
         trains = {train.interval: train for train in trial(grid.tolist())}
         step, known = float(grid[1] - grid[0]), set(grid.tolist())
         for _ in range(_ZOOMS):
@@ -345,7 +347,7 @@ class _Search:
         intervals: Sequence[float],
         trains: Sequence[tuple[float, ...]],
     ) -> list[BuzzTrain]:
-        """Simulate trains; return those with a dot that counts and a current within the limit."""
+        """Simulate trains; return those with a dot in the force range and a current within the limit."""
         self.tried += len(trains)
         judged = []
         for interval, times in zip(intervals, trains, strict=True):

@@ -1,4 +1,4 @@
-"""Judging of dots: deviations of force and arrival from the single-pulse dot, and the limits on them."""
+"""Evaluation of dots: deviations of force and arrival from the single-pulse dot, compared with limits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ class Judgement(Declared):
     """Deviations of dots from the single-pulse dot, compared with the limits."""
 
     wanted: BoolArray = column(
-        "1", "where a dot is judged; elsewhere the other columns are False or NaN", "member firing"
+        "1",
+        "mask of the dots that are evaluated; elsewhere the other columns are False or NaN",
+        "member firing",
     )
     run: BoolArray = column("1", "whether the simulation reached the dot", "member firing")
     lost: BoolArray = column("1", "whether the firing made no dot", "member firing")
@@ -33,13 +35,13 @@ class Judgement(Declared):
         "s", "touch minus slot time and single-pulse flight time", "member firing", more="NaN for a lost dot"
     )
     extra_contacts: IntArray = column(
-        "1", "extra pack contacts beyond those of the single pulse", "member firing", more="not below 0"
+        "1", "extra pack contacts beyond those of the single pulse", "member firing", more="at least 0"
     )
-    limits: Limits = part("limits that the dots are judged by")
+    limits: Limits = part("limits on the deviations of the dots")
 
     @property
     def faults(self) -> IntArray:
-        """Index in `FAULTS` of the first fault of each dot; -1 for a good dot and where no dot is judged."""
+        """Index in `FAULTS` of each dot's first fault; -1 for a good dot, and where no dot is evaluated."""
         first = np.full(self.wanted.shape, -1)
         # The comparisons are negated so that NaN counts as a fault.
         with np.errstate(invalid="ignore"):
@@ -61,7 +63,7 @@ class Judgement(Declared):
 
     @property
     def passed(self) -> BoolArray:
-        """Mask of the members whose requested dots are all within limits, shape (members,)."""
+        """Mask of the ensemble members whose requested dots are all within limits, shape (members,)."""
         return np.asarray((self.faults < 0).all(axis=1))
 
 
@@ -136,7 +138,7 @@ class Limits(Declared):
 
     @property
     def text(self) -> str:
-        """The limits in plain text, with microseconds."""
+        """The limits in plain text, with times in microseconds."""
         return (
             f"force within {100.0 * self.force:g} %, arrival within {1e6 * self.arrival:g} us,"
             f" {self.extra_contacts} extra contacts"
@@ -144,7 +146,7 @@ class Limits(Declared):
 
     @property
     def said(self) -> str:
-        """The limits in words, as a summary shows them."""
+        """The limits in words, for summaries, with a suitable unit of time."""
         return (
             f"force within {100.0 * self.force:g} %, arrival within {quantity(self.arrival, 's')},"
             f" {self.extra_contacts} extra contacts"
@@ -165,8 +167,8 @@ PRESETS: Final = {
     "dot-matrix": Limits(arrival=0.5 * DOT_MATRIX_SPREAD),
     "engraved": Limits(arrival=0.5 * ENGRAVED_SPREAD),
 }
-"""Limits by name. The spreads of the paper are peak to peak, so half of each is allowed to either side;
-"slots" are the default limits, by which drives are compared."""
+"""Presets of the limits, by name. The paper's spreads are peak to peak, so half of each is allowed to either
+side; "slots" is the default, with which drives are compared."""
 
 
 def limits_named(name: str) -> Limits:

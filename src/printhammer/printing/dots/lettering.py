@@ -42,7 +42,7 @@ _DOT: Final = "#"
 
 @cache
 def glyphs() -> Mapping[str, BoolArray]:
-    """Return the dots of each character of the built-in font: (9, 6), wires from the top by columns."""
+    """Return the dots of each character of the built-in font, shape (9, 6): wires from the top, columns."""
     text = (files("printhammer.printing.dots") / "fonts" / "nine-wire.txt").read_text("utf-8")
     drawn = {" ": np.zeros((WIRES, ADVANCE), np.bool_)}
     # Blank lines separate the groups; the first group says what the file is.
@@ -74,7 +74,7 @@ def standard_font() -> Path:
 
 
 class OutlineFont:
-    """A TrueType or OpenType font, sized so that ASCII and a text fit on a number of wires.
+    """A TrueType or OpenType font, sized so that ASCII characters and a given text fit on the wires.
 
     Raises
     ------
@@ -96,7 +96,7 @@ class OutlineFont:
         return [mark for mark in dict.fromkeys(text) if ord(mark) not in known]
 
     def glyph(self, mark: str) -> BoolArray:
-        """Return the dots of one character, wires from the top by columns, with at least one column."""
+        """Return the dots of one character, shape (wires, columns), with wire 0 at the top."""
         from PIL import Image, ImageDraw
 
         width = max(1, round(self._font.getlength(mark)))
@@ -117,7 +117,7 @@ def _opened(path: Path, size: int) -> FreeTypeFont:
 
 @lru_cache(maxsize=16)
 def _fitted(path: Path, wires: int, marks: str) -> tuple[FreeTypeFont, int]:
-    """Return the font at the largest size that fits, and the number of wires above the base line."""
+    """Load the font at the largest size that fits the wires; return it and the wires above the base line."""
     for size in range(_LARGER * wires, 0, -1):
         font = _opened(path, size)
         boxes = [font.getbbox(mark, mode="1", anchor="ls") for mark in marks]
@@ -160,7 +160,7 @@ def broken(text: str, columns: int = COLUMNS) -> list[str]:
 def lettered(
     text: str, wires: int = WIRES, font: str | Path | None = None, columns: int = COLUMNS
 ) -> BoolArray:
-    """Set a text in dots, shape (lines, wires, slots); see `Pattern.from_text`."""
+    """Convert a text to dots, shape (lines, wires, slots); see `Pattern.from_text`."""
     if columns < 1:
         raise InputError.of("columns", columns, "1 or more characters in a line", written=str(columns))
     if not text.strip():

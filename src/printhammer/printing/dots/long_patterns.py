@@ -1,4 +1,4 @@
-"""Long patterns that drives are judged by: the de Bruijn cycle, rows of dots, and a line of text.
+"""Long test patterns for drives: the de Bruijn cycle, rows of dots, and a line of text.
 
 The cycle holds every word of eight slots, but at most eight dots in a row. An error may grow from dot to dot
 and show only in a longer row, so rows have 200 slots, with a dot in every slot, every second or every third.
@@ -25,7 +25,7 @@ KINDS: Final = get_args(Kind)
 
 
 class LongPattern(NamedTuple):
-    """A long pattern: its kind, the slots of its dots, and the first slot that is judged."""
+    """A long test pattern: its kind, the slots of its dots, and the first slot that is evaluated."""
 
     kind: Kind
     slots: tuple[int, ...]
@@ -39,7 +39,7 @@ def row_of_dots(step: int = 1) -> tuple[int, ...]:
 
 @cache
 def long_patterns() -> tuple[LongPattern, ...]:
-    """Return the cycle with its lead-in, the rows, and one pattern per wire for the line of text.
+    """Return the long test patterns: cycle with lead-in, rows, and the line of text, one pattern per wire.
 
     Patterns of the same kind are consecutive.
     """

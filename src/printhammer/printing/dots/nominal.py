@@ -1,4 +1,4 @@
-"""The single-pulse dot, the reference that all other dots are judged by."""
+"""The single-pulse dot: the reference with which all other dots are compared."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class SinglePulse(Declared):
     force: float = scalar("N", "largest pack force")
     flight_time: float = scalar("s", "time from firing to touch")
     extra_contacts: int = scalar(
-        "1", "number of extra pack contacts, as of bounces on a stop", default=0, kw_only=True
+        "1", "number of extra pack contacts, e.g. from bounces on a stop", default=0, kw_only=True
     )
 
 
@@ -86,7 +86,8 @@ def single_pulses(
 ) -> list[SinglePulse | None]:
     """Simulate one pulse from rest for each of many hammers; `waveforms` replace the hammers' own waveforms.
 
-    An entry is None where the pulse makes no dot or the simulation ended early. Every hammer needs a pack.
+    The entry of a hammer is None if its pulse makes no dot or its simulation ended early. Every hammer needs
+    a pack.
     """
     if not hammers:
         return []

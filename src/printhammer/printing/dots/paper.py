@@ -34,7 +34,7 @@ _UNITS: Final = {"stiffness": "1", "front": "m", "length": "m"}
 
 
 class Paper(Declared):
-    """Random variation of pack stiffness and front along a line, about the values of the hammer."""
+    """Random variation of pack stiffness and pack front along a print line, about the hammer's values."""
 
     stiffness: float = part("standard deviation of the stiffness of the pack, relative", default=0.05)
     front: float = scalar("m", "standard deviation of the front of the pack", default=3e-6)
@@ -79,14 +79,14 @@ class Paper(Declared):
 
     @property
     def text(self) -> str:
-        """The variation in words, for a report."""
+        """Standard deviations and correlation length in words, for a report."""
         return (
             f"stiffness {100.0 * self.stiffness:g} %, front {1e6 * self.front:g} µm, correlated over"
             f" {1e3 * self.length:g} mm"
         )
 
     def deviations(self, slots: int, pitch: float) -> FloatArray:
-        """Draw stiffness and front, (2, slots), in standard deviations, for a slot pitch in m."""
+        """Draw deviations of stiffness and front, (2, slots), in standard deviations; `pitch` is in m."""
         rng = np.random.default_rng(self.seed)
         white = rng.standard_normal((2, slots))
         kept = math.exp(-pitch / self.length) if self.length else 0.0
@@ -96,7 +96,7 @@ class Paper(Declared):
         return np.asarray(np.clip(off, -_WIDEST, _WIDEST))
 
     def hammers(self, hammer: Hammer, slots: int, pitch: float) -> tuple[Hammer, ...]:
-        """Return the hammer at each slot, for a slot pitch in m; the platen does not move."""
+        """Return the hammer with the pack at each slot, for a slot pitch in m; the platen does not move."""
         spread = {"pack.stiffness": self.stiffness, "pack.front": self.front}
         for key, value in spread.items():
             if value and key not in hammer.constants:

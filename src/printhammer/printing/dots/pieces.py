@@ -50,7 +50,7 @@ class PiecewiseMotion:
 
     @property
     def contacts(self) -> list[Contact]:
-        """All contacts, in order of touch time; a contact split between two segments is joined."""
+        """All contacts, in order of touch time; a contact split between two segments is merged."""
         contacts: list[Contact] = []
         for motion in self._pieces:
             for contact in motion.contacts:
@@ -63,7 +63,7 @@ class PiecewiseMotion:
 
     @property
     def dots(self) -> list[Dot]:
-        """The outcome of each firing up to the end of the simulation."""
+        """Dots of all firings up to the end of the simulation, in order."""
         dots: dict[int, Dot] = {}
         for motion in self._pieces:
             for dot in motion.dots:
@@ -77,7 +77,7 @@ class PiecewiseMotion:
 
     @property
     def energy(self) -> Ledger:
-        """The energy ledger of the whole run: the sums over its segments."""
+        """Energy ledger of the whole run: each term is the sum over the segments."""
         ledgers = [motion.energy for motion in self._pieces]
         names = [field.name for field in fields(Ledger)]
         return Ledger(**{name: sum(getattr(ledger, name) for ledger in ledgers) for name in names})

@@ -67,7 +67,7 @@ class Settling(Declared):
     settle_out: float | None = scalar(
         "s",
         "time from the firing until the armature stays within `SETTLED` of the stroke from its rest position",
-        more="None if it has not settled within `CYCLE` or two windows, see `printhammer.run.window`",
+        more="None if not settled within `CYCLE` or two windows, see `printhammer.run.window`",
     )
     rebounds: int = part("number of rebounds from the backstop higher than `SETTLED` of the stroke")
     highest: float = part("height of the highest rebound, as a fraction of the stroke; 0 without a rebound")
@@ -80,7 +80,7 @@ class Settling(Declared):
 
 
 def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float = TOLERANCE) -> Settling:
-    """Simulate one pulse from rest, by default the hammer's own, and measure the settling."""
+    """Simulate one pulse from rest, by default the hammer's own, and compute settling and backstop wear."""
     if hammer.position is None:
         raise InputError(
             f"{hammer.path}: the hammer has no backstop",
@@ -131,7 +131,7 @@ def touches(motion: Motion | PiecewiseMotion) -> list[Contact]:
 
 
 def wear_of(motion: Motion | PiecewiseMotion) -> Wear:
-    """Compute the load on the backstop in a motion."""
+    """Compute the load on the backstop in a motion: touches, impulse, loss, largest speed and force."""
     mass, contacts = motion.hammer.mass, touches(motion)
     forces = [contact.peak_force for contact in contacts if contact.peak_force is not None]
     return Wear(
@@ -157,7 +157,7 @@ def rebounds(motion: Motion, position: float) -> list[Rebound]:
 
 
 def settled_from(away: BoolArray) -> int:
-    """Return the index from which on no sample is away; the number of samples if the last one is away."""
+    """Return the index of the first sample after the last True in a mask of samples away from rest."""
     places = np.flatnonzero(away)
     return int(places[-1]) + 1 if places.size else 0
 
@@ -165,7 +165,7 @@ def settled_from(away: BoolArray) -> int:
 def _settled(motion: Motion, rest: float, limit: float) -> float | None:
     """Locate by bisection the time, s, of the last departure from within `limit` (m) of the rest position.
 
-    The time counts from the firing; None if the armature is never away, or away at the end.
+    The time counts from the firing; None if the armature never leaves the limit, or is outside it at the end.
     """
     count = round((motion.end - motion.start) / _SPACING) + 1
     grid = np.union1d(np.linspace(motion.start, motion.end, count), motion.maxima[0])

@@ -1,7 +1,7 @@
-"""Drive strategies: functions from a requested dot pattern to a drive.
+"""Drive strategies: functions that map a requested dot pattern to a drive.
 
-The open loop is here; compensation tables and feedback are strategies too. A pattern is a row of slots, times
-one period apart, in each of which a dot is requested or not.
+The open loop is defined here; compensation tables and feedback are strategies too. A pattern is a row of
+slots, one period apart in time, each with or without a requested dot.
 """
 
 from __future__ import annotations
@@ -70,22 +70,22 @@ def de_bruijn(order: int = SLOTS) -> BoolArray:
 
 
 def cycle_with_lead_in(order: int = SLOTS, lead_in: int = LEAD_IN) -> BoolArray:
-    """Return one turn of the de Bruijn cycle, preceded by its own last `lead_in` slots.
+    """Return one turn of the de Bruijn cycle, preceded by the last `lead_in` slots of the cycle.
 
-    The run begins at rest with the lead-in, so that every judged slot, from index `lead_in` on, has the same
-    past as in an endless cycle for at least `lead_in` slots.
+    The run begins at rest with the lead-in, so that every evaluated slot, from index `lead_in` on, has the
+    same last `lead_in` slots before it as in an endless cycle.
     """
     cycle = de_bruijn(order)
     return np.concatenate([np.resize(cycle[::-1], lead_in)[::-1], cycle])
 
 
 def slots_of(pattern: npt.ArrayLike) -> tuple[int, ...]:
-    """Return the indices of the slots with a dot."""
+    """Return the indices of the slots with a requested dot."""
     return tuple(np.flatnonzero(np.asarray(pattern, dtype=np.bool_)).tolist())
 
 
 def slot_times(slots: Sequence[int] | IntArray, rate: float, first: float = FIRST_SLOT) -> FloatArray:
-    """Return the times of slots, s, for slot indices of any shape."""
+    """Compute the times of slots, s, from slot indices of any shape and a slot rate, Hz."""
     return first + np.asarray(slots, dtype=np.float64) / rate
 
 
@@ -157,6 +157,6 @@ def checked_drives(
 
 
 def name_of(strategy: Strategy) -> str:
-    """Return the name of a strategy, such as "open loop"."""
+    """Return the name of a drive strategy, such as "open loop"."""
     name = getattr(strategy, "name", None) or getattr(strategy, "__name__", type(strategy).__name__)
     return str(name).replace("_", " ")

@@ -31,7 +31,7 @@ class Case(NamedTuple):
 
 
 class Trial(Declared):
-    """Outcome of all patterns in all cases; members are ordered by case, then by pattern."""
+    """Dots of all patterns in all cases (hammer and rate); members are ordered by case, then by pattern."""
 
     cases: tuple[Case, ...] = part("hammers and rates")
     patterns: tuple[tuple[int, ...], ...] = part("indices of the slots with a dot")
@@ -52,7 +52,7 @@ class Trial(Declared):
         return np.asarray(self.judgement.passed.reshape(len(self.cases), -1).all(axis=1))
 
     def rows(self, case: int) -> slice:
-        """Return the member indices of a case."""
+        """Return the member indices of a case, as a slice with one member per pattern."""
         return slice(case * len(self.patterns), (case + 1) * len(self.patterns))
 
 
@@ -111,6 +111,6 @@ def attempt(
 
 
 def fired_of(strategy: Strategy, hammer: Hammer, drive: Drive) -> Waveform:
-    """Return the waveform that sets the simulation length: the strategy's, the hammer's or the drive's."""
+    """Return the waveform that sets the simulation length: that of the strategy, hammer or drive."""
     own = getattr(strategy, "waveform", None)
     return own if isinstance(own, Waveform) else hammer.waveform or longest_of(drive)

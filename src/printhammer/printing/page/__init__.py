@@ -1,1 +1,1 @@
-"""Pages: dot patterns by wire and column, and the page that a head prints from them."""
+"""Printed pages: dot patterns by wire and column, and the dots that a print head makes of them."""

@@ -1,4 +1,4 @@
-"""The printed page: the position and darkness of every dot.
+"""The printed page: position and darkness of every dot on the paper.
 
 Each wire of each print line is a separate simulation from rest; all of them form one ensemble. The carriage
 passes slot n at n / rate after slot 0, at the speed rate x pitch. A dot lands where the carriage is at touch;
@@ -102,7 +102,7 @@ def head_of(
     density: float = DENSITY,
     line_gap: float = LINE_GAP,
 ) -> Head:
-    """Return a head with assumed dimensions, by default as high as one of nine wires.
+    """Build a print head with assumed dimensions, by default as high as a head of nine wires.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Page(Result, rows="dot"):
     rate: float = scalar("Hz", "slot rate")
     strategy: str = scalar("", "name of the drive strategy")
     nominal: Nominal = part("single-pulse dot")
-    limits: Limits = part("limits that the dots are judged by")
+    limits: Limits = part("limits on the deviations of the dots")
     line: IntArray = column("1", "print line", "dot", more="of the requested dot, counted from 0")
     wire: IntArray = column("1", "wire; the topmost is 0", "dot")
     slot: IntArray = column("1", "slot", "dot", more="counted from 0")
@@ -160,7 +160,7 @@ class Page(Result, rows="dot"):
     )
     arrival_deviation: FloatArray = column(
         "s",
-        "touch minus slot time and nominal flight time",
+        "touch minus slot time and single-pulse flight time",
         "dot",
         more="NaN for a lost dot, as in the columns that follow",
     )
@@ -170,7 +170,7 @@ class Page(Result, rows="dot"):
     extra_contacts: IntArray = column("1", "number of extra pack contacts", "dot")
     extra_of: IntArray = column("1", "dot that the extra contact belongs to", "extra")
     extra_arrival: FloatArray = part(
-        "touch of each extra contact minus slot time and nominal flight time, s", repr=False
+        "touch of each extra contact minus slot time and single-pulse flight time, s", repr=False
     )
     extra_force: FloatArray = column("N", "largest pack force of the extra contact", "extra")
     run_line: IntArray = column(
@@ -182,7 +182,7 @@ class Page(Result, rows="dot"):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the hammer that prints the page."""
         return f"page printed by {self.hammer.name}"
 
     def summary(self) -> Summary:
@@ -226,7 +226,7 @@ class Page(Result, rows="dot"):
         return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
-        """Return pattern, head, single pulse and limits."""
+        """Return pattern, head, single-pulse dot and limits, as attributes of the Dataset."""
         pattern, head, single, limits = self.pattern, self.head, self.nominal, self.limits
         return {
             "pattern": pattern.name,
@@ -238,14 +238,14 @@ class Page(Result, rows="dot"):
         }
 
     def entries(self) -> Entries:
-        """Return the columns: those of the fields, faults by name, and positions on the paper."""
+        """Return the dot columns: the fields, the faults by name, and the positions on the paper."""
         (x, y), (extra_x, extra_y) = self.places, self.extra_places
         more = (
             ("fault", "1", "first fault, by the limits", "dot", _FAULTS[self.fault]),
-            ("x", "m", "place of the dot, from the middle of slot 0 to the right", "dot", x),
-            ("y", "m", "place of the dot, from the topmost wire down", "dot", y),
-            ("extra_x", "m", "place of the extra contact, as x", "extra", extra_x),
-            ("extra_y", "m", "place of the extra contact, as y", "extra", extra_y),
+            ("x", "m", "position of the dot, from the middle of slot 0 to the right", "dot", x),
+            ("y", "m", "position of the dot, from the topmost wire down", "dot", y),
+            ("extra_x", "m", "position of the extra contact; coordinate as x", "extra", extra_x),
+            ("extra_y", "m", "position of the extra contact; coordinate as y", "extra", extra_y),
         )
         columns = {
             name: (Column(unit, meaning, (dim,), name=name), values)
@@ -260,35 +260,35 @@ class Page(Result, rows="dot"):
 
     @property
     def printed(self) -> BoolArray:
-        """Mask of the dots that are on the paper."""
+        """Mask of the requested dots that are on the paper."""
         return self.run & ~self.lost
 
     @property
     def good(self) -> BoolArray:
-        """Mask of the dots that are within limits."""
+        """Mask of the requested dots that are within limits."""
         return np.asarray(self.fault < 0)
 
     @property
     @derived("m", "position minus intended position, along the line", "dot")
     def placement_error(self) -> FloatArray:
-        """Distance from the intended position, m, positive in the carriage direction; NaN without a dot."""
+        """Distance of each dot from its intended position, m, positive in carriage direction; NaN if lost."""
         return self.arrival_deviation * self.speed
 
     @property
-    @derived("1", "largest pack force over that of the single pulse", "dot")
+    @derived("1", "largest pack force over the largest pack force of the single pulse", "dot")
     def force_ratio(self) -> FloatArray:
-        """Peak force over that of the single pulse; NaN without a dot."""
+        """Peak force of each requested dot over the single-pulse peak force; NaN for a lost dot."""
         return self.peak_force / self.nominal.force
 
     @property
     @derived("1", "fraction of light absorbed", "dot")
     def darkness(self) -> FloatArray:
-        """Fraction of light that the dot absorbs, 0 to 1; NaN without a dot."""
+        """Fraction of light that each requested dot absorbs, 0 to 1; NaN for a lost dot."""
         return darkness(self.density)
 
     @property
     def density(self) -> FloatArray:
-        """Optical density of each dot; NaN without a dot."""
+        """Optical density of each requested dot; NaN for a lost dot."""
         return self.head.density * self.force_ratio
 
     @property
@@ -305,18 +305,18 @@ class Page(Result, rows="dot"):
 
     @property
     def extra_places(self) -> tuple[FloatArray, FloatArray]:
-        """Position of each extra contact, m; coordinates as in `places`."""
+        """Position of the mark of each extra contact, m; coordinates as in `places`."""
         across, down = self.intended
         return np.asarray(across[self.extra_of] + self.extra_arrival * self.speed), down[self.extra_of]
 
     @property
     def extra_density(self) -> FloatArray:
-        """Optical density of each extra contact."""
+        """Optical density of the mark of each extra contact."""
         return self.head.density * self.extra_force / self.nominal.force
 
     @property
     def fault_counts(self) -> dict[str, int]:
-        """Number of dots by their first fault."""
+        """Number of dots for each first fault, by name."""
         return {name: int((self.fault == number).sum()) for number, name in enumerate(FAULTS)}
 
     def worst_place(self, slots: int) -> tuple[int, int]:
@@ -340,7 +340,7 @@ class Page(Result, rows="dot"):
 
 
 def darkness(density: npt.ArrayLike) -> FloatArray:
-    """Return the fraction of light absorbed by ink of an optical density."""
+    """Convert an optical density to the fraction of light absorbed, 1 - 10^-density."""
     return np.asarray(1.0 - 10.0 ** -np.asarray(density, dtype=np.float64))
 
 
@@ -357,12 +357,12 @@ def print_page(
     effort: Effort = DISPLAY,
     **_keywords: Unpack[Keywords],
 ) -> Page:
-    """Print a pattern, or a text in the built-in font, with the same hammer on every wire.
+    """Simulate the printing of a pattern or text, with the same hammer on every wire of the head.
 
     Parameters
     ----------
     hammer : Hammer
-        The hammer of every wire.
+        Hammer of every wire.
     what : Pattern or str
         Requested dots; a text is set in the built-in font of nine wires.
     rate : float or str
@@ -432,7 +432,7 @@ def print_page(
 
 
 def _dots_of(trial: Trial) -> dict[str, Any]:
-    """Collect the columns of the dots and extra contacts of a trial, wire after wire."""
+    """Collect the page columns of the dots and extra contacts of a trial, wire after wire."""
     ((_hammer, single, _rate),) = trial.cases
     dots, extra, judged, wanted = trial.dots, trial.extra, trial.judgement, trial.slots >= 0
     assert extra is not None

@@ -1,4 +1,4 @@
-"""Patterns: the dots requested of each wire in each slot of each print line, and their files.
+"""Dot patterns: the dots requested of each wire in each slot of each print line, and pattern files.
 
 Patterns are read from and written to TOML or bitmap files.
 
@@ -96,7 +96,7 @@ def pattern_from_toml(text: str, source: str = "pattern") -> tuple[str, BoolArra
 
 
 def _marked(rows: list[str], wires: int, source: str) -> BoolArray:
-    """Parse rows of marks into dots, shape (lines, wires, slots)."""
+    """Parse text rows of '#' and '.' into a mask of dots, shape (lines, wires, slots)."""
     if len(rows) % wires:
         raise InputError(
             f"{source}: rows has {len(rows)} rows",
@@ -188,7 +188,7 @@ _TITLE: Final = 60  # Largest length of a title in a picture
 
 
 class Pattern(Declared):
-    """The requested dots.
+    """Requested dots of a page, by print line, wire and slot.
 
     Raises
     ------
@@ -228,7 +228,7 @@ class Pattern(Declared):
         font: str | Path | None = None,
         columns: int = COLUMNS,
     ) -> Self:
-        """Set a text in dots.
+        """Convert a text to a dot pattern.
 
         Parameters
         ----------
@@ -237,8 +237,8 @@ class Pattern(Declared):
         wires : int, optional
             Number of wires.
         font : path, optional
-            A TrueType font; by default the built-in font for 9 wires, of
-            `printhammer.printing.dots.lettering`, and DejaVu Sans Mono for others.
+            Path of a TrueType font; by default the built-in font of `printhammer.printing.dots.lettering` for
+            9 wires, and DejaVu Sans Mono for other numbers of wires.
         columns : int, optional
             Largest number of characters in a print line.
 
@@ -290,7 +290,7 @@ class Pattern(Declared):
 
     @property
     def wanted(self) -> int:
-        """Number of dots to print, over all lines and wires."""
+        """Number of requested dots, summed over all lines and wires."""
         return int(self.dots.sum())
 
     def __eq__(self, other: Any) -> bool:

@@ -1,1 +1,1 @@
-"""Rates: print quality at a rate, the safe rate, and the effects of tolerances and materials."""
+"""Slot rates: print quality at a rate, the safe rate, and the effects of tolerances and materials."""

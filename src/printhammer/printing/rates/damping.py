@@ -38,8 +38,7 @@ from printhammer.run.effort import DISPLAY, Effort, Keywords, computation
 from printhammer.support.arrays import FloatArray, TextArray
 
 KINDS: Final = ("as it is", "hard", "elastomer", "pack")
-"""What a material changes: nothing, the constants of the hard backstop, the backstop law (to an elastomer),
-or the pack."""
+"""Kinds of material: as built, hard backstop with other constants, elastomer backstop, or other pack."""
 
 STIFFNESSES: Final = (1.0 / 9.0, 1.0 / 3.0, 3.0)
 DAMPINGS: Final = (0.25, 0.5, 2.0, 4.0, 16.0)
@@ -57,7 +56,7 @@ PACK_DAMPINGS: Final = (0.1, 0.4)  # Damping ratios of spring-and-dashpot packs;
 
 
 class Material(Declared):
-    """A replacement of one material of the studied hammer."""
+    """Replacement of the backstop or pack material of the studied hammer."""
 
     kind: str = part("one of `KINDS`")
     label: str = part("short description")
@@ -76,9 +75,9 @@ class Material(Declared):
 def materials(hammer: Hammer, single: Nominal) -> list[Material]:
     """List the default materials for a hammer and its single-pulse dot.
 
-    Hard backstops have other constants of equations (6) and (7); elastomers follow Kuwabara and Kono; packs
-    are softer and harder ones of equation (5), and springs with a dashpot. The stiffness of such a spring is
-    chosen so that the loading work of the single-pulse dot compresses it to the force of that dot.
+    Hard backstops have other constants of equations (6) and (7); elastomers follow the law of Kuwabara and
+    Kono; packs are softer or harder by equation (5), or a spring with a dashpot. The stiffness of such a
+    spring is chosen so that the loading work of the single-pulse dot compresses it to the force of that dot.
     """
     listed = [Material("as it is", "as it is", {})]
     backstop, pack = hammer.backstop, hammer.pack
@@ -138,7 +137,7 @@ _ROUNDS: Final = 5  # Number of refinements
 
 
 class DampingStudy(Result):
-    """Effect of other materials at the same print force.
+    """Safe rate and settling of a hammer with other backstop and pack materials, at the same print force.
 
     The numbers are NaN unless `status` is "ok" or "current limit".
     """
@@ -146,7 +145,9 @@ class DampingStudy(Result):
     hammer: Hammer = part("the studied hammer")
     limits: Limits = part("limits on the dots, for the safe rates")
     current_limit: float = scalar("A", "current limit")
-    nominal: Nominal = part("single-pulse dot of the hammer", more="every material prints with its force")
+    nominal: Nominal = part(
+        "single-pulse dot of the hammer", more="the force of this dot is the print force of every material"
+    )
     materials: tuple[Material, ...] = part("materials that replace those of the hammer")
     status: TextArray = column(
         "",
@@ -187,11 +188,11 @@ class DampingStudy(Result):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the studied hammer."""
         return f"damping study of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate the materials, one row each."""
+        """Tabulate settling, wear and safe rate, one row per material."""
         rates = [None if math.isnan(rate) else f"{rate:g}" for rate in self.safe_rate.tolist()]
         if self.best is not None:
             rates[self.best] = styled("best", rates[self.best])
@@ -214,24 +215,24 @@ class DampingStudy(Result):
         )
 
     def notes(self) -> dict[str, Any]:
-        """Return the limits, the print force and the rate grid."""
+        """Return limits, print force and rate grid, as attributes of the Dataset."""
         return {"limits": self.limits.text, "single_force": self.nominal.force, **grid_notes(self.grid)}
 
     @property
     @derived("", "kind of replacement", "material")
     def kind(self) -> list[str]:
-        """Kinds of the replacements, each one of `printhammer.printing.rates.damping.KINDS`."""
+        """Kind of each replacement material, from `printhammer.printing.rates.damping.KINDS`."""
         return [material.kind for material in self.materials]
 
     @property
     @derived("", "replacement material", "material")
     def label(self) -> list[str]:
-        """Short descriptions of the replacement materials."""
+        """Short description of each replacement material."""
         return [material.label for material in self.materials]
 
     @property
     def best(self) -> int | None:
-        """Index of the material with the highest safe rate within the current limit; None without any."""
+        """Index of the material with the highest safe rate within the current limit, or None."""
         allowed = np.where((self.status == "ok") & ~np.isnan(self.safe_rate), self.safe_rate, -np.inf)
         return int(np.argmax(allowed)) if np.isfinite(allowed).any() else None
 
@@ -260,7 +261,7 @@ def damping_study(
     Parameters
     ----------
     hammer : Hammer
-        The studied hammer, with pack, backstop and waveform.
+        Hammer to study, with pack, backstop and waveform.
     others : sequence of Material, optional
         Replacements; by default those of `printhammer.printing.rates.damping.materials`.
     current : float or str, optional
@@ -348,7 +349,7 @@ def damping_study(
 
 
 def tuned(hammers: Sequence[Hammer], force: float, effort: Effort) -> FloatArray:
-    """Compute the amplitude factors with which single pulses print with a given force, N.
+    """Solve for the amplitude factors with which single pulses print with a given force, N.
 
     The search covers `LEAST` to `MOST` on a grid, then ever finer grids around the crossing where the force
     first rises through `force`; of several crossings the one nearest to a factor of 1 is refined. Factors are

@@ -1,4 +1,4 @@
-"""The quality report: dots within limits, spreads, wear and energy of a hammer at a slot rate."""
+"""Print quality of a hammer at a slot rate: dots within limits, spreads, wear and energy."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ class Spread(Declared):
 
     @property
     def peak_to_peak(self) -> float:
-        """Maximum minus minimum."""
+        """Peak-to-peak spread: maximum minus minimum."""
         return self.high - self.low
 
     def said(self, unit: str, single: float | None = None) -> str:
-        """Return the statistics in words, in a unit, with the single-pulse value for comparison."""
+        """Format mean, deviation and range in a unit, with the single-pulse value for comparison."""
         if not self.count:
             return "–"
         mean, most = (quantity(each, unit, bare=True) for each in (self.mean, self.peak_to_peak))
@@ -78,7 +78,7 @@ class Spread(Declared):
 
 
 class Quality(Result):
-    """Print quality of a hammer at a rate: the judged dots, their statistics, wear and energy."""
+    """Print quality of a hammer at a slot rate: the evaluated dots, their statistics, wear and energy."""
 
     hammer: Hammer = part("driven hammer")
     strategy: str = scalar("", "name of the drive strategy")
@@ -86,9 +86,12 @@ class Quality(Result):
     rate: float = scalar("Hz", "slot rate", name="rate_Hz")
     wanted: BoolArray = part("mask of the slots with a dot, lead-in included", repr=False)
     judged_from: int = scalar(
-        "1", "first judged slot", more="earlier slots are a lead-in", name="judged_from_slot"
+        "1",
+        "first judged slot",
+        more="earlier slots are a lead-in, which is not evaluated",
+        name="judged_from_slot",
     )
-    limits: Limits = part("limits that the dots are judged by")
+    limits: Limits = part("limits on the deviations of the dots")
     nominal: Nominal = part("single-pulse dot")
     slot: IntArray = column("1", "index of the slot", "dot", dtype=np.int32)
     flight_time: FloatArray = column(
@@ -96,7 +99,7 @@ class Quality(Result):
     )
     force: FloatArray = column("N", "largest pack force", "dot")
     indentation: FloatArray = column("m", "largest indentation", "dot")
-    arrival_deviation: FloatArray = column("s", "touch minus slot time and nominal flight time", "dot")
+    arrival_deviation: FloatArray = column("s", "touch minus slot time and single-pulse flight time", "dot")
     lost: BoolArray = column("1", "whether the firing made no dot", "dot", dtype=np.int8)
     extra_contacts: IntArray = column("1", "number of extra pack contacts", "dot", dtype=np.int32)
     fault: IntArray = column(
@@ -119,7 +122,7 @@ class Quality(Result):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with hammer and slot rate."""
         return f"quality of {self.hammer.name} at {self.rate:g} Hz"
 
     def summary(self) -> Summary:
@@ -163,7 +166,7 @@ class Quality(Result):
         return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
-        """Return the figures of the report, by names that end in their units."""
+        """Return the key figures of the report; each name ends in the unit."""
         spreads = {
             f"{name}_{measure}_{unit}": getattr(getattr(self, f"{name}_spread"), measure)
             for name, unit in _SPREADS.items()
@@ -186,7 +189,7 @@ class Quality(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the run reached its end."""
+        """Whether the simulation reached its end."""
         return self.status == "ok"
 
     @property
@@ -290,7 +293,7 @@ def quality(
     paper: Paper | None = None,
     tolerance: float = TOLERANCE,
 ) -> Quality:
-    """Print a pattern from rest, and report its quality.
+    """Simulate the printing of a pattern from rest, and report the print quality.
 
     Parameters
     ----------
@@ -299,9 +302,9 @@ def quality(
     rate : float or str
         Slot rate, Hz, or text with a unit.
     pattern : str, int or bool array, optional
-        The slots: text such as "10110111", 1 for a dot; a number of dots in consecutive slots; or a boolean
-        mask. By default one turn of the binary de Bruijn cycle of order 8, which contains every word of eight
-        slots exactly once, after a lead-in of 64 slots that are not judged.
+        Requested dots by slot: text such as "10110111", 1 for a dot; a number of dots in consecutive slots;
+        or a boolean mask. By default one turn of the binary de Bruijn cycle of order 8, which contains every
+        word of eight slots exactly once, after a lead-in of 64 slots that are not judged.
     strategy, limits, nominal, tolerance
         As for `printhammer.safe_rate`.
     pitch : float or str, optional
@@ -401,7 +404,7 @@ def _verdict(good: bool, what: str) -> str:
 
 
 def spread_of(values: FloatArray) -> Spread:
-    """Compute the statistics of numbers; NaN are ignored."""
+    """Compute mean, standard deviation, minimum and maximum of numbers; NaN are ignored."""
     known = values[~np.isnan(values)]
     if not known.size:
         return Spread(0, math.nan, math.nan, math.nan, math.nan)
@@ -409,7 +412,7 @@ def spread_of(values: FloatArray) -> Spread:
 
 
 def dot_table(dots: Sequence[Dot], times: FloatArray) -> DotTable:
-    """Return the dots of one motion, with its firing times (s), as an ensemble table of one member."""
+    """Convert the dots of one motion, with firing times, s, to a dot table with one ensemble member."""
 
     def column(name: str) -> FloatArray:
         values = [getattr(dot, name) for dot in dots]

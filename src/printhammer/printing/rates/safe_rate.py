@@ -1,7 +1,7 @@
 """The safe rate: the largest slot rate up to which a hammer prints every pattern within limits.
 
 R(limits) is the largest rate of a grid such that, there and at every lower rate of the grid, all dots are
-within limits: those of all 255 patterns of eight slots from rest, and those of the long patterns. The long
+within limits: the dots of all 255 patterns of eight slots from rest, and of the long patterns. The long
 patterns are the binary de Bruijn cycle of order 8, which contains every word of eight slots exactly once,
 after a lead-in of 64 slots; rows of 200 slots; and a line of text.
 
@@ -66,11 +66,13 @@ class Failure(Declared):
     """The first dot outside the limits at the first rate that does not pass."""
 
     rate: float = scalar("Hz", "slot rate")
-    pattern: str = part("the slots up to this dot, 1 for a dot; of a long pattern at most the last eight")
+    pattern: str = part(
+        "slots up to the failed dot, 1 for a dot; at most the last eight slots of a long pattern"
+    )
     kind: Literal["from rest"] | Kind = part('"from rest", or the kind of the long pattern')
     slot: int = part("index of the slot; in the cycle counted from the end of the lead-in")
     dot: int = part("number of the dot in its pattern, counted from 1")
-    fault: str = part("one of `printhammer.printing.dots.judging.FAULTS`")
+    fault: str = part("fault of the dot, one of `printhammer.printing.dots.judging.FAULTS`")
     deviation: float = part(
         "relative force deviation, arrival deviation, s, or number of extra contacts, depending on the fault",
         more="NaN for the other faults",
@@ -81,7 +83,7 @@ class Failure(Declared):
 
     @property
     def text(self) -> str:
-        """The failure in one sentence."""
+        """The failure in one sentence: rate, pattern, dot and fault."""
         where = {
             "from rest": f"pattern {self.pattern}: its last dot",
             "cycle": f"the last dot in the cycle after {self.pattern[:-1]}",
@@ -104,7 +106,7 @@ class SafeRate(Result):
     hammer: Hammer = part("driven hammer")
     strategy: str = scalar("", "name of the drive strategy")
     limits: Limits = part("limits on the dots")
-    nominal: SinglePulse = part("single-pulse dot that judges the others")
+    nominal: SinglePulse = part("single-pulse dot with which all dots are compared")
     rate: float = scalar("Hz", "safe rate", more="NaN if not even the first rate passes", name="safe_rate")
     failure: Failure | None = part(
         "first failure at the next rate", more="None if every rate of the grid passes"
@@ -113,13 +115,17 @@ class SafeRate(Result):
     passed: BoolArray = column("1", "whether all dots are within limits", "rate", dtype=np.int8)
     force_low: FloatArray = column(
         "1",
-        "smallest deviation of a force from that of the single pulse",
+        "smallest (most negative) deviation of a force from the single-pulse force",
         "rate",
-        more="relative to the latter; NaN if no dot is printed, as in the three columns that follow",
+        more="relative to the single-pulse force; NaN if no dot is printed, as in the next three columns",
     )
-    force_high: FloatArray = column("1", "largest deviation of a force from that of the single pulse", "rate")
-    arrival_low: FloatArray = column("s", "earliest arrival, minus slot time and nominal flight time", "rate")
-    arrival_high: FloatArray = column("s", "latest arrival, minus slot time and nominal flight time", "rate")
+    force_high: FloatArray = column("1", "largest deviation of a force from the single-pulse force", "rate")
+    arrival_low: FloatArray = column(
+        "s", "earliest arrival, minus slot time and single-pulse flight time", "rate"
+    )
+    arrival_high: FloatArray = column(
+        "s", "latest arrival, minus slot time and single-pulse flight time", "rate"
+    )
     lost: IntArray = column("1", "number of lost dots", "rate", dtype=np.int32)
     extra_contacts: IntArray = column("1", "number of extra contacts", "rate", dtype=np.int32)
     long_run: BoolArray = column(
@@ -145,7 +151,7 @@ class SafeRate(Result):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the hammer."""
         return f"safe rate of {self.hammer.name}"
 
     def summary(self) -> Summary:
@@ -176,7 +182,7 @@ class SafeRate(Result):
         return self.failure is None
 
     def notes(self) -> dict[str, Any]:
-        """Return the limits, the first failure and the single-pulse dot."""
+        """Return limits, first failure and single-pulse dot, as attributes of the Dataset."""
         return {
             "limits": self.limits.text,
             "first_failure": "" if self.failure is None else self.failure.text,
@@ -212,15 +218,15 @@ def safe_rate(
     limits : Limits, optional
         Limits on the dots; by default 10 % of the force, 50 us, no extra contacts.
     nominal : SinglePulse, optional
-        Reference dot, of a single pulse, with which all dots are compared; by default that of the hammer. If
-        the drive was designed for another hammer, pass the dot of that hammer.
+        Single-pulse dot with which all dots are compared; by default that of `hammer`. If the drive was
+        designed for another hammer, pass the single-pulse dot of that other hammer.
     first, last, step : float or str, optional
         The grid of rates, Hz, or text with a unit; by default 100 Hz to 4 kHz, every 5 Hz, and as much lower
         as a device is slower than the paper's hammer. In open loop the default grid leaves out lower rates at
         which each pulse finds the device exactly at rest.
     stop : bool, optional
         Whether to stop at the first rate that does not pass; otherwise all rates of the grid are simulated,
-        for a chart.
+        as a chart needs them.
     long : bool, optional
         Whether the cycle, the rows and the line of text must pass too, besides the patterns from rest.
     progress : callable, optional
@@ -296,7 +302,7 @@ def safe_rate(
 
 
 def _said_of_row(growth: float) -> str:
-    """Describe the multiplier of a row in words."""
+    """Describe the multiplier of a row of dots in words."""
     more = ": dots alternate, within limits" if growth < -1.0 else ""
     return f"multiplier {growth:+.3f} from dot to dot{more}"
 
@@ -342,15 +348,15 @@ def grid_notes(grid: FloatArray) -> dict[str, float]:
 def from_rest(*, every: bool) -> list[tuple[int, ...]]:
     """Return the patterns of eight slots, each as the indices of the slots with a dot.
 
-    With `every`, all 255; otherwise the 128 that begin with a dot, which are enough in open loop from rest
-    since the other patterns are delayed copies of these.
+    With `every`, all 255 patterns; otherwise the 128 that begin with a dot, which are enough in open loop
+    from rest since the other patterns are delayed copies of these.
     """
     patterns = [slots_of(row) for row in eight_slot_patterns()]
     return [slots for slots in patterns if every or slots[0] == 0]
 
 
 def attempt_long(cases: Sequence[Case], strategy: Strategy = open_loop, **options: Any) -> Trial:
-    """Simulate the long patterns in all cases; options as for `printhammer.printing.dots.trial.attempt`."""
+    """Simulate the long patterns in all cases (hammer and rate); options as for `trial.attempt`."""
     patterns = long_patterns()
     begin = [pattern.judged_from for pattern in patterns]
     return attempt(cases, [pattern.slots for pattern in patterns], strategy, judged_from=begin, **options)
@@ -376,7 +382,7 @@ def multipliers(
 
 
 def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
-    """Return the columns of a safe rate at one rate, from the trials of that rate."""
+    """Return the columns of `SafeRate` at one slot rate, from the trials at that rate."""
 
     def joined(name: str) -> npt.NDArray[Any]:
         return np.concatenate(
@@ -399,7 +405,7 @@ def _row(runs: Sequence[tuple[Trial, int]]) -> dict[str, Any]:
 
 
 def _failure(trial: Trial, case: int, *, long: bool) -> Failure:
-    """Return the failure in the earliest slot; the first pattern wins a tie.
+    """Return the failure in the earliest slot of all patterns; the first pattern wins a tie.
 
     For long patterns, only the first pattern that does not pass is searched.
     """
@@ -467,8 +473,9 @@ def safe_rates(
 ) -> FloatArray:
     """Compute the safe rates of many hammers on an ascending grid of rates, Hz; arguments as for `all_pass`.
 
-    Each hammer is judged by its own entry of `singles`; progress counts the hammers whose safe rate is known.
-    The rate is NaN if not even the first rate of the grid passes, and the last rate of the grid if all pass.
+    The dots of each hammer are compared with its own entry of `singles`; progress counts the hammers whose
+    safe rate is known. The rate is NaN if not even the first rate of the grid passes, and the last rate of
+    the grid if all pass.
     """
     rates = np.full(len(hammers), np.nan)
     alive = np.arange(len(hammers))

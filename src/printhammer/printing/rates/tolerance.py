@@ -1,4 +1,4 @@
-"""Tolerance yield: the fraction of a production that prints within limits, and the safe rates."""
+"""Tolerance yield: the fraction of a production that prints within limits, and its safe rates."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ MOST: Final = 100_000  # Largest number of hammers in a yield
 
 Judged = Literal["own", "design"]
 GAP: Final = "pack.front"
-"""The constant whose spread applies to its distance from the backstop, since the origin of x is arbitrary."""
+"""The position whose spread applies to its distance from the backstop, since the origin of x is arbitrary."""
 
 FIXED: Final = ("backstop.position", "platen")
-"""Constants without a default spread: the origin, and the platen, which enters no force."""
+"""Constants without a default spread: the origin of x, and the platen, which no force depends on."""
 
 
 _SHARES: Final = (0.95, 0.5)
-"""Fractions of the hammers whose largest common rates a summary reports."""
+"""Fractions of the hammers for which a summary reports the largest rate that they all reach."""
 
 
 class ToleranceYield(Result):
-    """Yield of randomly drawn hammers: constants, single-pulse dots, and which print within limits."""
+    """Yield of randomly drawn hammers: their constants, single-pulse dots, and whether each passes."""
 
     hammer: Hammer = part("design hammer")
     strategy: str = scalar("", "name of the drive strategy")
@@ -61,7 +61,7 @@ class ToleranceYield(Result):
         more="in the order of `spreads`",
         name="factor",
     )
-    judged_by: Judged = scalar("", '"own" or "design"', more="whose single-pulse dot judges the others")
+    judged_by: Judged = scalar("", '"own" or "design"', more="hammer whose single-pulse dot is the reference")
     status: TextArray = column(
         "1",
         "status of the hammer",
@@ -94,7 +94,7 @@ class ToleranceYield(Result):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the design hammer."""
         return f"tolerance yield of {self.hammer.name}"
 
     def summary(self) -> Summary:
@@ -129,7 +129,7 @@ class ToleranceYield(Result):
         return Summary([Facts(rows)])
 
     def notes(self) -> dict[str, Any]:
-        """Return the limits, the spreads, the rate grid, and the rate of the test if there is one."""
+        """Return limits, spreads, rate grid and test rate (if any), as attributes of the Dataset."""
         return {
             "limits": self.limits.text,
             "spreads": dict(self.spreads),
@@ -198,15 +198,15 @@ def tolerance_yield(
     seed : int, optional
         Seed of the random draw.
     judged_by : str, optional
-        "own": each hammer is judged by its own single-pulse dot, as if each printer were adjusted;
-        "design": all hammers are judged by the dot of the design.
+        "own": dots are compared with the single-pulse dot of the same hammer, as if each printer were
+        adjusted; "design": with the single-pulse dot of the design.
     strategy, limits, first, last, step
         As for `printhammer.safe_rate`.
 
     Returns
     -------
-    The yield, with a status for each hammer.
-        With a status for each hammer.
+    ToleranceYield
+        The yield, with a status for each hammer.
     """
     count = read_count(number, "number")
     if count > MOST:
@@ -266,7 +266,7 @@ def tolerance_yield(
 
 
 def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, float]:
-    """Return the spread of each varying constant of a hammer.
+    """Return the relative spread, to either side, of each varying constant of a hammer, by key.
 
     Raises
     ------
@@ -293,7 +293,7 @@ def spreads_of(hammer: Hammer, asked: float | Mapping[str, float]) -> dict[str, 
 
 
 def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
-    """Draw factors on constants, (number, constants), uniform within the spreads to either side.
+    """Draw factors on the constants, shape (number, constants), uniform within the relative spreads.
 
     The points are a scrambled Sobol sequence (A. B. Owen, J. Complexity 14 (1998) 466).
     """
@@ -307,7 +307,7 @@ def draw(spreads: Mapping[str, float], number: int, seed: int) -> FloatArray:
 
 
 def _changes(hammer: Hammer, spreads: Iterable[str], factors: FloatArray) -> list[dict[str, float]]:
-    """Return the constants of each drawn hammer, SI, from factors on the constants of the design."""
+    """Compute the constants of each drawn hammer, SI, from factors on the constants of the design."""
     zero = {key: hammer.origin if key == GAP else 0.0 for key in spreads}
     values = {key: hammer.constants[key].si for key in zero}
     return [

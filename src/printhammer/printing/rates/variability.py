@@ -27,7 +27,7 @@ from printhammer.support.arrays import FloatArray
 
 
 class Perturbation(Declared):
-    """Relative changes of a hammer; all 0 by default."""
+    """Perturbation of a hammer: changes of current, travel, forms, magnet and damping; all 0 by default."""
 
     current: float = part(
         "relative change of every current, e.g. by the supply voltage: 0.03 for 3 % more", default=0.0
@@ -49,7 +49,7 @@ class Perturbation(Declared):
 
     @property
     def name(self) -> str:
-        """The changes in words, such as "current +3 %, travel -10 µm"; "nominal" without a change."""
+        """Name of the perturbation, such as "current +3 %, travel -10 µm"; "nominal" without a change."""
         words = [
             f"{key} {1e6 * value:+.3g} µm" if key == "travel" else f"{key} {100.0 * value:+.3g} %"
             for key, value in asdict(self).items()
@@ -60,7 +60,7 @@ class Perturbation(Declared):
 
 @checked
 def perturbed(hammer: Hammer, by: Perturbation) -> Hammer:
-    """Return a perturbed copy of a hammer.
+    """Return a copy of a hammer with the changes of a `Perturbation`.
 
     The current enters equation (3) as Bm I. Scaling every current is therefore the same as scaling Bm, and a
     strategy that is unaware of the change needs no modification.
@@ -146,7 +146,7 @@ CONSTANTS: Final = {
     "travel": (("pack.front",),),
     "paper": (("pack.stiffness",),),
 }
-"""Constants that each standard deviation applies to: the first group with a constant of the hammer."""
+"""Constants that each standard deviation applies to: the first of the groups that the hammer has."""
 
 _TRIES: Final = 10  # Maximum number of batches drawn, each of the requested size
 WIDEST: Final = 3.0
@@ -154,7 +154,7 @@ WIDEST: Final = 3.0
 
 
 class Variability(Declared):
-    """Standard deviations of the constants of a production, independent of each other."""
+    """Standard deviations of the constants of a production; the constants vary independently."""
 
     magnet: float = part("F0 and Am of equation (3), pole area, or force constant, relative", default=0.01)
     spring: float = part("Bs and As of equation (4), or preload and stiffness, relative", default=0.01)
@@ -172,7 +172,7 @@ class Variability(Declared):
 
     @classmethod
     def of(cls, hammer: Hammer) -> Variability:
-        """Return the default variability, with 0 where a hammer lacks the constants."""
+        """Return the default variability for a hammer: 0 for constants that the hammer lacks."""
         known = hammer.constants.keys()
         there = {
             name for name, groups in CONSTANTS.items() if known & {key for keys in groups for key in keys}
@@ -227,7 +227,7 @@ class Variability(Declared):
         return [drawn for _row, drawn in self.draw_rows(hammer, count, seed)]
 
     def draw_rows(self, hammer: Hammer, count: int, seed: int) -> list[tuple[FloatArray, Hammer]]:
-        """Draw hammers as `draw` does, each with its constants' deviations in standard deviations."""
+        """Draw hammers as `draw` does; return each with its deviations, in standard deviations."""
         rng = np.random.default_rng(seed)
         drawn: list[tuple[FloatArray, Hammer]] = []
         for _ in range(_TRIES):
@@ -247,13 +247,13 @@ class Variability(Declared):
         )
 
     def sigma_points(self, hammer: Hammer) -> list[Hammer]:
-        """Return the sigma points: hammers with one constant shifted by one standard deviation."""
+        """Return the sigma points: hammers with a single constant shifted by plus or minus its deviation."""
         own = np.eye(len(self.constants(hammer)))
         points = self.hammers(hammer, np.concatenate([own, -own]))
         return [point for point in points if point is not None]
 
     def hammers(self, hammer: Hammer, rows: FloatArray) -> list[Hammer | None]:
-        """Return the hammers whose constants are shifted by `rows` (M, constants) standard deviations.
+        """Build hammers with constants shifted by `rows`, shape (M, constants), in standard deviations.
 
         The constants are in the order of `constants`. An entry is None if the hammer is invalid or does not
         rest at the backstop.

@@ -1,4 +1,4 @@
-"""Shipped results of the reconstruction: base rates, search, family, schemes of 1983.
+"""Shipped results of the reconstruction: base rates, predictions, search, family, schemes of 1983.
 
 Five JSON files in the folder `data` beside this module, each with ``"format": 1``; any of them may be absent.
 All values are SI.
@@ -71,12 +71,12 @@ class BaseRates(_Table):
     poincare_panels: dict[str, _Panel] = Field({}, description="for each panel of Fig. 11 the same")
 
     def share(self, name: str) -> Share | None:
-        """Return the frequency of a claim; None if it was not measured."""
+        """Return the fraction of random hammers for which a claim holds; None if it was not measured."""
         return _share(self.claims.get(name))
 
     @property
     def panels(self) -> dict[str, Share]:
-        """Frequency of the printed verdict for each panel of Fig. 11."""
+        """Frequency, among random hammers, of the paper's classification of each panel of Fig. 11."""
         shares = {name: _share(panel) for name, panel in self.poincare_panels.items()}
         return {name: share for name, share in shares.items() if share is not None}
 
@@ -97,7 +97,7 @@ class Predictions(_Table):
 
 
 class Searched(_Table):
-    """One search: its objective and its result."""
+    """One search for a hammer: the claims it aimed at, its seed, and the number of hammers tried."""
 
     aim: Literal["stated", "all", "panels", "buzz", "claims"] = Field(description="the claims that led")
     seed: int = Field(description="the seed of the search")
@@ -114,7 +114,7 @@ class BestFor(_Table):
 
 
 class Failing(_Table):
-    """Claim that fails for the shipped hammer."""
+    """Claim that fails for the shipped hammer, with measured value, reason and best hammer."""
 
     value: dict[str, Any] = Field(description="what was measured with the shipped hammer")
     why: str = Field(description="why it fails")
@@ -135,7 +135,7 @@ class Search(_Table):
 
 
 class FamilyMember(_Table):
-    """Hammer of the family."""
+    """One hammer of the family: its constants, verdicts and consequences."""
 
     name: str = Field(description="its name")
     constants: dict[str, _Number] = Field(description="its constants by file key, SI")
@@ -162,7 +162,7 @@ class Family(_Table):
 
 
 class FamilyPanels(_Table):
-    """Number of panels of Fig. 11, of twelve, for one hammer of the family."""
+    """How many of the twelve panels of Fig. 11 agree with the paper, for one hammer of the family."""
 
     exact: _Count = Field(description="the number with the verdict of the paper, exactly")
     computed: _Count = Field(description="the same as the Runge-Kutta method of 1983 computes them")
@@ -170,7 +170,7 @@ class FamilyPanels(_Table):
 
 
 class Change(_Table):
-    """Frequency with which two ways of computing a panel give different verdicts."""
+    """Frequency with which two integrators classify the same panel of Fig. 11 differently."""
 
     first: str = Field(description="one way of computing")
     second: str = Field(description="the other")
@@ -183,7 +183,7 @@ class Change(_Table):
 
 
 class Schemes(_Table):
-    """Effect of the integrators of 1983 on the verdicts."""
+    """Effect of the integrators of 1983 on the classification of panels and on the claims."""
 
     format: Literal[1] = Field(description="1, the version of the format")
     shipped: str = Field(description="the fingerprint of the hammer of panels and claims")
@@ -204,7 +204,7 @@ FILES: Final[dict[str, type[_Table]]] = {
     "family": Family,
     "schemes": Schemes,
 }
-"""Name of each file, without ".json", and its class."""
+"""Class of each results file, by file name without ".json"."""
 
 _Model = TypeVar("_Model", bound=_Table)
 
@@ -219,7 +219,7 @@ def _file(name: str, model: type[_Model], meaning: str) -> cached_property[_Mode
 
 @dataclass(frozen=True)
 class Results:
-    """Results in a folder; each is None if its file is absent."""
+    """Results of the reconstruction in a folder; each result is None if its file is absent."""
 
     folder: Path | Traversable
     base_rates = _file("base_rates", BaseRates, "How often each claim holds among random plausible hammers.")
@@ -229,7 +229,7 @@ class Results:
     schemes = _file("schemes", Schemes, "What the integrators of 1983 do to verdicts.")
 
     def check(self) -> None:
-        """Read all files."""
+        """Read all result files, to check them."""
         for name in FILES:
             getattr(self, name)
 
@@ -254,7 +254,7 @@ class Results:
 
 
 def shipped_results() -> Results:
-    """Return the shipped results."""
+    """Return the results of the reconstruction that ship with the package."""
     return Results(files("printhammer").joinpath("report", "reconstruction", "data"))
 
 
@@ -267,7 +267,7 @@ def _refuse(text: str) -> None:
 
 
 def _fault(error: ValidationError, model: type[_Table]) -> InputError:
-    """Convert the first fault to an error with key, value and expectation."""
+    """Convert the first validation error to an `InputError` with key, value and expectation."""
     fault = error.errors(include_url=False)[0]
     steps = [step for step in fault["loc"] if step != "[key]"]
     key = "".join(f"[{step + 1}]" if isinstance(step, int) else f".{step}" for step in steps).lstrip(".")

@@ -41,6 +41,6 @@ class Share(Declared):
         return low, high
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the entry of `claims.json`."""
+        """Return the fraction as an entry of `claims.json`: counts, rate and interval."""
         low, high = self.interval
         return {"rate": self.rate, "low": low, "high": high, "measured": self.measured, "holds": self.holds}
