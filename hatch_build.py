@@ -1,4 +1,4 @@
-"""Build hook of the wheel: the modules of the kernel, lowered and compressed, see decision 0026."""
+"""Build hook of the wheel: adds the kernel's modules, lowered and compressed (see decision 0026)."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _ABSENT = {"magnet": "", "spring": "", "pack": "", "backstop": "", "absent": "pr
 
 
 class LoweredModules(BuildHookInterface[Any]):
-    """Lower the templates of all entry points and the laws of all parts that ship, into the wheel alone."""
+    """Build hook that lowers all entry-point templates and the laws of all shipped parts into the wheel."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Add the modules to the files of a wheel; an editable installation makes them when it wants them."""
+        """Add the lowered modules to the wheel; an editable installation lowers modules on demand instead."""
         if version == "editable":
             return
         sys.path.insert(0, str(Path(self.root, "src")))

@@ -1,10 +1,11 @@
 """A laboratory for impact print hammers.
 
-Give it a hammer, described by constants that can be measured, and a drive, and it tells how the hammer moves,
-what it prints and when it turns chaotic. Inside, every quantity is in SI.
+From a hammer, described by constants that can be measured, and a drive, the package computes how the hammer
+moves, what it prints, and when its motion becomes chaotic. Internally, every quantity is in SI.
 
-The public names stand in `__init__.pyi` and are imported on first use, so that importing the package costs
-nothing. The module `printhammer.sweep` does not hide the function of that name: the loader sees to it.
+The public names are listed in `__init__.pyi` and imported on first use, so that importing the package takes
+no time. The lazy loader ensures that `printhammer.sweep` is the function, not the subpackage of the same
+name.
 """
 
 from lazy_loader import attach_stub

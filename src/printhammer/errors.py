@@ -1,4 +1,4 @@
-"""Errors that printhammer raises deliberately."""
+"""Exceptions that printhammer raises deliberately."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Self
 
 
 class PrinthammerError(Exception):
-    """Base of every error that printhammer raises deliberately."""
+    """Base class of every exception that printhammer raises deliberately."""
 
 
 class InputError(PrinthammerError, ValueError):
-    """Invalid input from outside.
+    """Error for invalid input: a file, an option or an argument.
 
-    The message is one sentence, `<file>: <key> = <value>: expected <what>`. The command
-    line prints it and ends with status 2. The attributes hold the same for programs; None where the message
-    has no such part.
+    The message is one sentence, `<file>: <key> = <value>: expected <what>`. The command line prints the
+    message and exits with status 2. The attributes hold the same information for programs; an attribute is
+    None if the message lacks it.
 
     Parameters
     ----------
     message : str
-        The fault, with file, key and value.
+        Description of the error, with file, key and value.
     file, key, value : optional
-        The attributes.
+        Values of the attributes.
     expected : str, optional
         Expectation, appended to the message.
 
@@ -64,12 +64,12 @@ class InputError(PrinthammerError, ValueError):
         written: str | None = None,
         unit: str = "",
     ) -> Self:
-        """Compose the message of an invalid value.
+        """Compose the error for an invalid value.
 
         Parameters
         ----------
         key, value, expected, file
-            The attributes.
+            Values of the attributes.
         written : str, optional
             Text of the value in the message, by default its `repr`.
         unit : str
@@ -81,14 +81,14 @@ class InputError(PrinthammerError, ValueError):
         return cls(f"{where}{key} = {text}", file=file, key=key, value=value, expected=expected)
 
     def within(self, where: object, *, file: object = None, key: str | None = None) -> InputError:
-        """Return the error with a prefix to its message, and the location in its fields.
+        """Return a copy of the error with a location added to its message and attributes.
 
         Parameters
         ----------
         where : object
-            Prefix of the message; it is the file if neither file nor key is passed.
+            Prefix of the message; also the file, if neither file nor key is passed.
         file, key : optional
-            File and key named by the prefix, placed before those of this error.
+            File and key named by the prefix; the key is placed before the key of this error.
         """
         file = where if file is None and key is None else file
         files = [str(part) for part in (file, self.file) if part is not None]
@@ -101,7 +101,7 @@ class InputError(PrinthammerError, ValueError):
 
 @contextmanager
 def located(where: object, *, file: object = None, key: str | None = None) -> Iterator[None]:
-    """Prefix the message of an `InputError` with its origin, such as a file or a key."""
+    """Add a location, such as a file or a key, to any `InputError` raised in the context."""
     try:
         yield
     except InputError as error:
@@ -109,7 +109,7 @@ def located(where: object, *, file: object = None, key: str | None = None) -> It
 
 
 def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
-    """Return the known name closest to `name`, in quotes, for a message.
+    """Return the known name closest to a misspelled `name`, in quotes, for a message.
 
     If no name is close, return `otherwise`, by default a list of all names.
     """
@@ -121,7 +121,7 @@ def nearest(name: str, known: Iterable[str], otherwise: str = "") -> str:
 
 
 def missing_extra(needs: str, extra: str) -> InputError:
-    """Return the error for a missing package, "a store needs zarr", with the extra that installs it."""
+    """Return the error for a missing optional package, naming the extra that installs the package."""
     return InputError(
         f"{needs}, which the extra printhammer[{extra}] installs: pip install 'printhammer[{extra}]'",
         key=extra,

@@ -59,7 +59,7 @@ DIMENSIONS: dict[str, str] = {
 """Names of the dimensions that the program uses, by their SI unit; for messages."""
 
 _ZEROS = {"degF": 32, "fahrenheit": 32}
-"""Numbers of a unit at which the quantity in SI is 0; 0 for all others."""
+"""Number in each unit at which the quantity is 0 in SI; 0 for units not listed."""
 
 _UNKNOWN = "the unit {!r} is not known: expected one such as 'us', 'lbf' or 'N s/m^2.5'"
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(.*)", re.DOTALL)
@@ -120,17 +120,17 @@ def all_to_si(values: Sequence[float], unit: str, si_unit: str) -> list[float]:
 
 
 def from_si(value: float, si_unit: str, unit: str) -> float:
-    """Convert a number in `si_unit` to `unit`; arguments and errors otherwise as for `to_si`."""
+    """Convert a number from an SI unit to another unit; arguments and errors as for `to_si`."""
     return _scaled(value, 1 / _factor(unit, si_unit), si_unit) + _zero(unit)
 
 
 def factor_of(unit: str, si_unit: str) -> float:
-    """Return the size of one `unit` in `si_unit`, for scales such as "A/V"; errors as for `to_si`.
+    """Return the conversion factor from `unit` to `si_unit`, such as for "A/V"; errors as for `to_si`.
 
     Raises
     ------
     InputError
-        Also for a unit whose zero is not that of the SI unit, such as "degF".
+        Also for a unit whose zero differs from the zero of the SI unit, such as "degF".
     """
     if _zero(unit):
         raise InputError.of("unit", unit, f"a multiple of {si_unit}")
@@ -147,7 +147,7 @@ def is_unit_of(unit: str, si_unit: str) -> bool:
 
 
 def parse(text: str, si_unit: str) -> float:
-    """Read a number with its unit, such as "60 lbf", into SI; arguments as for `split`.
+    """Parse a number with its unit, such as "60 lbf", and convert it to SI; arguments as for `split`.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def split(text: str, si_unit: str) -> tuple[float, str]:
 
 
 def describe(si_unit: str) -> str:
-    """Return a phrase for messages, such as "a length (m)"."""
+    """Return the name of the dimension of an SI unit, such as "a length (m)", for messages."""
     return f"{DIMENSIONS[si_unit]} ({si_unit})" if si_unit in DIMENSIONS else f"a quantity in {si_unit}"
 
 
@@ -221,7 +221,7 @@ def _scaled(value: object, factor: Fraction, unit: str) -> float:
 
 @lru_cache(maxsize=1024)
 def _factor(unit: str, si_unit: str) -> Fraction:
-    """Return the size of a unit in `si_unit`."""
+    """Return the exact conversion factor from a unit to `si_unit`."""
     size, dimension = _measure(unit)
     si_size, si_dimension = _measure(si_unit)
     if dimension != si_dimension:
@@ -234,7 +234,7 @@ def _factor(unit: str, si_unit: str) -> Fraction:
 
 @lru_cache(maxsize=1024)
 def _measure(unit: str) -> tuple[Fraction, UnitsContainer]:
-    """Return the size of a unit in the base units and its dimension."""
+    """Return the size of a unit in the base units, and its dimension."""
     from pint import UndefinedUnitError
     from pint.util import UnitsContainer
 

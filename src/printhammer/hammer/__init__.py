@@ -1,1 +1,1 @@
-"""Hammer: constants, file format and statics."""
+"""Hammer: constants, file format, edits and statics."""

@@ -1,4 +1,4 @@
-"""Edits of a hammer file, applied to plain dictionaries and to the text alike.
+"""Edits of a hammer file, applied to its parsed dictionary and to its TOML text alike.
 
 An edit of the text preserves everything else, including comments and layout.
 """
@@ -26,7 +26,7 @@ from printhammer.hammer.uncertainty import UNCERTAINTY
 from printhammer.support.constants import Constant, quantities, shown
 
 Edit = tuple[str, Any]
-"""Dotted key and its new TOML value; None deletes the key."""
+"""Edit of a hammer file: a dotted key and its new TOML value; None deletes the key."""
 
 
 def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, source: str) -> Edit:
@@ -34,8 +34,8 @@ def edit_of(document: Mapping[str, Any], key: str, value: Any, status: str, sour
 
     The key is a constant or option, such as "mass" or "pack.stiffness", or a table, such as "backstop". The
     value is, for a constant, text with a unit, a number in SI or a `Constant`; for an option, its value; for
-    a table, a part, a waveform or a mapping; None deletes the key. New constants get the status and source
-    passed.
+    a table, a part, a waveform or a mapping; None deletes the key. New constants get the `status` and
+    `source` that are passed.
     """
     section, _, name = key.rpartition(".")
     if key in SELECTORS:
@@ -113,7 +113,7 @@ def _table(section: str, value: Any, status: str, source: str) -> dict[str, Any]
 
 
 def _fields(section: str, value: Any) -> dict[str, Any]:
-    """Return selector, constants and options of a part or waveform."""
+    """Return the law or shape, the constants and the options of a part or waveform."""
     selector = SELECTORS[section]
     kind = getattr(type(value), selector, None)
     if kind not in kinds_of(section) or type(value) is not model_of(section, kind):
@@ -137,7 +137,7 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
 
 
 def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any]:
-    """Return a plain document with edits applied; unedited values are shared with the original."""
+    """Return a copy of a parsed document with edits applied; unedited values are shared with the original."""
     result = dict(document)
     for key, value in edits:
         section, _, name = key.rpartition(".")
@@ -151,14 +151,14 @@ def changed(document: Mapping[str, Any], edits: Iterable[Edit]) -> dict[str, Any
 
 
 def _copied(value: Any) -> Any:
-    """Copy a plain value: tables and lists are copied, scalars are immutable."""
+    """Copy a parsed TOML value: tables and lists are copied, immutable scalars are not."""
     if isinstance(value, Mapping):
         return {name: _copied(entry) for name, entry in value.items()}
     return [_copied(entry) for entry in value] if isinstance(value, list) else value
 
 
 def changed_text(text: str, edits: Iterable[Edit]) -> str:
-    """Apply edits to the text of a document; everything else is preserved, including comments."""
+    """Apply edits to the TOML text of a hammer file; comments and layout are preserved."""
     import tomlkit
 
     def inline(value: Mapping[str, Any]) -> Any:

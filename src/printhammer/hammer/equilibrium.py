@@ -26,7 +26,7 @@ _NEAREST: Final = 1e-18
 _PLACES: Final = 401  # Number of grid points of the search for sign changes of the pull
 _LARGEST_CURRENT: Final = 1e6  # Range of currents of a law that states none, A; arbitrary
 FARTHER: Final = (10.0, 100.0, 1000.0)
-"""Search radii about the origin, m, if nothing limits the search and no equilibrium is nearer; arbitrary."""
+"""Search radii for equilibria, m, about the origin, tried in turn if the hammer sets no limit; arbitrary."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class Equilibrium:
     """Equilibrium at a constant current."""
 
     x: float
-    """Displacement, m."""
+    """Displacement of the armature, m."""
     stable: bool
-    """Whether the force drives the armature back after a small displacement to either side."""
+    """Whether the force returns the armature after a small displacement in either direction."""
     frequency: float | None
     """Natural frequency of small undamped oscillations, Hz; None if unstable, on a rigid backstop, or in a
     pack with memory, which has no unique stiffness."""
     surface: str | None
-    """Surface in contact, "backstop" or "pack"; None for a free armature."""
+    """Surface in contact with the armature, "backstop" or "pack"; None for a free armature."""
 
 
 @dataclass(frozen=True)
@@ -49,28 +49,30 @@ class EquilibriumPicture:
     """Statics of a hammer: equilibria, release current and holding margin."""
 
     rest: float | None
-    """Rest state at zero current, m."""
+    """Rest position of the armature at zero current, m; None without a rest state."""
     no_rest: str
-    """Reason for a missing rest state; empty if there is a rest state."""
+    """Reason why there is no rest state; empty if there is one."""
     equilibria: tuple[Equilibrium, ...]
     """Equilibria at zero current, in ascending order."""
     release_current: float | None
-    """Current at which the armature lifts off the backstop, A."""
+    """Coil current at which the armature lifts off the backstop, A."""
     x: FloatArray
+    """Displacements from the backstop to the end of the stroke, m."""
     margin: FloatArray
-    """Displacements from the backstop to the end of the stroke, m, and the holding margin at each, N."""
+    """Holding margin at each displacement of `x`, N."""
     weakest: tuple[float, float]
-    """Displacement, m, and value, N, of the smallest holding margin on that grid."""
+    """Displacement, m, and value, N, of the smallest holding margin on the grid `x`."""
     positive_intervals: tuple[tuple[float, float], ...]
-    """Intervals of x, m, in which the net force at zero current drives the armature toward the paper."""
+    """Intervals of x, m, where the net force at zero current drives the armature toward the paper."""
 
 
 def rest_state(hammer: HammerLike) -> float:
     """Return the displacement at which the armature rests at zero current, m.
 
-    With a backstop against which the net force presses, the equilibrium in contact, which compresses the
-    backstop (for a rigid backstop, or without any force, its position). Without a magnet or without a
-    backstop: otherwise the nearest stable equilibrium.
+    If the net force of magnet and spring presses the armature against a backstop, the armature rests at the
+    equilibrium in contact, which compresses the backstop (a rigid backstop: at its position). If a hammer
+    with a magnet has no net force at the backstop, the armature rests there. In all other cases the armature
+    rests at the stable equilibrium nearest to the origin.
     """
     force = StaticForce(hammer)
     if hammer.backstop is not None:
@@ -112,20 +114,21 @@ def rest_state(hammer: HammerLike) -> float:
 def equilibria(
     hammer: HammerLike, current: float = 0.0, within: tuple[float, float] | None = None
 ) -> list[Equilibrium]:
-    """Find all equilibria at a constant current, ascending.
+    """Find all equilibria of the armature at a constant current, in ascending order.
 
     The search runs from the lower limit of the magnet's law (or the rigid backstop) to the platen, or else to
-    the end of the pack or of the magnet's law. Without such limits it covers 1 m on either side, and 10, 100
-    and 1000 m if no stable equilibrium is nearer. Intervals without any force are excluded.
+    the end of the pack or of the magnet's law. Without such limits it covers 1 m on either side of the
+    origin, extended to 10, 100 and 1000 m as long as no stable equilibrium is found. Intervals without any
+    force are excluded.
 
     Parameters
     ----------
     hammer
-        The hammer.
+        Hammer whose equilibria are searched for.
     current
         Coil current, A.
     within
-        Other limits, m.
+        Limits of the search, m, instead of the default limits.
 
     Raises
     ------
@@ -152,13 +155,14 @@ def release_current(hammer: HammerLike) -> float:
     """Return the smallest current that lifts the armature off the backstop, A.
 
     At that current the force of magnet and spring at the position of the backstop vanishes. For equation (3),
-    I = (Am - sqrt((F0 + Fs(b)) sqrt(b))) / Bm. Of two solutions of opposite sign, the smaller magnitude is
-    returned; 0 if the net force at zero current is not negative.
+    I = (Am - sqrt((F0 + Fs(b)) sqrt(b))) / Bm. Of two solutions of opposite sign, the one of smaller
+    magnitude is returned; 0 if the net force at zero current is not negative.
 
     Raises
     ------
     InputError
-        The hammer has no backstop or magnet, or no current within the range of the magnet's law does it.
+        The hammer has no backstop or magnet, or no current within the range of the magnet's law lifts the
+        armature.
     """
     if hammer.backstop is None or hammer.magnet is None:
         missing = "magnet" if hammer.magnet is None else "backstop"
@@ -199,8 +203,9 @@ def holding_margin(hammer: HammerLike, x: npt.ArrayLike) -> FloatArray:
 def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
     """Return the intervals of the stroke where the net force at zero current is positive; ends in m.
 
-    In these intervals magnet and spring drive the armature toward the paper, and it may never return. The
-    search covers backstop to platen, or to the back of the pack; the list is empty without a backstop.
+    In such an interval magnet and spring drive the armature toward the paper, and the armature may never
+    return. The search covers backstop to platen, or to the back of the pack; the list is empty without a
+    backstop.
     """
     if hammer.backstop is None:
         return []
@@ -221,8 +226,8 @@ def positive_intervals(hammer: HammerLike) -> list[tuple[float, float]]:
 def pull_reversals(hammer: HammerLike) -> list[float]:
     """Return the displacements, m, at which the pull of a measured magnet changes sign, ascending.
 
-    The pull is the force at the largest current of the table less that without current, from the backstop to
-    the end of the table. The list is empty for a law that is no table.
+    The pull is the force at the largest current of the table minus the force at zero current; the search runs
+    from the backstop to the end of the table. The list is empty for a law that is not a table.
     """
     most = max(_currents(hammer), key=abs)
     if hammer.magnet is None or abs(most) >= _LARGEST_CURRENT:
@@ -283,7 +288,7 @@ def _compressed(force: StaticForce, position: float, current: float = 0.0) -> fl
 
 
 def _described(force: StaticForce, root: Root, current: float) -> Equilibrium:
-    """Return a root as an `Equilibrium`, with stability, frequency and surface."""
+    """Convert a root of the net force to an `Equilibrium`, with stability, frequency and surface."""
     stable = _is_stable(root, force)
     surface = None
     if force.hammer.backstop is not None and root.x < force.hammer.backstop.position:
@@ -298,7 +303,7 @@ def _described(force: StaticForce, root: Root, current: float) -> Equilibrium:
 
 
 def _is_stable(root: Root, force: StaticForce) -> bool:
-    """Whether the force points to the root from both sides; a rigid backstop holds from below."""
+    """Whether the force points to the root from both sides; a rigid backstop supports it from below."""
     held = root.before > 0 or (force.rigid and root.x == force.limits[0])
     return held and root.after < 0
 
@@ -324,7 +329,7 @@ def _roots(force: StaticForce, current: float, within: tuple[float, float] | Non
 
 
 def _same_rest(force: StaticForce, current: float, within: tuple[float, float] | None) -> list[Root]:
-    """Find all roots; the root at the backstop equals `rest_state` bit for bit."""
+    """Find all roots of the net force; a root at the backstop is replaced by the value of `rest_state`."""
     crossings = _roots(force, current, within)
     backstop = force.hammer.backstop
     if backstop is None or force.rigid or not force.free(backstop.position, current) < 0.0:
@@ -337,7 +342,7 @@ def _same_rest(force: StaticForce, current: float, within: tuple[float, float] |
 
 
 def _grid(force: StaticForce, low: float, high: float) -> list[float]:
-    """Return a search grid between two limits: evenly spaced points, and clusters about the anchors."""
+    """Return a search grid between two limits: evenly spaced points, with clusters around the anchors."""
     places = set(np.linspace(low, high, 1025).tolist())
     for anchor in (*force.anchors(), low, high):
         for sign in (1.0, -1.0):
@@ -348,7 +353,7 @@ def _grid(force: StaticForce, low: float, high: float) -> list[float]:
 
 
 def _away_from_zero(first: float, limit: float) -> list[float]:
-    """Return 0 and a geometric sequence up to a limit, 12 points per decade."""
+    """Return 0 and a geometric sequence up to a limit, with 12 points per decade."""
     if limit <= first:
         return [0.0, limit]
     count = max(2, math.ceil(12.0 * math.log10(limit / first)) + 1)
@@ -356,7 +361,7 @@ def _away_from_zero(first: float, limit: float) -> list[float]:
 
 
 def _currents(hammer: HammerLike) -> tuple[float, float]:
-    """Return the range of currents of the magnet's law, A."""
+    """Return the range of currents in which the magnet's law is valid, A."""
     low, high = getattr(hammer.magnet, "current_range", (-_LARGEST_CURRENT, _LARGEST_CURRENT))
     return float(low), float(high)
 

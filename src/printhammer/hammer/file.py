@@ -54,10 +54,10 @@ TEXTS: Final = {
 _NOUN: Final = re.compile("[a-z]+(-[a-z]+)*")
 
 SELECTORS: Final = {**dict.fromkeys(ROLES, "law"), "waveform": "shape"}
-"""Tables of a hammer file, with the key that selects the law or shape of each."""
+"""Tables of a hammer file, each with the key that selects its law or shape."""
 
 UNSAID: Final = {"coil": "winding"}
-"""Default kind of the tables that may omit the selecting key."""
+"""Default law or shape of the tables that may omit the selecting key."""
 
 _M = TypeVar("_M", bound=BaseModel)
 
@@ -73,7 +73,7 @@ class Body(BaseModel):
 
 @dataclass(frozen=True)
 class Contents:
-    """Contents of a hammer file in SI; `parts` by role."""
+    """Parsed contents of a hammer file in SI; `parts` is keyed by role."""
 
     name: str
     title: str
@@ -105,8 +105,9 @@ def build(
 ) -> Contents:
     """Build and validate the contents of a hammer file, in SI, from its TOML document.
 
-    Messages begin with `where`, usually the file; force tables and sampled waveforms are read from `folder`.
-    A table that is the same object as in the document `like` is not parsed again: its contents are reused.
+    Error messages begin with `where`, usually the file; force tables and sampled waveforms are read from
+    `folder`. A table that is the identical object in the document `like` is not parsed again; the contents
+    parsed from `like` are reused.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def build(
 
 
 def model_of(section: str, kind: str) -> type[BaseModel]:
-    """Return the model class of a table, for a section and kind such as "pack" and "power"."""
+    """Return the model class for a section and kind of a hammer file, such as "pack" and "power"."""
     if section == "waveform":
         from printhammer.drive.waveforms.shapes import SHAPES
 
@@ -130,7 +131,7 @@ def model_of(section: str, kind: str) -> type[BaseModel]:
 
 
 def kinds_of(section: str) -> tuple[str, ...]:
-    """List the valid laws or shapes of a table."""
+    """List the laws or shapes that a table of a hammer file may select."""
     if section == "waveform":
         from printhammer.drive.waveforms.shapes import SHAPES
 
@@ -140,7 +141,7 @@ def kinds_of(section: str) -> tuple[str, ...]:
 
 
 def file_options(model: type[BaseModel]) -> dict[str, Any]:
-    """List the options of a model that a file may set; the quantity of a waveform follows from its unit."""
+    """List the options of a model that a file may set; the unit of a waveform implies its driven quantity."""
     return {name: kind for name, kind in options(model).items() if name != "quantity"}
 
 
@@ -220,7 +221,7 @@ def _kind(table: Mapping[str, Any], section: str, selector: str) -> str:
 
 
 def _only(table: Mapping[str, Any], known: Iterable[str], prefix: str) -> None:
-    """Raise InputError for an unknown key; the message suggests the closest known key."""
+    """Raise InputError for an unknown key of a table; the message suggests the closest known key."""
     known = list(known)
     for key in table:
         if key not in known:
@@ -317,7 +318,7 @@ _WANTED: Final = {
 
 
 def si_unit_of(note: Quantity, unit: str) -> str:
-    """Return the SI unit for a unit, of a constant that may have several dimensions."""
+    """Return the SI unit that matches `unit`, for a constant that may have one of several dimensions."""
     from printhammer.units import to_si
 
     for other in note.also:
@@ -328,7 +329,7 @@ def si_unit_of(note: Quantity, unit: str) -> str:
 
 
 def _check_order(contents: Contents) -> None:
-    """Check the order of positions: backstop, front of the pack, platen, within the magnet's range."""
+    """Check that backstop, pack front and platen are in order, and inside the range of the magnet's law."""
     places: dict[str, float] = {}
     backstop, pack = contents.parts.get("backstop"), contents.parts.get("pack")
     if isinstance(backstop, BackstopPart):
@@ -413,7 +414,7 @@ def _constants(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _constant_schema(note: Quantity) -> dict[str, Any]:
-    """Return the schema of one constant; of the bounds only the sign is independent of the unit."""
+    """Return the JSON schema of one constant; only the sign of a bound is independent of the unit."""
     units = " or ".join((note.si, *(unit for unit in note.also if unit != note.si)))
     result: dict[str, Any] = {
         "$ref": "#/$defs/constant",

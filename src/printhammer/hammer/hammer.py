@@ -95,7 +95,7 @@ class Hammer:
         text : str
             TOML.
         name : str, optional
-            Name for error messages, usually the file.
+            Name for error messages, usually the file name.
         folder : path, optional
             Folder of force tables and sampled waveforms; by default the working directory.
         """
@@ -133,17 +133,17 @@ class Hammer:
 
     @property
     def name(self) -> str:
-        """Short name."""
+        """Short name of the hammer, such as "hendriks-1983"."""
         return self._contents.name
 
     @property
     def title(self) -> str:
-        """One-line description; may be empty."""
+        """One-line description of the hammer; may be empty."""
         return self._contents.title
 
     @property
     def note(self) -> str:
-        """Important remarks on the constants; may be empty."""
+        """Important remarks on the constants of the hammer; may be empty."""
         return self._contents.note
 
     @property
@@ -153,7 +153,7 @@ class Hammer:
 
     @property
     def path(self) -> str:
-        """Path of the hammer file for messages; for a modified hammer, a remark says so."""
+        """Path of the hammer file, for messages; marked as modified if constants were replaced."""
         return self._where
 
     @property
@@ -173,68 +173,68 @@ class Hammer:
 
     @cached_property
     def magnet(self) -> MagnetPart | None:
-        """Permanent magnet and coil."""
+        """Magnet: permanent magnet and coil; None if absent."""
         part = self._contents.parts.get("magnet")
         return part if isinstance(part, MagnetPart) else None
 
     @cached_property
     def coil(self) -> CoilPart | None:
-        """Circuit of the coil."""
+        """Circuit of the coil; None if absent."""
         part = self._contents.parts.get("coil")
         return part if isinstance(part, CoilPart) else None
 
     @cached_property
     def spring(self) -> SpringPart | None:
-        """Spring of the armature."""
+        """Spring of the armature; None if absent."""
         part = self._contents.parts.get("spring")
         return part if isinstance(part, SpringPart) else None
 
     @cached_property
     def pack(self) -> PackPart | None:
-        """Ribbon and paper pack."""
+        """Ribbon and paper pack; None if absent."""
         part = self._contents.parts.get("pack")
         return part if isinstance(part, PackPart) else None
 
     @cached_property
     def backstop(self) -> BackstopPart | None:
-        """Backstop."""
+        """Backstop of the armature; None if absent."""
         part = self._contents.parts.get("backstop")
         return part if isinstance(part, BackstopPart) else None
 
     @cached_property
     def damping(self) -> DampingPart | None:
-        """Damping of the armature that acts at every displacement."""
+        """Damping of the armature at every displacement; None if absent."""
         part = self._contents.parts.get("damping")
         return part if isinstance(part, DampingPart) else None
 
     @property
     def parts(self) -> Mapping[str, Part]:
-        """Parts of the hammer, by role."""
+        """Parts of the hammer that are present, by role."""
         return MappingProxyType(self._contents.parts)
 
     @property
     def waveform(self) -> Waveform | None:
-        """Standard waveform of one pulse."""
+        """Standard waveform of one pulse; None if absent."""
         return self._contents.waveform
 
     @cached_property
     def position(self) -> float | None:
-        """Position of the backstop, m."""
+        """Position of the backstop, m; None without a backstop."""
         return self.backstop.position if self.backstop is not None else None
 
     @cached_property
     def front(self) -> float | None:
-        """Front of the pack, m."""
+        """Position of the front face of the pack, m; None without a pack."""
         return self.pack.front if self.pack is not None else None
 
     @cached_property
     def origin(self) -> float:
-        """Position b of equation (4): that of the backstop, or 0 without one, m."""
+        """Position b of equation (4), m: position of the backstop, or 0 without a backstop."""
         return self.position if self.position is not None else 0.0
 
     @property
     def constants(self) -> Mapping[str, Constant]:
-        """Constants in the hammer file, by dotted key such as "magnet.F0"."""
+        """Constants of the hammer file, by dotted key such as "magnet.F0"."""
         return MappingProxyType(self._contents.constants)
 
     @property
@@ -291,7 +291,7 @@ class Hammer:
         return self._with(wanted, status, source, f"{self._where.removesuffix(_CHANGED)}{_CHANGED}")
 
     def _with(self, wanted: Mapping[str, Any], status: str, source: str, where: str) -> Hammer:
-        """Return a new hammer with keys replaced; messages refer to it as `where`."""
+        """Return a new hammer with keys replaced; error messages begin with `where`."""
         document = dict(self._document)
         edits: list[Edit] = []
         with located(where):
@@ -319,7 +319,7 @@ class Hammer:
         Raises
         ------
         InputError
-            The file cannot be written, or a table beside it would overwrite another; what was there stays.
+            The file cannot be written, or a table would overwrite a different file; existing files are kept.
         """
         target = Path(path)
         draft = target.with_name(target.name + ".part")
@@ -337,7 +337,7 @@ class Hammer:
             ) from None
 
     def _tables(self, target: Path) -> dict[str, bytes]:
-        """Return the contents of referenced files that are missing beside `target`."""
+        """Return the contents of the referenced files that are missing beside `target`."""
         missing: dict[str, bytes] = {}
         for model in (self.magnet, self.waveform):
             name = getattr(model, "file", None)
@@ -371,11 +371,11 @@ class Hammer:
                 _ = self.rest
 
     def warnings(self) -> list[str]:
-        """List warnings about a hammer that can still be simulated.
+        """List the warnings about a hammer; a hammer with warnings can still be simulated.
 
         There is one sentence for each interval between backstop and platen in which the net force of magnet
-        and spring at zero current is positive, and one for each place at which the pull of a measured magnet
-        changes sign.
+        and spring at zero current is positive, and one for each displacement at which the pull of a measured
+        magnet changes sign.
         """
         from printhammer.hammer.equilibrium import positive_intervals, pull_reversals
         from printhammer.units import from_si
@@ -414,7 +414,7 @@ class Hammer:
         return f"<Hammer {self.name} {self.fingerprint[:8]}>"
 
     def _repr_html_(self) -> str:
-        """Return the HTML repr: name and title, the laws, and the constants with their sources."""
+        """Return the HTML repr: name and title, laws, and constants with their sources."""
         laws = [(role, part.law) for role, part in self.parts.items()]
         if self.waveform is not None:
             laws.append(("waveform", f"{self.waveform.shape}, {self.waveform.quantity}"))

@@ -3,9 +3,9 @@
 =====================  ========================================================================
 name                   meaning
 =====================  ========================================================================
-``mass``               constant of the hammer itself
+``mass``               constant of the hammer, not of a part
 ``pack.stiffness``     constant of a part, spelled as in a hammer file
-``waveform.width``     constant of the fired pulse: the hammer's waveform, or that of the drive
+``waveform.width``     constant of the fired pulse: the waveform of the hammer or of the drive
 ``period``, ``rate``   time between firings and firings per second, of a train or of a force
 ``drive.amplitude``    constant of a continuous periodic force, as is ``drive.phase``
 =====================  ========================================================================
@@ -36,39 +36,41 @@ TIMING: Final = {
     PERIOD: Quantity("s", "T", "time between firings", gt=0.0),
     RATE: Quantity("Hz", "f", "firing rate", gt=0.0),
 }
-"""Period and rate of a train."""
+"""Names of the time between firings and the firing rate of a train."""
 
 FORCE: Final = {
     "amplitude": Quantity("N", "F", "amplitude of the force"),
     "frequency": Quantity("Hz", "f", "frequency of the force", gt=0.0),
     "phase": Quantity("rad", "phi", "phase of the force"),
 }
-"""Constants of a sinusoidal force."""
+"""Names of the constants of a sinusoidal force."""
 
 PLACES: Final = ("platen", "pack.front", "backstop.position")
-"""Constants that are positions on the axis of the armature."""
+"""Constants that are positions on the axis of the armature, such as "backstop.position"."""
 
 _ZERO: Final = {"m": 100e-6, "s": 500e-6, "kg": 1e-3, "N": 10.0}
-"""Upper end of the range of a constant that is zero, by SI unit: typical of impact print hammers."""
+"""Upper end of the control range of a constant whose value is zero, by SI unit; typical of print hammers."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Range of a constant on a control."""
+    """Range of a constant on a control, such as a slider."""
 
     low: float
+    """Lower end of the range, SI."""
     high: float
-    """Ends of the range, SI."""
+    """Upper end of the range, SI."""
     logarithmic: bool
-    """Whether the scale is logarithmic: equal steps are equal factors."""
+    """Whether the scale of the control is logarithmic, so that equal steps are equal factors."""
 
 
 def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
     """Return the control range of a constant, around its value in a hammer.
 
     The ranges are arbitrary: wide enough for every hammer of the paper, narrow enough for a slider. Positions
-    move by half the distance from backstop to platen; other constants by `factor` up and down, with a
-    coefficient of restitution at most 1; a constant that is zero gets a range typical of its dimension.
+    move by half the distance from backstop to platen; other constants range from 1 / `factor` to `factor`
+    times their value, a coefficient of restitution at most to 1; a constant that is zero gets a range typical
+    of its dimension.
     """
     constant = hammer.constants[name]
     value = constant.si
@@ -85,7 +87,7 @@ def range_of(hammer: Hammer, name: str, factor: float = 10.0) -> Range:
 
 
 def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
-    """Return the declaration of a constant of a hammer; None if no such constant exists."""
+    """Return the declaration of a constant of a hammer; None if the hammer has no such constant."""
     section, _, field = name.rpartition(".")
     if not section:
         return quantities(Body).get(field)
@@ -101,17 +103,17 @@ def quantity_of(hammer: Hammer, name: str) -> Quantity | None:
 
 
 def quantities_of(waveform: Waveform) -> dict[str, Quantity]:
-    """Return the declarations of a waveform's constants, amplitudes in the unit of the driven quantity."""
+    """Return the declarations of a waveform's constants; amplitudes have the unit of the driven quantity."""
     return {name: in_unit_of_drive(note, waveform.unit) for name, note in quantities(type(waveform)).items()}
 
 
 def in_unit_of_drive(note: Quantity, unit: str) -> Quantity:
-    """Return the declaration of a constant that may be a current or a force, in the unit of the drive."""
+    """Return the declaration of a constant that may be a current or a force, in the unit of the waveform."""
     return replace(note, si=unit, also=()) if note.also else note
 
 
 def unknown(name: str, known: Collection[str], where: str = "") -> InputError:
-    """Return the error for an unknown constant, with the nearest known name or all names."""
+    """Return the error for an unknown constant; the message suggests the nearest name or lists all names."""
     file, _, key = where.rpartition(": ")
     return InputError(
         f"{where or 'constant'} = {shown(name)} is not known",

@@ -14,11 +14,11 @@ FAR: Final = 1.0
 
 
 class HammerLike(Protocol):
-    """Attributes of a hammer that the statics use."""
+    """Attributes of a hammer that the statics use, as a protocol."""
 
     @property
     def name(self) -> str:
-        """Name, for messages."""
+        """Name of the hammer, for messages."""
 
     @property
     def mass(self) -> float:
@@ -26,19 +26,19 @@ class HammerLike(Protocol):
 
     @property
     def magnet(self) -> MagnetPart | None:
-        """Magnet."""
+        """Magnet; None if absent."""
 
     @property
     def spring(self) -> SpringPart | None:
-        """Spring."""
+        """Spring; None if absent."""
 
     @property
     def pack(self) -> PackPart | None:
-        """Ribbon and paper."""
+        """Ribbon and paper pack; None if absent."""
 
     @property
     def backstop(self) -> BackstopPart | None:
-        """Backstop."""
+        """Backstop; None if absent."""
 
     @property
     def platen(self) -> float | None:
@@ -46,7 +46,7 @@ class HammerLike(Protocol):
 
     @property
     def origin(self) -> float:
-        """Position of the backstop, or 0 without one, m."""
+        """Position of the backstop, m; 0 without a backstop."""
 
 
 class StaticForce:
@@ -78,11 +78,11 @@ class StaticForce:
             self.end = min(self.high, self.front + getattr(hammer.pack, "thickness", 0.0))
 
     def free(self, x: float, current: float = 0.0) -> float:
-        """Net force of magnet and spring, N: no contact; NaN outside the range of the magnet's law."""
+        """Compute the net force of magnet and spring, N, without contacts; NaN outside the magnet's range."""
         return self.magnet(x, current) + self.spring(x)
 
     def total(self, x: float, current: float = 0.0) -> float:
-        """Net force with the contacts, N."""
+        """Compute the net force including the contacts, N."""
         # Inlined from `free`, `elastic` and `pack`: function calls dominate the time of an equilibrium
         # search.
         force = float(self._magnet(self._magnet_constants, x, current)) + float(
@@ -94,25 +94,25 @@ class StaticForce:
         return force + self.pack(x) if x > self.front else force
 
     def magnet(self, x: float, current: float = 0.0) -> float:
-        """Force of the magnet, N."""
+        """Compute the force of the magnet, N."""
         return float(self._magnet(self._magnet_constants, x, current))
 
     def spring(self, x: float) -> float:
-        """Force of the spring, N."""
+        """Compute the force of the spring, N."""
         return float(self._spring(self._spring_constants, x))
 
     def elastic(self, depth: float) -> float:
-        """Elastic force of the backstop compressed by a depth, N."""
+        """Compute the elastic force of the backstop at a compression depth, m; in N."""
         if depth <= 0.0 or self.rigid:
             return 0.0
         return float(self._backstop(self._backstop_constants, math.sqrt(depth)))
 
     def pack(self, x: float) -> float:
-        """Force of a slowly pressed pack, N."""
+        """Compute the force of a slowly pressed pack, N."""
         return float(self._pack(self._pack_constants, x, 0.0)) if x > self.front else 0.0
 
     def slope(self, x: float, current: float = 0.0) -> float:
-        """Return the derivative of the total force, with contacts, with respect to x, N/m.
+        """Compute the derivative of the total force, contacts included, with respect to x, N/m.
 
         Each part is differentiated separately, within its contact or range; the backstop with respect to
         sqrt(depth), in which its laws are smooth.
@@ -131,12 +131,12 @@ class StaticForce:
         return total
 
     def anchors(self) -> list[float]:
-        """Positions, m, near which forces vary on short scales."""
+        """Return the positions, m, near which forces vary on short length scales."""
         places = [self.low, self.high, self._position, self.front, self.hammer.origin, 0.0]
         return sorted({place for place in places if self.low <= place <= self.high})
 
     def reach(self, far: float = FAR) -> tuple[float, float]:
-        """Return the search interval for equilibria, m, at most `far` from the origin."""
+        """Return the search interval for equilibria, m, within `far` of the origin."""
         hammer = self.hammer
         low, high = self.limits
         if hammer.platen is not None:
@@ -148,7 +148,7 @@ class StaticForce:
 
 
 def derivative(function: Callable[[float], float], x: float, step: float) -> float:
-    """Differentiate by central differences, extrapolated to step size 0.
+    """Differentiate a function by central differences, extrapolated to step size 0.
 
     C. J. F. Ridders, Adv. Eng. Software 4 (1982) 75.
     """

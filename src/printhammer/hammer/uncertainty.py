@@ -2,7 +2,8 @@
 
 A fit writes these errors beside its constants, and the next fit uses them as priors. In the file they are a
 table ``[uncertainty]``: ``constants``, their ``standard_errors`` with units, the ``correlation`` of each
-constant with those before it, and ``records``, the fingerprints of the motions already used.
+constant with the preceding constants, and ``records``, the fingerprints of the records of motion already
+used.
 """
 
 from __future__ import annotations
@@ -39,20 +40,20 @@ class Uncertainty:
     covariance: FloatArray
     """Covariance matrix, SI, shape (n, n)."""
     records: tuple[str, ...] = ()
-    """Fingerprints of the records of motion that entered the covariance."""
+    """Fingerprints of the records of motion used to fit the constants."""
 
     def error(self, key: str) -> float:
-        """Return the standard error of a constant, SI; 0 for a constant known exactly."""
+        """Return the standard error of a constant, SI; 0 for an exactly known constant."""
         return float(np.sqrt(self.covariance.diagonal()[self.keys.index(key)])) if key in self.keys else 0.0
 
     def without(self, gone: Container[str]) -> Uncertainty:
-        """Return the uncertainty without some constants (marginalised)."""
+        """Return the uncertainty of the remaining constants, without the keys passed (marginalised)."""
         rows = [row for row, key in enumerate(self.keys) if key not in gone]
         keys = tuple(self.keys[row] for row in rows)
         return Uncertainty(keys, self.covariance[np.ix_(rows, rows)], self.records)
 
     def table(self, units: Mapping[str, str]) -> dict[str, Any] | None:
-        """Return the table for a hammer file, with SI units by key; None if every constant is exact."""
+        """Return the table for a hammer file, with SI `units` by key; None if every constant is exact."""
         errors = np.sqrt(self.covariance.diagonal())
         exact = [key for key, error in zip(self.keys, errors.tolist(), strict=True) if not error > 0.0]
         if exact:
@@ -71,13 +72,13 @@ class Uncertainty:
 
 
 def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertainty:
-    """Parse the table of a hammer file; `constants` are those of the hammer.
+    """Parse the table [uncertainty] of a hammer file; `constants` are the constants of the hammer.
 
     Raises
     ------
     InputError
         A name is not a constant of the hammer, a standard error is not a positive quantity of its dimension,
-        or the correlations are not those of a covariance matrix.
+        or the correlations do not form a positive semidefinite matrix.
     """
     if not isinstance(table, Mapping):
         raise InputError.of(UNCERTAINTY, table, f"a table [{UNCERTAINTY}]", written=shown(table))
@@ -127,7 +128,7 @@ def _error(key: str, text: str, constant: Constant) -> float:
 
 
 def _correlation(table: Mapping[str, Any], count: int) -> FloatArray:
-    """Return the correlation matrix; the identity if the table has no correlations."""
+    """Return the correlation matrix; the identity matrix if the table states no correlations."""
     matrix = np.eye(count)
     rows = table.get("correlation", [])
     wanted = f"expected {max(count - 1, 0)} rows of 1, 2, ... numbers, those of a covariance"

@@ -1,11 +1,11 @@
-"""Declarations of result fields: meaning, unit and dimensions, beside each field.
+"""Declarations of result fields: each field states its meaning, unit and dimensions.
 
 `column`, `coordinate`, `scalar` and `part` declare the fields of a `printhammer.results.Result`, and
 `derived` adds a property to its table. Dataset, table, files, the Attributes section of the docstring and the
-HTML repr follow from the declarations. `Declared` is the base of classes with declared fields that are not
-results.
+HTML repr follow from the declarations. `Declared` is the base of classes that have declared fields but are
+not results.
 
-The functions on HTML format results and their fields for notebooks.
+The formatting functions show results and their fields in notebooks.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ import numpy as np
 from printhammer.support.html import html_table, titled
 
 MOST_ROWS: Final = 40
-"""Largest number of rows shown of a table; longer tables show the first and last rows. Arbitrary."""
+"""Largest number of table rows shown; of longer tables the first and last rows are shown. Arbitrary."""
 
 
 def cell(value: Any) -> str:
-    """Format a value as a cell: numbers to six digits, arrays by shape, None as a dash."""
+    """Format a value as a table cell: numbers to six digits, arrays by their shape, None as a dash."""
     if value is None:
         return "-"
     if isinstance(value, np.ndarray):
@@ -52,7 +52,7 @@ def extent(values: Any) -> str:
 
 
 def span(values: Any) -> str:
-    """Format the smallest and largest of numbers; empty without numbers."""
+    """Format the range of an array, from the smallest to the largest number; empty without numbers."""
     array = np.asarray(values)
     if array.dtype.kind not in "fiu":
         return ""
@@ -61,7 +61,7 @@ def span(values: Any) -> str:
 
 
 def shortened(rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[Sequence[str]]:
-    """Return at most `most` rows: the first and last ones, with the number of omitted rows between."""
+    """Return at most `most` rows: the first and last ones, and between them the number of omitted rows."""
     hidden, half = len(rows) - most, most // 2
     if hidden <= 0:
         return list(rows)
@@ -97,11 +97,11 @@ class Column:
     dtype : object
         Type of the numbers in the Dataset; None keeps the type of the values.
     codes : sequence of str
-        Names of the numbers 0, 1, 2 and so on; the table holds the names.
+        Names of the codes 0, 1, 2 and so on; the table shows the names.
     head : str
         Heading in the table, without the unit; empty for `name`.
     attrs : mapping or None
-        Further attributes of the variable.
+        Further attributes of the Dataset variable.
     """
 
     unit: str
@@ -117,7 +117,7 @@ class Column:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Attributes of the variable in the Dataset."""
+        """Attributes of the variable in the Dataset, such as its unit and long name."""
         coded = ", ".join(f"{code} {name}" for code, name in enumerate(self.codes))
         return {
             **({"units": self.unit} if self.unit else {}),
@@ -127,12 +127,12 @@ class Column:
         }
 
     def heading(self, name: str) -> str:
-        """Return the heading in the table of a variable, such as "x [m]"."""
+        """Return the heading of the column in a table, such as "x [m]"."""
         return heading(self.head or name, self.unit)
 
     @property
     def sentence(self) -> str:
-        """Return the text of the docstring."""
+        """Return the text of the field in the Attributes section of the docstring."""
         unit = f", {self.unit}" if self.unit not in ("", "1") else ""
         more = f"; {self.more}" if self.more else ""
         return f"{self.meaning[:1].upper()}{self.meaning[1:]}{unit}{more}."
@@ -144,7 +144,7 @@ def heading(name: str, unit: str) -> str:
 
 
 class More(TypedDict, total=False):
-    """Optional properties of a declaration, as described for `Column`."""
+    """Optional keyword arguments of a declaration, as described for `Column`."""
 
     more: str
     name: str
@@ -180,7 +180,7 @@ def coordinate(unit: str, meaning: str, dims: str, *, default: Any = MISSING, **
 
 
 def scalar(unit: str, meaning: str, *, more: str = "", name: str = "", **default: Any) -> Any:
-    """Declare a number, text or short list that is an attribute of the Dataset; arguments as for `column`.
+    """Declare an attribute of the Dataset: a number, text or short list; arguments as for `column`.
 
     `default` and `default_factory` are passed to `dataclasses.field`.
     """
@@ -198,9 +198,9 @@ def part(meaning: str, *, more: str = "", repr: bool = True, **default: Any) -> 
 def derived(
     unit: str, meaning: str, dims: str = "", *, kind: Kind | None = None, **more: Unpack[More]
 ) -> Callable[[_F], _F]:
-    """Declare a property as a variable of the Dataset; placed below `@property` or `@cached_property`.
+    """Decorate a property as a variable of the Dataset; placed below `@property` or `@cached_property`.
 
-    Arguments as for `column`; without dimensions it is an attribute of the Dataset.
+    Arguments as for the function `column`; without dimensions the property is an attribute of the Dataset.
     """
     sort: Kind = kind or ("column" if dims.split() else "scalar")
     note = Column(unit, meaning, tuple(dims.split()), sort, **more)
@@ -213,7 +213,7 @@ def derived(
 
 
 def columns_of(result: type[Any]) -> dict[str, Column]:
-    """Return the declarations of a class by attribute: fields in order, then derived properties."""
+    """Return the declarations of a class by attribute name: fields in order, then derived properties."""
     declared: dict[str, Column] = {}
     if is_dataclass(result):
         declared = {entry.name: entry.metadata[_KEY] for entry in fields(result) if _KEY in entry.metadata}
@@ -226,7 +226,7 @@ def columns_of(result: type[Any]) -> dict[str, Column]:
 
 
 def with_attributes(doc: str, result: type[Any], columns: Mapping[str, Column]) -> str:
-    """Return a docstring with the Attributes section generated from the declared fields.
+    """Return a docstring with an Attributes section generated from the declared fields.
 
     The section is placed before Notes, References and similar sections. Properties keep their own docstrings.
     """
@@ -246,7 +246,7 @@ def with_attributes(doc: str, result: type[Any], columns: Mapping[str, Column]) 
 
 
 def _type_text(annotation: str, dims: tuple[str, ...]) -> str:
-    """Format an annotation in numpydoc style, such as "int array, shape (firing,)"."""
+    """Format a type annotation in numpydoc style, such as "int array, shape (firing,)"."""
     if not dims or not ("Array" in annotation or "ndarray" in annotation):
         return annotation.replace(" | ", " or ")
     sort = "int " if "int" in annotation.lower() else "bool " if "bool" in annotation.lower() else ""
@@ -258,8 +258,9 @@ def _type_text(annotation: str, dims: tuple[str, ...]) -> str:
 class Declared:
     """Base of classes with declared fields but without a Dataset; subclasses are frozen dataclasses.
 
-    The fields declare their meanings as those of a result do, and the Attributes section of the docstring
-    follows. With `eq=False` instances are compared by identity, as required for fields that are arrays.
+    The fields declare their meanings like the fields of a result; the Attributes section of the docstring
+    follows from the declarations. With `eq=False` instances are compared by identity, as required for fields
+    that are arrays.
     """
 
     if TYPE_CHECKING:
@@ -285,10 +286,10 @@ class Declared:
         return titled(type(self).__name__, html_table(rows))
 
     def __dir__(self) -> list[str]:
-        """Return the names for completion: public fields, properties and methods."""
+        """Return the names offered for completion: public fields, properties and methods."""
         return public_names(super().__dir__())
 
 
 def public_names(names: Iterable[str]) -> list[str]:
-    """Return the names for users of an object: neither private names nor constants of its class."""
+    """Return the public attribute names of an object, without constants of its class."""
     return sorted(name for name in names if not name.startswith("_") and not name.isupper())

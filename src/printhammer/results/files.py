@@ -1,6 +1,6 @@
-"""Results on disk: atomic writing by file ending, and reopening.
+"""Results on disk: atomic writing in a format chosen by the file ending, and reopening.
 
-| ending | holds |
+| ending | content |
 |---|---|
 | `.nc` | the Dataset, NetCDF in the classic format, which everything reads |
 | `.zarr` | the Dataset, a Zarr v3 store (needs the extra ``sweep``) |
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 ENDINGS: Final = (".nc", ".zarr", ".csv", ".parquet", ".json")
-"""Endings of the files that hold results."""
+"""Endings of the files in which results are saved."""
 
 _NEEDED: Final = {
     ".zarr": ("zarr", "Zarr stores need", "sweep"),
@@ -60,12 +60,12 @@ class Reopened(Declared):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Title, numbers of the whole result, and provenance."""
+        """Attributes of the Dataset: title, scalars, and provenance."""
         return {str(key): value for key, value in self.dataset.attrs.items()}
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the result."""
+        """Provenance of the result, as far as the file states it."""
         return {key: value for key, value in self.attributes.items() if key in KEYS}
 
 
@@ -141,14 +141,14 @@ def reopen(path: str | Path) -> Reopened:
 
 
 def need_for(path: str | Path, kind: str = "") -> None:
-    """Check that the optional package for a file format is installed; `kind` overrides the ending."""
+    """Check that the optional package for a file format is installed; `kind`, if set, replaces the ending."""
     package, what, extra = _NEEDED.get(kind or Path(path).suffix.lower(), ("json", "", ""))
     if find_spec(package) is None:
         raise missing_extra(f"{path}: {what} {package}", extra)
 
 
 def plain(value: Any) -> Any:
-    """Convert a value to plain numbers, texts, lists and dicts of Python, which every format can hold."""
+    """Convert a value to Python numbers, texts, lists and dicts, which every file format can hold."""
     if isinstance(value, dict):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, np.ndarray | list | tuple):
@@ -159,7 +159,7 @@ def plain(value: Any) -> Any:
 
 
 def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[str, Any]) -> xr.Dataset:
-    """Build a Dataset from columns and coordinates with their values, by name."""
+    """Build a Dataset from columns and coordinates with their values, by variable name."""
     import xarray as xr
 
     data: dict[str, Any] = {}
@@ -172,7 +172,7 @@ def dataset_of(entries: Mapping[str, tuple[Column, Any]], attributes: Mapping[st
 
 
 def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -> pd.DataFrame:
-    """Convert the arrays of a Dataset over the dimensions of the first one to a table."""
+    """Convert to a table the arrays of a Dataset that share the dimensions of the first array."""
     first = next(iter(dataset.data_vars.values()), None)
     dims = () if first is None else tuple(map(str, first.dims))
     columns = {}
@@ -187,7 +187,7 @@ def frame_of(dataset: xr.Dataset, attributes: Mapping[str, Any] | None = None) -
 def frame(
     columns: Mapping[str, tuple[tuple[str, ...], Any]], dims: tuple[str, ...], attributes: dict[str, Any]
 ) -> pd.DataFrame:
-    """Build a table with one row for each index along given dimensions.
+    """Build a table with one row for each combination of indices along the dimensions.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def frame(
     dims : tuple of str
         The dimensions; the last varies fastest.
     attributes : dict
-        Attributes for the `attrs` of the table.
+        Attributes to store in the `attrs` of the table.
     """
     import pandas as pd
 
@@ -216,7 +216,7 @@ def frame(
 
 
 def csv_text(table: pd.DataFrame) -> str:
-    """Format a table as CSV with all digits, preceded by its `attrs` as lines ``# key: value``."""
+    """Format a table as CSV with all digits; its `attrs` precede it as lines ``# key: value``."""
     head = "".join(f"# {key}: {_text(value)}\n" for key, value in table.attrs.items())
     return head + str(table.to_csv(index=False, float_format="%.17g", lineterminator="\n"))
 
@@ -241,7 +241,7 @@ def write_parquet(table: pd.DataFrame, path: str | Path) -> None:
 
 
 def _text(value: Any) -> str:
-    """Encode an attribute as text: verbatim if it is not mistaken for a number or list, else as JSON."""
+    """Encode an attribute as text: verbatim unless it would be read as a number or list, else as JSON."""
     if isinstance(value, str) and _decoded(value) == value == value.strip() and value.isprintable():
         return value
     return json.dumps(_strict(value), ensure_ascii=False)
@@ -264,7 +264,7 @@ def _netcdf(dataset: xr.Dataset) -> bytes:
 
 
 def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return attributes as arrays, numbers and texts; other values as JSON."""
+    """Return attributes as arrays, numbers and texts for NetCDF; other values are encoded as JSON."""
     flat = {}
     for key, value in attributes.items():
         kept = plain(value)
@@ -386,7 +386,7 @@ def _read_csv(source: Path) -> pd.DataFrame:
 
 
 def _typed(cells: list[str]) -> Any:
-    """Convert a column of cells to exact numbers, Booleans or text."""
+    """Convert a column of text cells to exact numbers, Booleans or text."""
     if set(cells) <= {"True", "False"}:
         return np.array([cell == "True" for cell in cells])
     for kind in (int, float):

@@ -1,11 +1,11 @@
-"""Provenance of results: the common set of keys.
+"""Provenance of results: definition of the keys.
 
 | key | |
 |---|---|
 | `hammer`, `hammer_fingerprint` | name of the hammer and fingerprint of its constants |
 | `drive`, `drive_fingerprint` | the drive in words, and its fingerprint, where there is one drive |
-| `waveform` | what every firing does, as the ``[waveform]`` table of a drive file, on one line of TOML |
-| `overlap` | what overlapping pulses do, "add" or "replace" |
+| `waveform` | waveform of every firing, as the ``[waveform]`` table of a drive file, on one line of TOML |
+| `overlap` | rule for overlapping pulses, "add" or "replace" |
 | `period` | time between the firings of a regime, s |
 | `scheme` | the integration scheme of a single run |
 | `tolerance` | error allowed in one step |
@@ -27,7 +27,7 @@ from printhammer.drive.waveforms.shapes import Waveform
 from printhammer.hammer.hammer import Hammer
 
 VERSIONS: Final = ("printhammer", "numpy", "numba", "scipy")
-"""Version keys, present in every result."""
+"""Keys of the versions, which every result has."""
 
 KEYS: Final = (
     "hammer",
@@ -42,7 +42,7 @@ KEYS: Final = (
     "status",
     *VERSIONS,
 )
-"""All provenance keys, in order."""
+"""All provenance keys, in order of display."""
 
 
 def provenance(
@@ -56,7 +56,7 @@ def provenance(
     tolerance: float | None = None,
     status: str | None = None,
 ) -> dict[str, Any]:
-    """Return the provenance of a result; a drive supplies waveform and overlap as well."""
+    """Return the provenance of a result; a drive adds its waveform and overlap rule."""
     if drive is not None:
         # A sequence has several waveforms, none of which represents the drive.
         waveform = drive.waveform if waveform is None and drive.uniform else waveform
@@ -78,7 +78,7 @@ def provenance(
 
 
 def versions() -> dict[str, str]:
-    """Return the versions that affect the bits of a result."""
+    """Return the package versions on which the bits of a result depend."""
     from printhammer import __version__
 
     return {"printhammer": __version__, **{name: _installed(name) for name in VERSIONS[1:]}}
@@ -86,5 +86,5 @@ def versions() -> dict[str, str]:
 
 @cache
 def _installed(name: str) -> str:
-    """Return the installed version of a package."""
+    """Return the installed version of a package; cached."""
     return version(name)

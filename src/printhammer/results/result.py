@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     Entries = dict[str, tuple[Column, Any]]
 
 RESULTS: dict[str, type[Result]] = {}
-"""Imported result classes, by name."""
+"""Result classes imported so far, by name."""
 
 
 @dataclass_transform(
@@ -93,7 +93,7 @@ class Result:
 
     @property
     def title(self) -> str:
-        """Title of the result, one line."""
+        """One-line title of the result."""
         return type(self).__name__
 
     @property
@@ -106,8 +106,8 @@ class Result:
     def provenance(self) -> dict[str, Any]:
         """Provenance: fingerprints, versions, tolerance; see `results.provenance`.
 
-        It is composed from the attributes `hammer`, `drive`, `regime` and so on, as far as the result has
-        them.
+        The provenance is composed of the attributes `hammer`, `drive`, `regime` and so on, as far as the
+        result has them.
         """
         regime = getattr(self, "regime", None)
         known: dict[str, Any] = {}
@@ -122,9 +122,10 @@ class Result:
         return provenance(**known)
 
     def entries(self) -> Entries:
-        """Return the columns and coordinates with their values, by their names in the Dataset.
+        """Return the columns and coordinates with their values, by name in the Dataset.
 
-        A class overrides the method if units depend on the instance, or arrays are not fields.
+        A class overrides the method if its units depend on the instance, or if some of its arrays are not
+        fields.
         """
         return {
             note.name: (note, getattr(self, name))
@@ -133,7 +134,7 @@ class Result:
         }
 
     def notes(self) -> Mapping[str, Any]:
-        """Return further attributes of the Dataset, besides title, scalars and provenance."""
+        """Return attributes of the Dataset besides title, scalars and provenance."""
         return {}
 
     @property
@@ -187,7 +188,7 @@ class Result:
         """Draw the result; with an interactive backend, `pyplot.show` shows the figure.
 
         Options are those of the plot function that `printhammer.figures.plots` registers for the class;
-        `picture` names an alternative picture.
+        `picture` selects an alternative figure.
         """
         # By name, so that physics does not depend on pictures.
         figure: Figure = import_module("printhammer.figures.plots").plot(self, **options)
@@ -210,7 +211,7 @@ class Result:
         return Summary([Facts(rows)])
 
     def cells(self, name: str, heading: str = "", format: str = "") -> Cells:
-        """Return a declared column as a column of a summary, with its unit; see `results.Cells`."""
+        """Return a declared column as a column of a summary table, with its unit; see `results.Cells`."""
         note = self.COLUMNS[name]
         unit = {"degC": "°C", "1": ""}.get(note.unit, note.unit)
         return Cells(heading or name.replace("_", " "), np.ravel(getattr(self, name)), unit, format)
@@ -250,7 +251,7 @@ def _worded(summary: Callable[..., Summary]) -> Callable[..., Summary]:
 
 
 def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, Any]:
-    """Return the names of codes, "" for codes without a name."""
+    """Return the names of integer codes; "" for codes without a name."""
     if not note.codes:
         return values
     names = np.array([*note.codes, ""])
@@ -258,21 +259,21 @@ def named_codes(values: np.ndarray[Any, Any], note: Column) -> np.ndarray[Any, A
 
 
 def stacked(results: Sequence[Result], dim: str, kind: type[Result]) -> Entries:
-    """Stack the arrays of results; ragged arrays are padded with NaN, -1 or empty text.
+    """Stack the arrays of results along a new dimension; ragged arrays are padded with NaN, -1 or "".
 
     Parameters
     ----------
     results : sequence of Result
         Results of one class; may be empty.
     dim : str
-        Name of the new dimension, the first one of every array.
+        Name of the new dimension, which is the first dimension of every array.
     kind : type
         Class of the results, which declares the arrays if `results` is empty.
 
     Returns
     -------
     dict
-        Entries in the form of `Result.entries`; of each coordinate the longest one.
+        Entries in the form of `Result.entries`, with the longest of each coordinate.
     """
     declared = (note for note in kind.COLUMNS.values() if note.kind in ("column", "coordinate"))
     none: Entries = {note.name: (note, np.zeros((0,) * len(note.dims))) for note in declared}

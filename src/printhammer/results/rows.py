@@ -1,4 +1,4 @@
-"""Rows: declared values of one kind, as a tuple and as a table."""
+"""Rows: objects of one declared class, as a tuple and as a table."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _T = TypeVar("_T", bound=Declared)
 
 
 class Rows(tuple[_T, ...]):
-    """Tuple of declared values of one kind, such as dots, with a table repr.
+    """Tuple of objects of one declared class, such as dots, shown as a table.
 
     Indexing by name yields a column: ``motion.dots["flight_time"]`` is an array, with NaN for None.
     """
@@ -29,7 +29,7 @@ class Rows(tuple[_T, ...]):
     kind: type[_T]
 
     def __new__(cls, rows: Iterable[_T], kind: type[_T]) -> Self:
-        """Create the tuple from rows and their common class."""
+        """Create the tuple from its rows and the class of the rows."""
         made = super().__new__(cls, rows)
         made.kind = kind
         return made
@@ -49,7 +49,7 @@ class Rows(tuple[_T, ...]):
         Raises
         ------
         KeyError
-            There is no such column.
+            The class of the rows has no such column.
         """
         if isinstance(index, str):
             if index not in self._heads:
@@ -62,18 +62,18 @@ class Rows(tuple[_T, ...]):
 
     @property
     def _heads(self) -> dict[str, str]:
-        """Headings of the columns, such as "t_in [s]", by name."""
+        """Headings of the columns, such as "t_in [s]", by attribute name."""
         return {name: note.heading(name) for name, note in columns_of(self.kind).items()}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the table, SI, units in the headings."""
+        """Return the table in SI, with units in the headings."""
         import pandas as pd
 
         table = pd.DataFrame([asdict(row) for row in self], columns=list(self._heads))
         return table.rename(columns=self._heads)
 
     def save(self, path: Path) -> None:
-        """Write the table as Parquet for that ending, else as CSV; errors as for `write_file`."""
+        """Write the table as Parquet for the ending .parquet, else as CSV; errors as for `write_file`."""
         (write_parquet if path.suffix.lower() == ".parquet" else write_csv)(self.to_dataframe(), path)
 
     def _cells(self) -> list[list[str]]:
@@ -88,5 +88,5 @@ class Rows(tuple[_T, ...]):
         )
 
     def _repr_html_(self) -> str:
-        """Return the HTML repr."""
+        """Return the HTML repr: the table, with long tables shortened."""
         return html_table(shortened(self._cells()), list(self._heads.values()))

@@ -1,9 +1,9 @@
-"""Store of sweep results: a Zarr v3 group that grows block by block and survives a kill at any moment.
+"""Store of sweep results: a Zarr v3 group, written block by block, that survives a crash at any moment.
 
 All arrays are laid out before the first result. A block of members is one chunk of every array, so that
 stored data are never rewritten. Each file is written to a temporary name, flushed to disk, and renamed; the
 chunk of the array `MARK` is written last, so that a block is done if and only if that file exists. The lock
-of a store ends with the process that holds it.
+of a store is released when the process that holds it ends.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MARK: Final = "status"
-"""Array whose chunk marks a block as done."""
+"""Name of the array whose chunk marks a block as done."""
 
 _ROOT: Final = "zarr.json"
 _FLUSHES: Final = 8  # Files flushed at once; arbitrary
@@ -35,7 +35,7 @@ _DRAFT: Final = f"{MARK}/.draft"
 
 
 class Variable(Declared):
-    """Array of a store."""
+    """Array of a store: dimensions, type, chunks and attributes."""
 
     name: str = part("its name")
     dims: tuple[str, ...] = part("names of its dimensions; those of the members come first")
@@ -49,7 +49,7 @@ class Variable(Declared):
 
 
 class Layout(Declared):
-    """Layout of a store."""
+    """Layout of a store: its arrays, attributes and identity."""
 
     chunks: tuple[int, ...] = part("members of a block along each of their dimensions")
     variables: tuple[Variable, ...] = part("results and coordinates, `MARK` among the results")
@@ -58,7 +58,7 @@ class Layout(Declared):
 
 
 class Store:
-    """Store locked and written by this process; a context manager.
+    """Store of results that this process locks and writes; a context manager.
 
     Parameters
     ----------
@@ -67,12 +67,12 @@ class Store:
     layout : Layout
         Layout of the store.
     now : str
-        Creation time stamp.
+        Time stamp of the creation.
 
     Raises
     ------
     InputError
-        The folder holds something else, or results of another identity; another process holds the lock; the
+        The folder holds other data, or results of another identity; another process holds the lock; the
         folder cannot be written; zarr is not installed. Existing data are kept.
     """
 
@@ -96,7 +96,7 @@ class Store:
             raise
 
     def done(self, index: Sequence[int]) -> bool:
-        """Whether the block at an index of the chunk grid is done."""
+        """Whether the block at an index of the chunk grid has been written."""
         return (self.path / _chunk(MARK, index)).exists()
 
     def write(self, index: Sequence[int], results: Mapping[str, npt.NDArray[Any]]) -> None:
@@ -126,7 +126,7 @@ class Store:
             raise self._refusal(error) from None
 
     def finish(self, now: str) -> None:
-        """Add the completion time stamp to a complete store, unless it has one."""
+        """Add the time stamp of completion to a complete store, unless the store has one."""
         root = _root(self.path)
         if root["attributes"].get("finished"):
             return
@@ -162,7 +162,7 @@ class Store:
         self._handle = _locked(self.path, self.path)
 
     def _create(self, now: str) -> None:
-        """Create the layout in a temporary folder and rename it."""
+        """Create the arrays in a temporary folder, then rename the folder."""
         draft = self.path.with_name(f".{self.path.name}.part")
         draft.mkdir(exist_ok=True)
         self._handle = _locked(draft, self.path)
@@ -207,7 +207,7 @@ class Store:
 
 
 def open_store(path: str | Path) -> xr.Dataset:
-    """Open a store, complete or not; values are read on access."""
+    """Open a store, complete or incomplete; values are read when accessed."""
     _require_zarr()
     import xarray as xr
 
@@ -225,7 +225,7 @@ def _require_zarr() -> None:
 
 
 def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the files of an in-memory Zarr group with a layout, and its arrays by name.
+    """Create an in-memory Zarr group with a layout; return its files, and its arrays by name.
 
     Values written to an array appear among the files as the bytes to store on disk.
     """
@@ -263,7 +263,7 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
 
 
 def _root(path: Path) -> dict[str, Any]:
-    """Return the metadata of the group of a store."""
+    """Return the metadata of the Zarr group of a store."""
     other = f"{path}: the folder is no store of printhammer: expected one, or a name that is not taken"
     try:
         root: dict[str, Any] = json.loads((path / _ROOT).read_bytes())
@@ -307,7 +307,7 @@ def _locked(folder: Path, named: Path) -> int:
 
 
 def _make(folder: Path) -> list[Path]:
-    """Create a folder and its parents; return the folders whose directory entries may be new."""
+    """Create a folder and its parents; return the folders whose directory entries may have to be flushed."""
     if folder.is_dir():
         return [folder]
     above = _make(folder.parent)
@@ -316,7 +316,7 @@ def _make(folder: Path) -> list[Path]:
 
 
 def _flush(paths: Collection[Path]) -> None:
-    """Flush files and directory entries to disk; many at once take hardly longer than one."""
+    """Flush files and directory entries to disk in parallel, which takes hardly longer than one flush."""
     with ThreadPoolExecutor(min(_FLUSHES, len(paths))) as pool:
         list(pool.map(_flush_one, paths))
 

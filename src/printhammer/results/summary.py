@@ -1,8 +1,8 @@
 """Summaries of results: sentences, facts and small tables, with quantities in SI.
 
-The terminal, ``print(result)`` and the notebook render the same summary. Its texts hold marks instead of
-finished numbers and colours: `quantity` marks a number with its SI unit, which is converted into the unit
-system of the reader when the summary is rendered, and `styled` marks words that a terminal shows in colour.
+The terminal, ``print(result)`` and the notebook render the same summary. The texts hold marks instead of
+formatted numbers and colours: `quantity` marks a number with its SI unit, to be converted to the unit system
+of the reader when the summary is rendered; `styled` marks words that a terminal shows in colour.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Style = Literal["good", "poor", "bad", "strong", "best", "dim", "cyan", "magenta
 FactRow = tuple[str, str | None]
 
 NONE: Final = "–"
-"""Text of a missing quantity."""
+"""Text shown for a missing quantity."""
 
 SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "s": {"si": ("us", ".1f"), "inch": ("us", ".1f")},
@@ -34,7 +34,7 @@ SHOWN: Final[dict[str, dict[str, tuple[str, str]]]] = {
     "J": {"si": ("mJ", ".4f"), "inch": ("in lbf", ".5f")},
     "A": {"si": ("A", ".3f"), "inch": ("A", ".3f")},
 }
-"""Unit shown and number format in either unit system, by SI unit."""
+"""Displayed unit and number format in either unit system, by SI unit."""
 _SIGNS: Final = {"us": "µs", "um": "µm", "in lbf": "in·lbf"}
 
 _DOT: Final = re.compile(r"(?<![-\w])([Dd])ot(?=s?(?![-\w]| matrix))")
@@ -45,27 +45,27 @@ _STYLED: Final = re.compile("⟪([a-z]+) ([^⟪⟫]*)⟫")
 
 
 def quantity(value: float | None, unit: str, *, bare: bool = False) -> str:
-    """Mark a quantity in SI, with a unit in `SHOWN`; `bare` hides the unit; None yields a dash."""
+    """Mark a quantity in SI for display, with a unit in `SHOWN`; `bare` hides the unit; None gives a dash."""
     return NONE if value is None else f"⟦{float(value)!r} {unit}{'!' * bare}⟧"
 
 
 def interval(values: npt.NDArray[Any], unit: str) -> str | None:
-    """Mark the range of quantities in SI; None for an empty array."""
+    """Mark the range of an array of quantities in SI for display; None for an empty array."""
     return f"{quantity(values.min(), unit)} to {quantity(values.max(), unit)}" if values.size else None
 
 
 def styled(style: Style, said: object) -> str:
-    """Mark words with a style."""
+    """Mark words with a display style."""
     return f"⟪{style} {said}⟫"
 
 
 def judged(good: bool, said: object, otherwise: Style = "poor") -> str:
-    """Mark words as good, or with another style if `good` is false."""
+    """Mark words with the style "good" or, if `good` is false, with the other style."""
     return styled("good" if good else otherwise, said)
 
 
 def repeated(name: str, sentences: Iterable[str]) -> list[FactRow]:
-    """Return facts of which only the first has a name."""
+    """Return sentences as facts; only the first fact has the name."""
     return [("" if row else name, sentence) for row, sentence in enumerate(sentences)]
 
 
@@ -76,13 +76,13 @@ def multiplier(value: complex) -> str:
 
 
 def sign(unit: str, system: System) -> str:
-    """Return the symbol of the unit in which quantities of an SI unit are shown."""
+    """Return the symbol of the unit in which quantities of an SI unit are displayed."""
     name = SHOWN[unit][system][0]
     return _SIGNS.get(name, name)
 
 
 def shown(value: float, unit: str, system: System) -> str:
-    """Format a quantity in SI, without its unit."""
+    """Format a quantity, SI, in the displayed unit, without the unit symbol."""
     from printhammer.units import from_si
 
     name, digits = SHOWN[unit][system]
@@ -92,7 +92,7 @@ def shown(value: float, unit: str, system: System) -> str:
 
 
 def rendered(text: str, system: System = "si", style: Callable[[str, str], str] | None = None) -> str:
-    """Replace the marks of a text; `style` renders styled words, by default verbatim."""
+    """Replace the marks of a text by formatted quantities; `style` renders styled words."""
     with_units = _QUANTITY.sub(
         lambda mark: (
             shown(float(mark[1]), mark[2], system) + ("" if mark[3] else f" {sign(mark[2], system)}")
@@ -104,10 +104,10 @@ def rendered(text: str, system: System = "si", style: Callable[[str, str], str] 
 
 @dataclass(frozen=True)
 class Cells:
-    """Column of a table.
+    """Column of a summary table.
 
     Numbers with a unit in `SHOWN` and without a format are SI and are converted to the unit system of the
-    reader; others are shown unchanged, with `unit` in the heading. None and NaN are shown as a dash.
+    reader; other cells are shown unchanged, with `unit` in the heading. None and NaN are shown as a dash.
     """
 
     heading: str
@@ -122,7 +122,7 @@ class Cells:
         return not self.format and self.unit in SHOWN
 
     def unit_sign(self, system: System) -> str:
-        """Return the unit in the heading, empty if there is none."""
+        """Return the unit for the heading; empty for a pure number or text."""
         return sign(self.unit, system) if self._converted else self.unit
 
     def texts(self, system: System) -> list[str]:
@@ -140,21 +140,21 @@ class Cells:
 
 @dataclass(frozen=True)
 class Grid:
-    """Small table; beyond `most` rows only the first and last ones are shown."""
+    """Small table of a summary; of more than `most` rows only the first and last ones are shown."""
 
     columns: Sequence[Cells]
     title: str = ""
     most: int | None = None
 
     def rows(self, system: System) -> list[Sequence[str]]:
-        """Return the texts of the cells, row by row."""
+        """Return the texts of the cells, as one list per row."""
         rows = list(zip(*(column.texts(system) for column in self.columns), strict=True))
         return shortened(rows, self.most or len(rows))
 
 
 @dataclass(frozen=True)
 class Facts:
-    """List of names and values, one per row; a fact with value None is omitted."""
+    """List of names and values; a fact whose value is None is omitted."""
 
     rows: Sequence[FactRow]
     title: str = ""
@@ -166,12 +166,12 @@ class Facts:
 
 
 class Summary(tuple[str | Facts | Grid, ...]):
-    """Summary: sentences, facts and tables, in reading order."""
+    """Summary of a result: sentences, facts and tables, in reading order."""
 
     __slots__ = ()
 
     def worded(self, strike: str) -> Summary:
-        """Return the summary with another noun for a dot, such as "closing"."""
+        """Return the summary with another noun in place of "dot", such as "closing"."""
         return Summary(worded(each, strike) for each in self)
 
     def text(self, system: System = "si") -> str:
@@ -191,7 +191,7 @@ class Summary(tuple[str | Facts | Grid, ...]):
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """Return the HTML repr."""
+        """Return the HTML repr of the summary."""
         return "".join(_html(each) for each in self if each)
 
 

@@ -1,1 +1,1 @@
-"""Helpers without physics."""
+"""Helper functions without physics: roots, threads, tables, files and declarations of constants."""

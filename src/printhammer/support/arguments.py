@@ -23,20 +23,20 @@ _KINDS: Final = {
     "Branch": "a branch of orbits",
     "Orbit": "an orbit",
 }
-"""Descriptions of the checked classes for messages, by class name."""
+"""Noun phrase for each checked class, for error messages."""
 
 
 class _Argument(NamedTuple):
     name: str
     place: int
-    """Position among the positional arguments; their number for a keyword-only parameter."""
+    """Index among the positional arguments; for a keyword-only parameter, the number of positional ones."""
 
     classes: frozenset[str]
     expected: str
 
 
 def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], None]:
-    """Build the check of a function's arguments.
+    """Build a function that checks the arguments of another function.
 
     Parameters are checked whose annotation is a union of classes in `_KINDS` and None. Objects are compared
     by the names of their classes, so that no class has to be imported.
@@ -71,7 +71,7 @@ def check_objects(function: F) -> Callable[[tuple[Any, ...], dict[str, Any]], No
 
 
 def checked(function: F) -> F:
-    """Decorate a public function to raise InputError for an argument that is not the object annotated."""
+    """Decorate a public function to raise InputError for an argument of a class other than annotated."""
     check = check_objects(function)
 
     @functools.wraps(function)

@@ -1,4 +1,4 @@
-"""Array types: floating-point numbers, integers, Booleans and text."""
+"""NumPy array types: floating-point numbers, integers, Booleans and text."""
 
 import numpy as np
 import numpy.typing as npt

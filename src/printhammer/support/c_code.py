@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 
 def identifier(text: str) -> str:
-    """Return a valid C identifier, in lower case, made from any text."""
+    """Return a valid C identifier, in lower case, derived from any text."""
     return re.sub(r"\W+", "_", f"printhammer_{text}", flags=re.ASCII).lower()
 
 
@@ -20,13 +20,13 @@ def comment(text: str) -> str:
 
 
 def numbers(values: npt.ArrayLike) -> str:
-    """Format integers, ten to a line."""
+    """Format integers as C source, ten per line."""
     texts = [str(int(value)) for value in np.asarray(values).tolist()]
     return ",\n".join("    " + ", ".join(texts[at : at + 10]) for at in range(0, len(texts), 10))
 
 
 def nested(values: npt.ArrayLike) -> str:
-    """Format the initialiser of an integer array of any number of dimensions."""
+    """Format the initialiser of a C integer array of any number of dimensions."""
     whole = np.asarray(values)
     if whole.ndim == 1:
         return f"{{\n{numbers(whole)}\n  }}"
@@ -35,6 +35,6 @@ def nested(values: npt.ArrayLike) -> str:
 
 
 def table(kind: str, name: str, values: npt.ArrayLike) -> str:
-    """Format the definition of a two-dimensional array."""
+    """Format the definition of a two-dimensional C array."""
     whole = np.asarray(values)
     return f"static const {kind} {name}[{whole.shape[0]}][{whole.shape[1]}] = {nested(whole)};\n"

@@ -5,9 +5,9 @@ floats. `quantity` declares such a field, and `quantities` lists the declaration
 the JSON schema, the tables of `printhammer hammer show` and the documentation all derive from these
 declarations.
 
-A model that reads a file of its own (a measured table, a sampled waveform) resolves its name against
-`info.context["folder"]` of its validators: the folder of the hammer or drive file, a `pathlib.Path`; without
-a context, the working directory.
+A model that reads a further file (a measured table, a sampled waveform) resolves the name of that file
+against `info.context["folder"]` of its validators: the folder of the hammer or drive file, a `pathlib.Path`;
+without a context, the working directory.
 """
 
 from __future__ import annotations
@@ -31,45 +31,50 @@ _KEY = "quantity"
 
 @dataclass(frozen=True)
 class Quantity:
-    """Declaration of a physical constant: the metadata of a model field."""
+    """Declaration of a physical constant, stored as metadata of a model field."""
 
     si: str
     """SI unit of the stored float, as `printhammer.units` writes it; "1" for a pure number."""
     symbol: str
     """Symbol in the paper or the usual textbook, plain text."""
     meaning: str
-    """Meaning of the constant in one phrase, for tables and help."""
+    """Meaning of the constant in one phrase, for tables and help texts."""
     also: tuple[str, ...] = ()
     """SI units of other dimensions that a file may use instead (for the amplitude of a waveform: A or N)."""
     gt: float | None = None
+    """Exclusive lower bound of the SI value."""
     ge: float | None = None
+    """Lower bound of the SI value."""
     lt: float | None = None
+    """Exclusive upper bound of the SI value."""
     le: float | None = None
-    """Bounds of the SI value."""
+    """Upper bound of the SI value."""
     required: bool = True
     """Whether the constant is required in a file."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """Constant of a hammer: value and unit as written in its file, and the SI value."""
+    """Constant of a hammer: value and unit as written in the file, and the SI value."""
 
     key: str
     """Dotted key, such as "magnet.F0"."""
     value: float
+    """Number as written in the file, in `unit`."""
     unit: str
-    """Number and unit as written in the file."""
+    """Unit as written in the file."""
     si: float
-    """Value in `si_unit`."""
+    """Value in SI, in the unit `si_unit`."""
     status: str
-    """One of `STATUSES`."""
+    """Status of the constant, one of `STATUSES`, such as "stated" or "assumed"."""
     source: str
     """Origin of the value, such as a figure, a measurement or a textbook."""
     meaning: str
+    """Meaning of the constant, from the `Quantity` of the field."""
     symbol: str
-    """Meaning and symbol, from the `Quantity` of the field."""
+    """Symbol of the constant, from the `Quantity` of the field."""
     si_unit: str
-    """SI unit of `si`."""
+    """SI unit of the value `si`."""
 
 
 def quantity(
@@ -96,7 +101,7 @@ def quantity(
 
 @cache
 def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
-    """List the physical constants of a model class, field name to `Quantity`, in order of declaration."""
+    """List the physical constants of a model class: `Quantity` by field name, in order of declaration."""
     notes: dict[str, Quantity] = {}
     for name, field in model.model_fields.items():
         extra = field.json_schema_extra
@@ -107,13 +112,13 @@ def quantities(model: type[BaseModel]) -> dict[str, Quantity]:
 
 
 def options(model: type[BaseModel]) -> dict[str, Any]:
-    """List the other fields of a model class (choices, switches, file names), field name to annotation."""
+    """List the other fields of a model class (choices, flags, file names): annotation by field name."""
     known = quantities(model)
     return {name: field.annotation for name, field in model.model_fields.items() if name not in known}
 
 
 def folder_of(info: ValidationInfo) -> Path:
-    """Return the folder against which a file named in a model is resolved."""
+    """Return the folder for resolving the name of a file that a model refers to."""
     context = info.context
     folder = context.get("folder") if isinstance(context, dict) else None
     return Path(folder) if folder is not None else Path()
@@ -134,7 +139,7 @@ def expected(note: Quantity) -> str:
 
 
 def shown(value: object, *, quotes: bool = True) -> str:
-    """Format a value for an error message, on one line of 80 characters; `quotes=False` omits the quotes."""
+    """Format a value for an error message, on one line of at most 80 characters, by default in quotes."""
     text = value if isinstance(value, str) and not quotes and value.isprintable() else repr(value)
     return text if len(text) <= 80 else text[:77] + "..."
 
@@ -142,7 +147,7 @@ def shown(value: object, *, quotes: bool = True) -> str:
 def invalid(
     error: ValidationError, model: type[BaseModel], prefix: str = "", written: Mapping[str, str] | None = None
 ) -> InputError:
-    """Convert the first fault of a pydantic validation to an `InputError`.
+    """Convert the first error of a pydantic validation to an `InputError`.
 
     Parameters
     ----------
@@ -158,7 +163,7 @@ def invalid(
     Returns
     -------
     InputError
-        Error with key, value and expectation; an InputError raised by a validator is passed on unchanged.
+        Error with key, value and expectation; an InputError raised by a validator is returned unchanged.
     """
     fault = error.errors(include_url=False)[0]
     cause = fault.get("ctx", {}).get("error")

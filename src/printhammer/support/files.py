@@ -1,4 +1,4 @@
-"""Text files: atomic writing that never overwrites an input, and reading."""
+"""Text files: reading, and atomic writing that never overwrites an input."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def write_file(path: str | Path, content: str | bytes) -> None:
 
 
 def make_folder(path: str | Path) -> Path:
-    """Create a folder and its parents, and check that files can be written there."""
+    """Create a folder and its parents; raise InputError if no file can be written there."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -81,12 +81,12 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
 
 
 def read_text(path: Path, what: str, *, wanted: str = "", encoding: str = "utf-8") -> str:
-    """Read a text file; `what` names it in messages, such as "the drive file".
+    """Read a text file; `what` names the file in messages, such as "the drive file".
 
     Raises
     ------
     InputError
-        The file cannot be read, or is not UTF-8; `wanted` is the expectation in that message.
+        The file cannot be read, or is not UTF-8; `wanted` is the expectation stated in the message.
     """
     try:
         return path.read_text(encoding)

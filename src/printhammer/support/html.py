@@ -7,18 +7,18 @@ from html import escape
 from typing import Final
 
 _MOST_LETTERS: Final = 80
-"""Number of characters shown of a cell; arbitrary, about a line of a notebook."""
+"""Largest number of characters shown of a cell; arbitrary, about a line of a notebook."""
 
 
 def html_table(rows: Sequence[Sequence[str]], heads: Sequence[str] = ()) -> str:
-    """Return an HTML table; cells are truncated to 80 characters."""
+    """Return an HTML table of rows below a heading; long cells are truncated."""
     head = f"<thead><tr>{''.join(f'<th>{escape(name)}</th>' for name in heads)}</tr></thead>" if heads else ""
     cells = ("".join(f"<td>{escape(_cut(cell))}</td>" for cell in row) for row in rows)
     return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
 def titled(title: str, *parts: str) -> str:
-    """Return HTML blocks below a bold title."""
+    """Return HTML blocks under a bold title."""
     return f"<div><b>{escape(title)}</b>{''.join(parts)}</div>"
 
 

@@ -21,7 +21,7 @@ _FLAT: Final = 1e-12
 
 @dataclass(frozen=True)
 class Root:
-    """Root of a function, with its sign on either side: -1 or 1, and 0 at an end of the grid."""
+    """Root of a function, with the sign of the function on either side: -1 or 1; 0 at an end of the grid."""
 
     x: float
     before: int
@@ -29,7 +29,7 @@ class Root:
 
 
 def bisect(function: Callable[[float], float], low: float, high: float) -> float:
-    """Find a root by bisection, in a bracket with a sign change.
+    """Find a root by bisection of a bracket with a sign change.
 
     Returns
     -------
@@ -52,9 +52,9 @@ def bisect(function: Callable[[float], float], low: float, high: float) -> float
 def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Root]:
     """Find the roots of a function on an ascending grid.
 
-    Stretches where the function is NaN are skipped, as are stretches longer than 1e-12 where it is zero,
-    which hold no isolated root. Two roots between neighbouring grid points are found, unless they lie closer
-    together than about 1e-8 of the grid spacing; of three roots only one is found.
+    Intervals where the function is NaN are skipped, as are intervals longer than 1e-12 where the function is
+    zero, which contain no isolated root. Two roots between neighbouring grid points are found, unless they
+    lie closer together than about 1e-8 of the grid spacing; of three roots only one is found.
     """
     isolated: list[Root] = []
     points = _with_probes(function, grid)
@@ -64,7 +64,7 @@ def roots(function: Callable[[float], float], grid: Sequence[float]) -> list[Roo
 
 
 def _with_probes(function: Callable[[float], float], grid: Sequence[float]) -> list[tuple[float, float]]:
-    """Evaluate on the grid, and next to grid points that are roots, for the signs on both sides."""
+    """Evaluate a function on the grid, and beside grid points that are roots, for the signs on both sides."""
     points: list[tuple[float, float]] = []
     for k, x in enumerate(grid):
         value = function(x)
@@ -79,7 +79,7 @@ def _with_probes(function: Callable[[float], float], grid: Sequence[float]) -> l
 
 
 def _stretches(values: Sequence[float]) -> Iterator[tuple[int, int]]:
-    """Split the grid into stretches without NaN; return the index ranges."""
+    """Split the grid into runs of points without NaN; yield the first and last index of each run."""
     start = None
     for k, value in enumerate([*values, math.nan]):
         if math.isnan(value):

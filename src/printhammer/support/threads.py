@@ -1,6 +1,6 @@
 """Threads over ranges, and cooperative computations that share their expensive evaluations.
 
-`in_threads` splits ranges of indices into pieces, which threads fetch one at a time.
+`in_threads` splits ranges of indices into chunks, which threads fetch one at a time.
 
 A `Work` is a generator that delegates expensive evaluations: it yields a list of queries, receives the
 answers in the same order, and returns its result. `together` merges the queries of several works, so that one
@@ -27,7 +27,7 @@ _INTERVAL: Final = 0.1  # Interval between progress reports, s; arbitrary
 
 
 def thread_count(threads: int | None) -> int:
-    """Return the number of threads; None stands for the number of cores available to this process."""
+    """Return the number of threads; None stands for the number of CPU cores available to this process."""
     if threads is None:
         if hasattr(os, "sched_getaffinity"):
             return len(os.sched_getaffinity(0))
@@ -38,7 +38,7 @@ def thread_count(threads: int | None) -> int:
 
 
 def shifted(progress: Progress | None, begun: int, total: int) -> Progress | None:
-    """Return a progress callback for a part of a computation: `begun` steps are done, of `total`."""
+    """Return a progress callback for a later stage of a computation: `begun` steps of `total` are done."""
     return None if progress is None else lambda done, _all: progress(begun + done, total)
 
 
@@ -71,25 +71,25 @@ def in_threads(
     progress: Progress | None = None,
     lengths: Sequence[int] | None = None,
 ) -> None:
-    """Run several works in threads, each over a range of indices from 0.
+    """Run several functions in threads, each over the indices of its own range, in chunks.
 
     Parameters
     ----------
     works : sequence of callable
-        Functions of the first index of a piece and the index after its last.
+        Functions of the first index of a chunk and the index after its last.
     sizes : sequence of int
-        Length of the range of each work.
+        Length of the range of each function.
     threads : int
-        Number of threads; with one, the calling thread does all.
+        Number of threads; with 1, the calling thread computes everything.
     progress : callable, optional
-        Called from time to time, in the calling thread, with the number of indices done and in total.
+        Called periodically, in the calling thread, with the number of indices done and the total number.
     lengths : sequence of int, optional
-        Length of the pieces of each work; by default a thread gets a few dozen pieces.
+        Length of the chunks of each function; by default a thread gets a few dozen chunks.
 
     Raises
     ------
     KeyboardInterrupt
-        On Ctrl-C, after the pieces under way are finished.
+        On Ctrl-C, after the chunks in progress are finished.
     """
     total = sum(sizes)
     if lengths is None:
@@ -169,7 +169,7 @@ def together(works: Sequence[Work[A, B, T]]) -> Work[A, B, list[T]]:
 
 
 def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[B]]]) -> Work[C, D, T]:
-    """Run a work whose queries are answered by further works with queries of another kind."""
+    """Run a `Work` whose queries are answered by further works with queries of another kind."""
     answers: list[B] | None = None
     while True:
         try:
@@ -182,7 +182,7 @@ def translated(work: Work[A, B, T], answer: Callable[[list[A]], Work[C, D, list[
 
 
 def answered(work: Work[A, B, T], answer: Callable[[list[A]], list[B]]) -> T:
-    """Run a work to its end; a function answers its queries."""
+    """Run a `Work` to its end; a function answers its queries."""
     answers: list[B] | None = None
     while True:
         try:

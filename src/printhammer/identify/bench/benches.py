@@ -41,8 +41,10 @@ DISPLACEMENTS: Final = 31
 """Default number of displacements, from the backstop to the platen."""
 
 CURRENTS: Final = 6
+"""Default number of currents."""
+
 HIGHEST_CURRENT: Final = 1.25
-"""Default number of currents, and the highest current as a multiple of the waveform's peak."""
+"""Default highest current, as a multiple of the waveform's peak."""
 
 PEAKS: Final = (0.3, 0.45, 0.6)
 """Default peak indentations of the load cycles, as fractions of the pack thickness.

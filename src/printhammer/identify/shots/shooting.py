@@ -65,6 +65,7 @@ class Chain:
     by_state: FloatArray
     """Derivatives of the motion with respect to the initial state of the segment, shape (g, 2, 2)."""
     end_by_parameter: FloatArray
+    """Derivatives of each segment's final state per scale of each parameter, shape (j, 2, p)."""
     end_by_state: FloatArray
     """Derivatives of each segment's final state with respect to its initial state, shape (j, 2, 2)."""
 

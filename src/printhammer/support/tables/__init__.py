@@ -1,1 +1,1 @@
-"""Tables of numbers in text files, as people, spreadsheets and instruments write them."""
+"""Tables of numbers in text files, as written by people, spreadsheets and instruments."""

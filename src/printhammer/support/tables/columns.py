@@ -45,19 +45,19 @@ EXAMPLE: Final = "'time=1, current=2*-10 A/V, delay(current)=2 us'"
 
 @dataclass(frozen=True)
 class Source:
-    """Source of a quantity: a column, and the conversion of its numbers."""
+    """Source of a quantity: a column of the table, and the conversion of its numbers."""
 
     place: int
-    """Column, counted from 1."""
+    """Number of the column in the table, counted from 1."""
     factor: float = 1.0
-    """Factor from the number in the table to the quantity, in `unit`."""
+    """Factor that converts a number in the table to the quantity, in `unit`."""
     unit: str = ""
     """Unit of the factor, such as "A/V" or "A"; empty where the factor is a pure number."""
     offset: str = ""
-    """Quantity that is added, with its unit; empty for nothing."""
+    """Offset added after multiplication, with its unit; empty for no offset."""
 
     def scale(self, own: str, si: str) -> float:
-        """Compute the factor from a number in the table, whose unit there is `own` or empty, to SI.
+        """Compute the factor that converts numbers of the table to SI; `own` is their unit, if stated.
 
         Raises
         ------
@@ -84,19 +84,19 @@ class Source:
 
 @dataclass(frozen=True)
 class Columns:
-    """Declared columns of a table, by the name of the quantity."""
+    """Declared columns of a table, by quantity."""
 
     sources: dict[str, Source]
     clock: Clock | None = None
-    """Times of the rows, if no column holds them."""
+    """Times of the rows if they are evenly sampled; None if a column holds the times."""
     delays: dict[str, float] = field(default_factory=dict)
-    """Delay of a quantity, s."""
+    """Delay of each quantity relative to the time column, s."""
     where: str = "--columns"
-    """Name of the declaration in error messages."""
+    """Name of the declaration, for error messages."""
 
 
 def read_columns(text: str, where: str = "--columns") -> Columns:
-    """Parse a declaration of columns; `where` names it in messages.
+    """Parse a declaration of columns; `where` names the declaration in messages.
 
     Raises
     ------
@@ -141,12 +141,12 @@ def read_columns(text: str, where: str = "--columns") -> Columns:
 
 
 def columns_beside(path: Path) -> Columns | None:
-    """Read the file beside a table, whose name ends in .toml; return None if there is no such file.
+    """Read the declaration of columns in the TOML file beside a table; None if there is no such file.
 
     Raises
     ------
     InputError
-        The file cannot be read, or contains more than a table [columns] and optionally [delay].
+        The file cannot be read, or contains anything but a table [columns] and optionally [delay].
     """
     beside = path.with_name(f"{path.name}.toml")
     try:

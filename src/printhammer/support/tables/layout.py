@@ -1,4 +1,4 @@
-"""Layout of a table of numbers: separator, heading, units, facts around the numbers, times of even samples.
+"""Layout of a table of numbers: separator, heading, units, surrounding metadata, and sample times.
 
 Supported are the exports of oscilloscopes (Rigol, Tektronix, Keysight, PicoScope, LeCroy, Siglent, Rohde &
 Schwarz, GW Instek), of logic analysers (Saleae, sigrok), of LTspice, and of spreadsheets. No number is
@@ -23,11 +23,11 @@ from printhammer.support.tables.text import read_any, spaced, split_cells
 from printhammer.units import parse
 
 Row = tuple[int, list[str]]
-"""Line of the file, counted from 1, and cells."""
+"""Row of a table: its line in the file, counted from 1, and its cells."""
 
 _SEPARATORS: Final = "\t;|, "
 _LINES: Final = 2000
-"""Number of leading lines that determine the separator."""
+"""Number of leading lines from which the separator is determined."""
 _START: Final = ("xorg", "xorigin", "t0", "x0", "tstart", "xzero", "hoffset", "start", "begin")
 _STEP: Final = (
     *("increment", "incr", "inc", "step", "delta", "tinc", "dt", "deltax", "timeincrement", "hresolution"),
@@ -43,17 +43,17 @@ _ASSIGNED: Final = re.compile(r"\s*([^=:]+?)\s*[=:]\s*([^=:]+?)\s*")
 
 
 class Clock(NamedTuple):
-    """Times of even samples."""
+    """Times of evenly spaced samples."""
 
     start: float
     """Time of the first sample, s."""
     step: float
-    """Time from one sample to the next, s."""
+    """Sampling interval, s."""
     numbers: int | None = None
-    """Index of the column of sample numbers; None without such a column."""
+    """Index of the column of sample numbers; None if there is no such column."""
 
     def times(self, count: int) -> FloatArray:
-        """Return the times of a number of samples, s."""
+        """Return the times of the first `count` samples, s."""
         return np.asarray(self.start + self.step * np.arange(count), dtype=np.float64)
 
 
@@ -62,27 +62,27 @@ class Table:
     """A table of numbers before its columns are assigned to quantities."""
 
     where: str
-    """Name of the file, for messages."""
+    """Name of the file, for error messages."""
     head: int
-    """Line of the heading; 0 without a heading."""
+    """Line number of the heading; 0 without a heading."""
     columns: list[Heading]
     """Name and unit of each column, from its heading."""
     lines: list[int]
-    """Line of the file of each row, counted from 1."""
+    """Line number in the file of each row, counted from 1."""
     rows: list[list[str]]
-    """Cells; numbers have a decimal point."""
+    """Cells of each row as text; numbers have a decimal point."""
     comments: dict[str, str]
     """Comments of the form ``# key: value``."""
     clock: Clock | None
-    """Times of the rows, if facts in the file state them."""
+    """Times of the rows, if metadata in the file state them; else None."""
 
     def cells(self, place: int) -> list[str]:
-        """Return the stripped cells of a column."""
+        """Return the cells of a column, stripped of white space."""
         return [row[place].strip() if place < len(row) else "" for row in self.rows]
 
 
 def read_layout(path: Path, what: str, words: Collection[str] = ()) -> Table:
-    """Read a table of a file; `what` names it in messages, `words` are cells allowed beside numbers."""
+    """Read the table in a file; `what` names it in messages, `words` are cells allowed beside numbers."""
     return layout_of(read_any(path, what), str(path), words)
 
 
@@ -148,7 +148,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
 
 
 def _separator(text: str) -> str:
-    """Determine the separator that makes most lines rows of numbers, or else splits most lines."""
+    """Determine the separator: the one that makes most lines rows of numbers, or else splits most lines."""
     lines = [line for line in text.split("\n", _LINES)[:_LINES] if line.strip() and line.strip()[0] != "#"]
     best, chosen = 0, ""
     for sign in _SEPARATORS:
@@ -171,13 +171,13 @@ def _bare(row: list[str]) -> list[str]:
 
 
 def _is_data(row: list[str], words: Collection[str]) -> bool:
-    """Whether a row is numeric: every cell is a reading, a gap or one of the words."""
+    """Whether a row is numeric: every cell is a reading, a gap or an allowed word."""
     cells = [cell.strip() for cell in row]
     return any(map(is_number, cells)) and all(is_reading(cell) or cell.lower() in words for cell in cells)
 
 
 def _width(data: list[Row], above: list[Row]) -> int:
-    """Return the number of columns: that of the heading, or else of the longest row."""
+    """Return the number of columns: the length of the heading, or else of the longest row."""
     last = above[-1][1] if above else []
     if any(map(_is_named, last)) or is_unit_row(last):
         facts = (k for k, cell in enumerate(last) if _key(cell) in _CLOCK or _ASSIGNED.fullmatch(cell))
@@ -187,7 +187,7 @@ def _width(data: list[Row], above: list[Row]) -> int:
 
 
 def _commented(notes: list[tuple[int, str]], separator: str, width: int, first: int) -> list[Row]:
-    """Return the heading in the last comment above the numbers, as written by NumPy."""
+    """Return the heading in the last comment above the numbers, as NumPy writes it."""
     above = [
         (line, spaced(note).split() if separator == " " else note.split(separator))
         for line, note in notes
@@ -220,7 +220,7 @@ def _is_named(cell: str) -> bool:
 
 
 def _without_facts_beside(rows: list[Row]) -> tuple[list[Row], dict[str, list[str]]]:
-    """Remove columns of facts to the left of the numbers, as written by older Tektronix oscilloscopes."""
+    """Remove columns of metadata left of the numbers, as written by older Tektronix oscilloscopes."""
     first = rows[0][1]
     if not first[0].strip() or is_reading(first[0].strip()):
         return rows, {}
@@ -237,12 +237,12 @@ def _without_facts_beside(rows: list[Row]) -> tuple[list[Row], dict[str, list[st
 
 
 def _key(text: str) -> str:
-    """Normalise the name of a fact: lower case, letters and digits only."""
+    """Normalise the name of a metadata entry: lower case, letters and digits only."""
     return "".join(letter for letter in text.lower() if letter.isalnum())
 
 
 def _facts_of(row: list[str]) -> dict[str, list[str]]:
-    """Parse the facts of a row: "key,value,...", or cells such as "t0 = -1 ms"."""
+    """Parse the metadata entries of a row: "key,value,...", or cells such as "t0 = -1 ms"."""
     facts = {_key(match[1]): [match[2]] for cell in row if (match := _ASSIGNED.fullmatch(cell))}
     if len(row) > 1 and row[0].strip():
         facts[_key(row[0])] = [cell.strip() for cell in row[1:]]
@@ -250,7 +250,7 @@ def _facts_of(row: list[str]) -> dict[str, list[str]]:
 
 
 def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list[Row]) -> list[Heading]:
-    """Add units from facts to the headings of columns without a unit."""
+    """Add units stated in the metadata to the headings of columns without a unit."""
     lecroy = bool(above) and above[0][1][0].upper().startswith("LECROY")
     time = _fact(facts, _TIME_UNIT, ["s"] if lecroy else [""])[0]
     values = _fact(facts, _VALUE_UNIT, ["V"] if lecroy else [""])
@@ -270,7 +270,7 @@ def _with_units(columns: list[Heading], facts: dict[str, list[str]], above: list
 
 
 def _beside_names(columns: list[Heading], facts: dict[str, list[str]]) -> list[Heading]:
-    """Return the headings of an older Tektronix oscilloscope: time, and the source named in its facts."""
+    """Return the headings for an older Tektronix oscilloscope: time, and the source named in the metadata."""
     source = _fact(facts, ("source",), [""])[0]
     unit = split_heading(f"x [{facts[_TIME_UNIT[0]][0]}]").unit
     return [Heading("time", unit), *(column._replace(name=source) for column in columns[1:])]
@@ -283,7 +283,7 @@ def _fact(facts: dict[str, list[str]], keys: Collection[str], default: list[str]
 def _clock(
     where: str, facts: dict[str, list[str]], columns: list[Heading], rows: list[list[str]], *, numbered: bool
 ) -> Clock | None:
-    """Derive the sample times from facts: start and step, or step and the index of time zero."""
+    """Derive the sample times from metadata: start and step, or step and the index of time zero."""
     written = _fact(facts, _START, [""])[0]
     # Above the numbers, a start without a unit may be a sample index.
     plain = not numbered and is_number(written) and not any(key in facts for key in _START[:-2])

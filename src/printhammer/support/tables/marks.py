@@ -1,4 +1,4 @@
-"""Numbers as written in tables: decimal comma or point, group marks, gaps, readings out of range."""
+"""Numbers as written in tables: decimal marks, thousands separators, gaps, and out-of-range readings."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Final
 from printhammer.errors import InputError
 
 GAPS: Final = frozenset({"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "1.#qnan", "-1.#ind"})
-"""Cells without a reading, in lower case."""
+"""Cells that stand for a missing reading, in lower case."""
 
 OVER: Final = frozenset({"inf", "-inf", "+inf", "infinity", "-infinity", "∞", "-∞", "1.#inf", "-1.#inf"})
-"""Cells of a reading beyond the range of an instrument, in lower case."""
+"""Cells that stand for a reading beyond the range of an instrument, in lower case."""
 
 _SPACES: Final = "'\u2019\u00a0\u202f"
 _NUMBER: Final = re.compile(
@@ -25,7 +25,7 @@ _GROUPED: Final = {
 
 
 def is_number(cell: str) -> bool:
-    """Whether a stripped cell is a finite number, with any decimal and group marks."""
+    """Whether a stripped cell is a finite number, with any decimal mark and thousands separators."""
     return _NUMBER.fullmatch(cell) is not None
 
 
@@ -37,14 +37,14 @@ def is_reading(cell: str) -> bool:
 def with_points(
     where: str, text: str, separator: str, lines: Sequence[int], rows: list[list[str]]
 ) -> list[list[str]]:
-    """Convert rows to numbers with a decimal point and without group marks.
+    """Convert the numbers in rows to a decimal point and no thousands separators.
 
     Parameters
     ----------
     where, text, separator : str
-        Name of the file, for messages, its text, and what separates cells.
+        Name of the file, for messages; text of the file; separator of cells.
     lines, rows : list
-        Lines of the file, and their cells.
+        Line number and cells of each row.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def with_points(
 
 
 def _check_groups(where: str, lines: Sequence[int], rows: list[list[str]]) -> None:
-    """Raise InputError for a column such as 999, 1.000, 1.001, whose points may separate thousands."""
+    """Raise InputError for a column such as 999, 1.000, 1.001, whose points may be thousands separators."""
     for place in range(max(map(len, rows), default=0)):
         column = [
             (line, row[place].strip()) for line, row in zip(lines, rows, strict=True) if place < len(row)

@@ -1,4 +1,4 @@
-"""Headings of columns: the name, the unit, and the quantity that a name denotes."""
+"""Headings of columns: the name, the unit, and the quantity that the name denotes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ALIASES: Final = {
     "force": ("force", "f", "kraft"),
     "voltage": ("voltage", "u", "spannung", "tension"),
 }
-"""Names of columns that denote a quantity, in lower case."""
+"""Quantities by the column names that denote them, in lower case."""
 
 _MEASURED: Final = ("s", "V", "A", "m", "N", "Hz", "m/s", "ohm", "Wb", "H")
 _COUNTS: Final = frozenset({"number", "sequence", "samples", "sample", "#", "pts", "points"})
@@ -27,19 +27,19 @@ _VOLTAGES: Final = re.compile(r"V\(.+\)")
 
 
 class Heading(NamedTuple):
-    """Name and unit of a column; empty if the heading lacks them."""
+    """Name and unit of a column; each is empty if the heading lacks it."""
 
     name: str
     unit: str = ""
 
     @property
     def shown(self) -> str:
-        """Text for messages, such as "CH1 [V]"."""
+        """Heading as text for messages, such as "CH1 [V]"."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     @property
     def quantity(self) -> str:
-        """Quantity that the name denotes; empty if it is unknown."""
+        """Quantity that the name denotes; empty if the name is unknown."""
         name = self.name.lower()
         return next((what for what, names in ALIASES.items() if name in names), "")
 
@@ -66,7 +66,7 @@ def split_heading(cell: str) -> Heading:
 
 
 def unit_of(text: str) -> str:
-    """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; empty if it is no unit."""
+    """Parse a cell such as "(us)", "Volts" or "V DC" as a unit; empty if the cell is no unit."""
     bare = re.sub(r"\s*(DC|AC|dc|ac)$", "", text.strip().strip("()[]{}").strip()) or text.strip()
     for word in (bare, bare.lower()):
         for si in _MEASURED:
@@ -76,7 +76,7 @@ def unit_of(text: str) -> str:
 
 
 def is_unit_row(cells: list[str]) -> bool:
-    """Whether cells are units, counts, or empty, with at least one unit."""
+    """Whether the cells of a row are units, counts, or empty, with at least one unit."""
     units = [unit_of(cell) or cell.strip().strip("()").lower() in _COUNTS for cell in cells if cell.strip()]
     return all(units) and any(isinstance(unit, str) for unit in units)
 

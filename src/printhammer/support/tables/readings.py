@@ -3,7 +3,7 @@
 A heading states the unit of every column: ``displacement [um],current [A],force [N]``, in any order and any
 unit of the dimension; every line after it is one row. A declaration of columns, or a file beside the table,
 assigns the columns that the heading does not identify; see `printhammer.support.tables.columns`. The quantity
-of a column is never guessed from its numbers. Times are those of the table: rows before time 0 are kept.
+of a column is never guessed from its numbers. Times are not shifted: rows before time 0 are kept.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _NO_WORDS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
 
 LARGEST: Final = 1e9
-"""Largest magnitude of a measured value in SI; instruments write numbers such as 9.9e37 for no reading."""
+"""Largest magnitude accepted for a value in SI; instruments write numbers such as 9.9e37 for no reading."""
 
 BEFORE: Final = 0.1
-"""Largest value of a drive before time 0, as a fraction of its peak, that counts as noise; arbitrary."""
+"""Largest drive value before time 0, as a fraction of the peak, that counts as noise; arbitrary."""
 
 _TINY: Final = float(np.finfo(np.float64).tiny)
 _BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
@@ -42,16 +42,16 @@ _BY_UNIT: Final = {"time": "s", "current": "A", "force": "N"}
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """Columns of a table, in the order of its rows."""
+    """Quantities read from a table, in the order of its rows."""
 
     path: Path
-    """The file."""
+    """Path of the table."""
     values: dict[str, FloatArray]
-    """Columns of numbers by name, SI, shape (rows,)."""
+    """Columns of numbers by quantity, SI, shape (rows,)."""
     words: dict[str, list[str]]
     """Columns of words by name, in lower case."""
     lines: IntArray
-    """Line of the file of each row, counted from 1; shape (rows,)."""
+    """Line number in the file of each row, counted from 1, shape (rows,)."""
     comments: dict[str, str]
     """Comments of the form ``# key: value``; for a repeated key, the last."""
     levels: frozenset[str] = frozenset()
@@ -61,7 +61,7 @@ class Readings:
         return len(self.lines)
 
     def check_times(self, *, least: int = 2) -> None:
-        """Check the number of rows and that times ascend; InputError with the line."""
+        """Raise InputError, with the line number, for too few rows or for times that do not ascend."""
         times, where = self.values["time"], str(self.path)
         if len(times) < least:
             raise InputError(
@@ -79,12 +79,12 @@ class Readings:
             )
 
     def check_before(self, times: FloatArray, name: str) -> None:
-        """Check that a drive column starts at time 0, the firing, and not before.
+        """Check that a drive column starts at time 0, the time of firing, and not earlier.
 
         Raises
         ------
         InputError
-            More than `BEFORE` of its peak is before time 0, or no row is after it.
+            Before time 0 the drive exceeds `BEFORE` times its peak, or no row is after time 0.
         """
         values, where = np.abs(self.values[name]), str(self.path)
         early = times < 0.0
@@ -109,7 +109,7 @@ def read_table(
     columns: str | None = None,
     what: str = "the table",
 ) -> Readings:
-    """Read a table, numbers in SI; optional columns may be missing from the result.
+    """Read a table and convert its numbers to SI; optional columns may be missing from the result.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def read_table(
 
 
 def columns_of(path: Path, columns: str | None) -> Columns | None:
-    """Return the declared columns of a file, from a text or the file beside it; None without either."""
+    """Return the declared columns of a table, from `columns` or the file beside it; None without either."""
     return columns_beside(path) if columns is None else read_columns(columns)
 
 
@@ -197,7 +197,7 @@ def assigned(
     wanted: str,
     columns: Columns | None,
 ) -> tuple[dict[str, Source], dict[str, int]]:
-    """Assign columns to numbers and words, by declaration if there is one, else by heading."""
+    """Assign columns to quantities and words, by declaration if there is one, else by heading."""
     if columns is None:
         return _by_heading(table, numbers, text, wanted)
     for name, source in columns.sources.items():
@@ -227,8 +227,8 @@ def assigned(
 def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
     """Identify the quantity of each column by its heading: by name, or by a unit that occurs once.
 
-    Sample indices are no quantity. Only time, current and force are identified by unit, and only in a record
-    over time: a voltage or a length may be any quantity.
+    A column of sample indices is not a quantity. Only time, current and force are identified by unit, and
+    only in a record over time: a voltage or a length may be any quantity.
     """
     known = []
     for place, heading in enumerate(table.columns):
@@ -395,7 +395,7 @@ def _words(table: Table, name: str, place: int, allowed: tuple[str, ...]) -> lis
 def _in_time(
     values: dict[str, FloatArray], lines: IntArray, columns: Columns, where: str
 ) -> tuple[dict[str, FloatArray], IntArray]:
-    """Remove delays: interpolate all columns at the times of the first, and drop incomplete rows.
+    """Remove the delays: interpolate all columns at the times of the first; drop incomplete rows.
 
     The times of the first column are shifted; the others are interpolated linearly.
     """
@@ -437,7 +437,7 @@ def _listed(table: Table) -> str:
 
 
 def _example(table: Table, numbers: Mapping[str, str]) -> str:
-    """Return an example of `--columns` for a table."""
+    """Return an example of the option `--columns` for a table."""
     entries = []
     for place, ((name, si), heading) in enumerate(zip(numbers.items(), table.columns, strict=False), 1):
         own = heading.unit

@@ -1,4 +1,4 @@
-"""Text of table files: encodings, line ends, comments, cells.
+"""Text of table files: encodings, line ends, comments, and cells.
 
 Blank lines are skipped. Lines that begin with #, and those of sigrok and Matlab that begin with ; or %, are
 comments; a comment such as ``# sampling rate: 1 MHz`` is stored as key and text.
@@ -22,22 +22,22 @@ _COMMENT: Final = re.compile(r"\s*(#|//|[%;]\s*[^\W\d_][^;]*$)")
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of a table, with the line of the file of each row."""
+    """Cells of a table, with the line number of each row."""
 
     where: str
-    """Name of the file, for messages."""
+    """Name of the file, for error messages."""
     rows: list[tuple[int, list[str]]]
-    """Line of the file, counted from 1, and cells."""
+    """Rows: line number in the file, counted from 1, and cells."""
     comments: dict[str, str]
     """Comments of the form ``# key: value``; for a repeated key, the last."""
     notes: list[tuple[int, str]]
-    """Line and text of every comment."""
+    """Line number and text of every comment."""
 
 
 def read_cells(path: Path, what: str, *, gaps: bool = False) -> Cells:
-    """Read comma-separated values; `what` names the file in messages, such as "the force table".
+    """Read a CSV file as cells; `what` names the file in messages, such as "the force table".
 
-    With `gaps`, a row of only empty cells is kept.
+    With `gaps`, a row that has only empty cells is kept.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def read_cells(path: Path, what: str, *, gaps: bool = False) -> Cells:
 
 
 def read_any(path: Path, what: str) -> str:
-    """Read a text file in UTF-8, UTF-16 or Windows-1252, with line feeds as line ends."""
+    """Read a text file in UTF-8, UTF-16 or Windows-1252; line ends become line feeds."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
@@ -60,7 +60,7 @@ def read_any(path: Path, what: str) -> str:
 
 
 def decoded(content: bytes, where: str) -> str:
-    """Decode the bytes of a text file as `read_any` does."""
+    """Decode the bytes of a text file in the encodings that `read_any` accepts."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         encoding = "utf-16"
     elif b"\0" in content[:200]:
@@ -90,7 +90,7 @@ def with_line_ends(text: str) -> str:
 
 
 def split_cells(text: str, where: str, *, gaps: bool = False, delimiter: str = ",") -> Cells:
-    """Split the text of a table into cells; `where` prefixes messages. A space is any white space."""
+    """Split the text of a table into cells; a space as separator stands for any white space."""
     comments: dict[str, str] = {}
     notes: list[tuple[int, str]] = []
     lines = _uncommented(text, comments, notes)
@@ -112,7 +112,7 @@ def split_cells(text: str, where: str, *, gaps: bool = False, delimiter: str = "
 
 
 def spaced(line: str) -> str:
-    """Collapse white space in a line, and remove it between a name and its unit in brackets."""
+    """Collapse white space in a line; remove white space between a name and its unit in brackets."""
     return " ".join(re.sub(r"\s+(?=[\[(])", "", line).split())
 
 
