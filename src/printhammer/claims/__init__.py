@@ -1,6 +1,7 @@
-"""Claims of the paper: each measurable statement of Hendriks (1983), checked.
+"""Claims of the paper: the measurable statements of Hendriks (1983), each tested for a hammer.
 
-`claims.toml` states the claims as numbers; one module per family measures them; `judge_all` compares.
+`claims.toml` states the claims as numbers; one module per family measures the values; `judge_all` compares
+both.
 """
 
 from printhammer.claims import bursts, integrators, statics, strobes, verdicts

@@ -1,6 +1,6 @@
-"""Claims about nine-pulse bursts against rate, Figs. 8 and 9.
+"""Claims about bursts of nine pulses against the rate, Figs. 8 and 9.
 
-Also the claim about the frequency-time map: sensitivity of the response to the rate.
+The claim about the sensitivity of the frequency-time map to the rate is included.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _SAMPLES: Final = 2001  # Samples of a drive for a lower bound of its peak; arbi
 
 
 def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
-    """Return the number of printed dots, the relative spread of peak forces, and that of flight times, s."""
+    """Return the number of printed dots, the relative spread of forces, and the spread of flight times, s."""
     forces = [dot.peak_force for dot in motion.dots if dot.peak_force is not None]
     flights = [dot.flight_time for dot in motion.dots if dot.flight_time is not None]
     if len(forces) < 2:
@@ -40,7 +40,7 @@ def spreads(motion: Motion) -> tuple[int, float | None, float | None]:
 
 @measures("independent_at_low_rate", "pack", "waveform")
 def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
-    """Measure the spread of the dots of a slow burst."""
+    """Measure the spread of peak forces and flight times over the dots of a burst at a low rate."""
     rate, pulses = claim.settings["rate_Hz"], claim.settings["pulses"]
     struck, force, flight = spreads(context.train(rate, pulses))
     value = {"dots_struck": struck, "force_spread": force, "flight_time_spread_s": flight}
@@ -54,7 +54,7 @@ def independent_at_low_rate(context: Context, claim: Claim) -> Measured:
 
 
 def rates_of(settings: Mapping[str, Any]) -> list[float]:
-    """Return the firing rates at which a claim is evaluated, Hz, from the first to the last."""
+    """Return the firing rates, Hz, at which a claim is evaluated, in ascending order."""
     first, last, step = (settings[name] for name in ("first_rate_Hz", "last_rate_Hz", "rate_step_Hz"))
     return [float(first + step * k) for k in range(round((last - first) / step) + 1)]
 
@@ -87,7 +87,7 @@ def onsets(context: Context) -> dict[str, float]:
 
 @measures("order_of_onset", *WHOLE)
 def order_of_onset(context: Context, _claim: Claim) -> Measured:
-    """Measure the lowest rates at which flight times vary, forces vary, and a dot is lost."""
+    """Report the lowest rates at which flight times vary, forces vary, and a dot is lost."""
     first = context.once("onsets", lambda: onsets(context))
     lost = first.get("lost")
     value: dict[str, Any] = {"first_lost_dot_at_Hz": lost}
@@ -107,7 +107,7 @@ def order_of_onset(context: Context, _claim: Claim) -> Measured:
 
 @measures("second_dot_lost", *WHOLE)
 def second_dot_lost(context: Context, claim: Claim) -> Measured:
-    """Measure the first interval of rates in which the peak after the second firing stays below the pack."""
+    """Measure the lowest range of rates at which the peak after the second firing stays below the pack."""
     settings = claim.settings
     waveform, front, _ = context.waveform, context.front, context.dot
     begins = ends = None
@@ -134,7 +134,7 @@ def second_dot_lost(context: Context, claim: Claim) -> Measured:
 
 
 def hung_up(motion: Motion) -> bool:
-    """Whether the armature stays off the backstop from its first leaving of the pack to the last firing."""
+    """Whether the armature stays off the backstop from its first pack contact to the last firing."""
     left = _first_leaving(motion)
     if left is None:
         return False
@@ -145,7 +145,7 @@ def hung_up(motion: Motion) -> bool:
 
 
 def _first_leaving(motion: Motion) -> float | None:
-    """Return the time at which the armature first leaves the pack, s; None without a contact."""
+    """Return the time at which the armature first leaves the pack, s; None without a pack contact."""
     times = motion.step_times
     inside = motion.at(times)[0] > (motion.hammer.front or 0.0)
     if not inside.any():
@@ -156,14 +156,14 @@ def _first_leaving(motion: Motion) -> float | None:
 
 
 def _exceeds(drive: Drive, limit: float) -> bool:
-    """Whether the largest absolute value of a drive exceeds a limit."""
+    """Whether the largest absolute current or force of a drive exceeds a limit."""
     # The samples are a lower bound of the peak, which is slow to find.
     samples = np.abs(drive.value(np.linspace(0.0, drive.end, _SAMPLES)))
     return bool(samples.max() > limit) or drive.peak > limit
 
 
 def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
-    """Return the rate above which all bursts hang up, the motions, and the highest rate allowed, Hz."""
+    """Return the lowest rate at which bursts hang up, the motions from there on, and the highest rate, Hz."""
     settings = claims()["hang_up_at_high_rate"].settings
     step, pulses, limit = (settings[name] for name in ("rate_step_Hz", "pulses", "current_limit_A"))
     waveform = context.waveform
@@ -184,7 +184,7 @@ def hang_up_range(context: Context) -> tuple[float | None, list[Motion], float]:
 
 @measures("hang_up_at_high_rate", *WHOLE)
 def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
-    """Measure the lowest rate above which the armature always hangs up."""
+    """Measure the rate above which the armature hangs up in every burst, up to the current limit."""
     lowest, _, highest = context.once("hang-up", lambda: hang_up_range(context))
     value = {"hang_up_rate_Hz": lowest, "highest_rate_Hz": highest}
     if lowest is None:
@@ -194,7 +194,7 @@ def hang_up_at_high_rate(context: Context, _claim: Claim) -> Measured:
 
 @measures("weak_prints_when_hung_up", *WHOLE)
 def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest force of a distinct impact after the first dot, if the armature hangs up."""
+    """Measure the largest force of a distinct impact after the first dot, in bursts that hang up."""
     lowest, motions, highest = context.once("hang-up", lambda: hang_up_range(context))
     if lowest is None:
         raise NotMeasurableError("The armature does not hang up")
@@ -220,10 +220,10 @@ def weak_prints_when_hung_up(context: Context, _claim: Claim) -> Measured:
 
 
 def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
-    """Return peak force, N, and distinctness of each pack contact after the first.
+    """Return the peak force, N, of each pack contact after the first, and whether it is a distinct impact.
 
-    An impact is distinct if at most one pulse was fired since the contact before it: several pulses that lift
-    the armature together make one impact.
+    An impact is distinct if at most one pulse was fired since the preceding contact: several pulses that
+    together lift the armature cause a single impact.
     """
     contacts = [contact for contact in motion.contacts if contact.surface == "pack"]
     return [
@@ -234,7 +234,7 @@ def later_impacts(motion: Motion) -> list[tuple[float, bool]]:
 
 @measures("flight_time_spread", *WHOLE)
 def flight_time_spread(context: Context, claim: Claim) -> Measured:
-    """Measure the spread of the flight times of bursts at the strange strobe times."""
+    """Measure the flight-time spread of bursts at the strobe times that the paper calls strange."""
     settings, pulses = claim.settings, claim.settings["pulses"]
     _, _, slow = spreads(context.train(settings["rate_Hz"], pulses))
     by_panel: dict[str, Any] = {}
@@ -260,14 +260,14 @@ def flight_time_spread(context: Context, claim: Claim) -> Measured:
 
 
 _SPACING: Final = 10e-6
-"""Time between samples of a displacement record, s."""
+"""Sampling interval of a displacement record in the sensitivity test, s."""
 
 
 def sensitivity(context: Context, band: tuple[float, float], grid: float, step: float, pulses: int) -> float:
-    """Return the RMS change of the displacement record per hertz, m/Hz, in a band of rates.
+    """Compute the RMS change of the displacement record per hertz, m/Hz, in a band of rates.
 
-    Each rate of a grid is compared with the rate `step` above it, Hz, in bursts of `pulses` firings, at the
-    same times: from the first firing to 1 ms after the last one at the slower rate.
+    The records at each rate of a grid and at the rate `step` Hz above are compared, in bursts of `pulses`
+    firings, from the first firing until `TAIL` after the last firing at the slower rate.
 
     Raises
     ------
@@ -337,12 +337,12 @@ def map_sensitivity(context: Context, claim: Claim) -> Measured:
 def erratic_pairs(
     struck: BoolArray, flight_time: FloatArray, settings: Mapping[str, Any]
 ) -> tuple[BoolArray, BoolArray]:
-    """Return the pairs of neighbouring rates at which a late dot changes, and the rates at which dots vary.
+    """Mask the pairs of neighbouring rates between which a late dot changes, and rates at which dots vary.
 
     A dot changes if it is printed at only one of the two rates, or if its flight times, s, differ by more
     than `flight_time_change_s`; dots before `first_dot` do not count. Dots vary if one is lost, or if their
-    flight times differ by more than `flight_time_spread_s`. Both tables have a row for each rate; the results
-    have shapes (rates - 1,) and (rates,).
+    flight times differ by more than `flight_time_spread_s`. Both input tables have one row per rate; the
+    masks have shapes (rates - 1,) and (rates,).
     """
     flights = np.where(struck, flight_time, np.nan)
     change = np.abs(np.diff(flights, axis=0)) > settings["flight_time_change_s"]
@@ -354,9 +354,9 @@ def erratic_pairs(
 def erratic_share(
     rates: FloatArray, erratic: BoolArray, varies: BoolArray, hang_up: float | None
 ) -> tuple[float | None, float | None]:
-    """Return the fraction of erratic pairs between the first varying rate and hang-up, and that rate.
+    """Return the fraction of erratic pairs between the first varying rate and hang-up, and that first rate.
 
-    Rates are in Hz, the pairs those of `erratic_pairs`. None if dots vary nowhere, or not before hang-up.
+    Rates are in Hz; the pairs are from `erratic_pairs`. None if dots vary at no rate, or only after hang-up.
     """
     if not varies.any():
         return None, None
@@ -367,7 +367,7 @@ def erratic_share(
 
 @measures("chaotic_region", *WHOLE)
 def chaotic_region(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of neighbouring rates between which a late dot changes, where dots vary."""
+    """Measure the fraction of neighbouring rates between which a late dot changes, before hang-up."""
     rates = rates_of(claim.settings)
     pulses = claim.settings["pulses"]
     dots = context.dots([PulseTrain(context.waveform, rate=rate, pulses=pulses) for rate in rates])

@@ -1,4 +1,4 @@
-"""Runs shared by the claims, each computed once."""
+"""Context of the claims: a hammer with the runs that several claims share, each computed once."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from printhammer.run.problem import TOLERANCE
 from printhammer.run.simulate import Scheme, simulate
 
 CYCLE: Final = 20e-3
-"""Duration of the single-pulse cycle, s: from rest to rest, with ample time to settle."""
+"""Duration of the single-pulse cycle, s: from rest until long after the armature has settled."""
 
 TAIL: Final = 4e-3
-"""Time after the last firing of a train for its dot, s."""
+"""Time simulated after the last firing of a train, s, so that its dot is included."""
 
 _IDLE: Final = 1e-3  # Firing time of a motion at rest, which ends before it, s; arbitrary
 
@@ -29,11 +29,11 @@ _T = TypeVar("_T")
 
 
 class NotMeasurableError(PrinthammerError):
-    """The claim concerns a part or an event that this hammer does not have."""
+    """Raised if a claim concerns a component or an event that the hammer does not have."""
 
 
 class Context:
-    """Hammer with the motions that the claims need.
+    """Hammer with the motions that the claims need, each simulated once.
 
     Parameters
     ----------
@@ -53,12 +53,12 @@ class Context:
         self._kept: dict[str, Any] = {}
 
     def need(self, name: str) -> Any:
-        """Return a part or constant of the hammer.
+        """Return a component or constant of the hammer by name.
 
         Raises
         ------
         NotMeasurableError
-            The hammer lacks the part or constant.
+            The hammer lacks the component or constant.
         """
         part = getattr(self.hammer, name)
         if part is None:
@@ -79,11 +79,11 @@ class Context:
 
     @property
     def front(self) -> float:
-        """Front of the pack, m."""
+        """Displacement of the front of the pack, m."""
         return float(self.need("pack").front)
 
     def once(self, name: str, search: Callable[[], _T]) -> _T:
-        """Return the result of a search, cached by name."""
+        """Return the result of a search, which is run at the first call and cached by name."""
         if name not in self._kept:
             self._kept[name] = search()
         kept: _T = self._kept[name]
@@ -98,7 +98,7 @@ class Context:
         state: tuple[float, float] | None = None,
         **options: Any,
     ) -> Motion:
-        """Run the hammer, or another hammer, under a drive; cache the result."""
+        """Simulate the hammer, or a given hammer, under a drive, and cache the motion."""
         which = self.hammer if hammer is None else hammer
         options = {"tolerance": self.tolerance, "scheme": self.scheme, **options}
         key = (which.fingerprint, drive.fingerprint, duration, state, *sorted(options.items()))
@@ -108,7 +108,7 @@ class Context:
         return self._motions[key]
 
     def run(self, drive: Drive, duration: float, **options: Any) -> Motion:
-        """Run like `attempt`, but require the run to complete.
+        """Simulate like `attempt`, but require the run to reach its end.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Context:
         return motion
 
     def ensemble(self, drives: Sequence[Drive], ends: Any, **options: Any) -> EnsembleResult:
-        """Run many drives, each until its end, s; options as for `Ensemble.run`.
+        """Run an ensemble of drives, each until its end, s; options are those of `Ensemble.run`.
 
         Raises
         ------
@@ -137,33 +137,33 @@ class Context:
         return result
 
     def dots(self, drives: Sequence[Drive], tail: float = TAIL) -> DotTable:
-        """Return the dots of many drives, each run until `tail`, s, after its last firing."""
+        """Run many drives, each until `tail`, s, after its last firing; return the table of dots."""
         result = self.ensemble(drives, [float(drive.times[-1]) + tail for drive in drives], dots=True)
         assert result.dots is not None
         return result.dots
 
     def pulses(self, times: Iterable[float], duration: float) -> Motion:
-        """Run pulses fired at given times, s."""
+        """Simulate pulses fired at given times, s, from rest."""
         return self.run(PulseTrain(self.waveform, at=list(times)), duration)
 
     def train(self, rate: float, pulses: int, tail: float = TAIL) -> Motion:
-        """Run a train at a rate, Hz, from rest, until `tail`, s, after its last firing."""
+        """Simulate a pulse train at a rate, Hz, from rest, until `tail`, s, after its last firing."""
         drive = PulseTrain(self.waveform, rate=rate, pulses=pulses)
         return self.run(drive, float(drive.times[-1]) + tail)
 
     def strobe_train(self, period: float, points: int) -> Motion:
-        """Run a train of a period, s, from rest, up to the firing of the last strobe point."""
+        """Simulate a pulse train of a period, s, from rest, up to the firing of the last strobe point."""
         drive = PulseTrain(self.waveform, period=period, pulses=points)
         return self.run(drive, float(drive.times[-1]))
 
     @cached_property
     def single(self) -> Motion:
-        """Single-pulse cycle, from rest to rest."""
+        """Motion of the single-pulse cycle, from rest to rest."""
         return self.pulses([0.0], CYCLE)
 
     @cached_property
     def returns(self) -> list[Contact]:
-        """Touches of the backstop after a single pulse."""
+        """Contacts with the backstop after a single pulse, in order of time."""
         contacts = touches(self.single)
         if not contacts:
             raise NotMeasurableError("The armature does not return to the backstop after a single pulse")
@@ -189,7 +189,7 @@ class Context:
 
     @property
     def stroke(self) -> float:
-        """Single-pulse peak minus backstop position, m."""
+        """Single-pulse stroke: peak displacement minus backstop position, m."""
         stroke = self.peak - self.position
         if stroke <= 0.0:
             raise NotMeasurableError("The armature stays in the backstop after a single pulse")
@@ -197,7 +197,7 @@ class Context:
 
     @property
     def dot(self) -> Dot:
-        """Dot of the single pulse."""
+        """Dot printed by the single pulse."""
         dot = self.single.dots[0]
         if not dot.struck:
             raise NotMeasurableError("The armature does not reach the pack after a single pulse")

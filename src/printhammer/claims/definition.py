@@ -22,7 +22,7 @@ _PRINTED_DIGITS: Final = 1e-9  # Relative difference up to which numbers are equ
 
 
 class Claim(Declared):
-    """Checkable statement of the paper."""
+    """Claim of the paper that can be checked: what to measure, and the band of allowed values."""
 
     name: str = part("name")
     kind: Kind = part('"stated", "typical" or "shape"')
@@ -37,16 +37,16 @@ class Claim(Declared):
     )
 
     def holds(self, value: Mapping[str, Any]) -> bool:
-        """Whether every measured value is within its band."""
+        """Whether every measured value lies within its band."""
         return all(within(value.get(key), band) for key, band in self.band.items())
 
     def missed(self, value: Mapping[str, Any]) -> list[str]:
-        """List the names of the values that are not within their bands."""
+        """List the names of the measured values that lie outside their bands."""
         return [key for key, band in self.band.items() if not within(value.get(key), band)]
 
 
 def within(value: Any, band: Any) -> bool:
-    """Whether a value is within a band; None and NaN never are."""
+    """Whether a measured value lies within a band; False for None and NaN."""
     if isinstance(band, dict):
         return _is_number(value) and all(SIDES[side](value, limit) for side, limit in band.items())
     if isinstance(band, list) and len(band) == 2 and all(_is_number(end) for end in band):

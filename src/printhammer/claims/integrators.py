@@ -1,4 +1,4 @@
-"""Claim about the two integrators of 1983."""
+"""Claim about the accuracy and stability of the two integrators of 1983."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _RUNGE_KUTTA_LIMIT: Final = math.sqrt(8.0)
 
 @measures("integrator_comparison", *WHOLE)
 def integrator_comparison(context: Context, claim: Claim) -> Measured:
-    """Measure the errors of both schemes on the paper's schedule, and the largest scale of its steps."""
+    """Measure the errors of both schemes at the paper's step sizes, and the scales at which they fail."""
     reference = context.run(PulseTrain(context.waveform), _CYCLE, tolerance=REFERENCE_TOLERANCE)
     trapezoid, runge_kutta = (_scheme(context, name, 1.0) for name in ("trapezoid", "runge-kutta-4"))
     errors = {motion: _error(motion, reference) for motion in (trapezoid, runge_kutta)}
@@ -66,13 +66,13 @@ def _scheme(context: Context, name: str, scale: float) -> Motion:
 
 
 def _error(motion: Motion, reference: Motion) -> float:
-    """Return the largest displacement error at the ends of steps, m."""
+    """Return the largest difference of displacement from a reference, at the ends of steps, m."""
     times = motion.step_times
     return float(np.abs(motion.at(times)[0] - reference.at(times)[0]).max())
 
 
 def _completes(context: Context, motion: Motion, reference: Motion) -> bool:
-    """Whether a scheme completes the cycle with one excursion into the pack, settled in the second half."""
+    """Whether a scheme completes the cycle, with one pack contact, and ends close to the reference."""
     if not motion.ok or sum(c.surface == "pack" for c in motion.contacts) != 1:
         return False
     times = motion.step_times[motion.step_times >= 0.5 * _CYCLE]
@@ -81,7 +81,7 @@ def _completes(context: Context, motion: Motion, reference: Motion) -> bool:
 
 
 def _failing_scale(context: Context, reference: Motion, name: str) -> float:
-    """Return the smallest factor tried on all step sizes at which a scheme fails."""
+    """Return the smallest scale factor on all step sizes, of those tried, at which a scheme fails."""
     scale = 1.0
     while scale < _LARGEST and _completes(context, _scheme(context, name, scale), reference):
         scale *= _RATIO

@@ -1,6 +1,6 @@
-"""Judging of claims: a function measures, the band of `claims.toml` decides.
+"""Evaluation of claims: a function measures the values, and the bands of `claims.toml` decide.
 
-`largest`, `falling`, `rank_correlation` and `spread` are the measures shared by the claims.
+The claims share the measures `largest`, `falling`, `rank_correlation` and `spread`.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from printhammer.results import Declared, part
 from printhammer.support.arrays import FloatArray
 
 WHOLE: Final = ("backstop", "pack", "waveform")
-"""Parts that most claims require."""
+"""Components that most claims require of a hammer."""
 
 Verdict = Literal["holds", "fails", "not yet"]
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Measured values of a claim."""
+    """Measured values of a claim, with a sentence that describes them."""
 
     value: Mapping[str, Any]
-    """Measured values by name, SI, with the unit at the end of the name; None for a missing value."""
+    """Measured values by name, SI; names end with the unit. None for a value that does not exist."""
     detail: str
-    """Description of the values in one sentence."""
+    """Sentence that describes the measured values."""
 
 
 class JudgedClaim(Declared):
-    """Claim with its measured values and verdict."""
+    """Claim with its measured values and the verdict: holds, fails or not yet."""
 
     claim: Claim = part("what was judged")
     value: Mapping[str, Any] | None = part(
@@ -49,12 +49,12 @@ class JudgedClaim(Declared):
 
     @property
     def missed(self) -> list[str]:
-        """Names of the values outside their bands."""
+        """Names of the measured values outside their bands."""
         return self.claim.missed(self.value) if self.value is not None else []
 
     @property
     def statements(self) -> tuple[int, int]:
-        """Number of statements that hold, and that the claim makes; each text of a list is a statement."""
+        """Numbers of statements that hold and that the claim makes; each entry of a list is a statement."""
         value = self.value or {}
         lists = {name: band for name, band in self.claim.band.items() if _is_texts(band)}
         if not lists:
@@ -67,7 +67,7 @@ class JudgedClaim(Declared):
         return sum(found == wanted for found, wanted in pairs), sum(map(len, lists.values()))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the entry of `claims.json`."""
+        """Return the claim and its verdict as an entry of `claims.json`."""
         claim = self.claim
         return {
             "name": claim.name,
@@ -88,14 +88,14 @@ def _is_texts(band: Any) -> bool:
 
 
 Judge = Callable[[Context, Claim], Measured]
-"""Function that measures a claim."""
+"""Type of a function that measures the values of a claim."""
 
 JUDGES: Final[dict[str, tuple[tuple[str, ...], Judge]]] = {}
-"""Required parts and measuring function of each claim, by name."""
+"""Required components and measuring function of each claim, by name."""
 
 
 def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
-    """Register the measuring function of a claim; `needs` are the parts without which it cannot hold."""
+    """Register the measuring function of a claim; `needs` are the components that the claim requires."""
 
     def register(function: Judge) -> Judge:
         if name in JUDGES or name not in claims():
@@ -107,7 +107,7 @@ def measures(name: str, *needs: str) -> Callable[[Judge], Judge]:
 
 
 PENDING: Final[dict[str, str]] = {}
-"""Claims that cannot be judged yet, with the missing capability."""
+"""Claims that cannot be evaluated yet, with the missing capability, by name."""
 
 
 def judge_all(
@@ -123,16 +123,16 @@ def judge_all(
     hammer : Hammer
         The hammer.
     names : iterable of str, optional
-        Claims to judge; by default all.
+        Names of the claims to evaluate; by default all.
     progress : callable, optional
-        Called with the name of each claim before it is judged.
+        Called with the name of each claim before its evaluation.
     context : Context, optional
-        Runs to share; by default a new one.
+        Context with the shared runs; by default a new context.
 
     Returns
     -------
     list of JudgedClaim
-        In the order of the paper.
+        Evaluated claims, in the order of the paper.
     """
     context = Context(hammer) if context is None else context
     wanted = set(claims() if names is None else names)
@@ -146,7 +146,7 @@ def judge_all(
 
 
 def judge(context: Context, claim: Claim) -> JudgedClaim:
-    """Evaluate one claim."""
+    """Evaluate one claim: measure its values and compare them with their bands."""
     if claim.name in PENDING:
         return JudgedClaim(claim, None, "not yet", f"Not judged yet: it takes {PENDING[claim.name]}.")
     start = perf_counter()
@@ -167,7 +167,7 @@ _ZOOMS: Final = 6  # Refinements of the grid; arbitrary
 
 
 def largest(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float:
-    """Return the largest value of a function of time, on successively refined grids."""
+    """Estimate the maximum of a function of time over an interval, on successively refined grids."""
     best = -np.inf
     for _ in range(_ZOOMS if end > start else 1):
         grid = np.linspace(start, end, _POINTS)
@@ -179,7 +179,7 @@ def largest(function: Callable[[FloatArray], FloatArray], start: float, end: flo
 
 
 def falling(values: Sequence[float]) -> bool:
-    """Whether the values decrease strictly."""
+    """Whether the values are strictly decreasing."""
     return all(after < before for before, after in itertools.pairwise(values))
 
 
@@ -199,5 +199,5 @@ def _ranks(values: Sequence[float]) -> FloatArray:
 
 
 def spread(values: Sequence[float]) -> float:
-    """Return the largest value minus the smallest."""
+    """Return the range of values: the largest minus the smallest."""
     return max(values) - min(values)

@@ -1,8 +1,8 @@
 """Claims about the single pulse (stroke, settle-out, forces, loops, energies), two pulses and buzz printing.
 
-Two pulses, Fig. 6: quench, and a hammer caught on the rise.
+Two pulses, Fig. 6: the second pulse brakes the armature (quench), or catches it on the rise.
 
-Buzz printing, Fig. 7.
+Buzz printing, Fig. 7: a train that prints while the armature stays off the backstop.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def single_pulse_stroke(context: Context, _claim: Claim) -> Measured:
 
 @measures("settle_out", *WHOLE)
 def settle_out(context: Context, _claim: Claim) -> Measured:
-    """Measure the rebounds after the first backstop touch."""
+    """Measure height and duration of the rebounds after the first backstop touch of a single pulse."""
     motion, stroke = context.single, context.stroke
     times, x = motion.maxima
     after = x[times > context.returns[0].t_in] - context.position
@@ -66,7 +66,7 @@ def settle_out(context: Context, _claim: Claim) -> Measured:
 
 @measures("low_restitution", *WHOLE)
 def low_restitution(context: Context, _claim: Claim) -> Measured:
-    """Measure the ratios of rebound to impact speed of the backstop touches."""
+    """Measure the ratio of rebound speed to impact speed for each backstop touch of a single pulse."""
     left = [(c.v_in, c.v_out) for c in touches(context.single) if c.v_out is not None and c.v_in != 0.0]
     if not left:
         raise NotMeasurableError("The armature never leaves the backstop again after a single pulse")
@@ -83,7 +83,7 @@ def low_restitution(context: Context, _claim: Claim) -> Measured:
 
 @measures("backstop_force_dominates", *WHOLE)
 def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest total force during backstop touches, and during the rest of the cycle."""
+    """Measure the largest total force during backstop touches, and outside them, after a single pulse."""
     motion = context.single
 
     def total(t: FloatArray) -> FloatArray:
@@ -103,7 +103,7 @@ def backstop_force_dominates(context: Context, _claim: Claim) -> Measured:
 
 @measures("quiet_look_loud_force", *WHOLE)
 def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
-    """Measure the largest backstop force in touches after a rebound too low to be seen."""
+    """Measure the largest backstop force in touches that follow a rebound too low to be seen."""
     static = float(context.idle.forces_at(0.0)["backstop"][0])
     quiet = claim.settings["quiet_rebound_over_stroke"] * context.stroke
     late = {bounce.end for bounce in rebounds(context.single, context.position) if bounce.height < quiet}
@@ -124,7 +124,7 @@ def quiet_look_loud_force(context: Context, claim: Claim) -> Measured:
 
 @measures("loops", *WHOLE)
 def loops(context: Context, _claim: Claim) -> Measured:
-    """Measure the work of each contact on the armature, and the energy ledger from rest to rest."""
+    """Measure the work of each contact on the armature, and the energy balance of the cycle."""
     motion = context.single
     # The last touch, in which the armature comes to rest, is not a closed loop.
     works = [-c.loss for c in motion.contacts if not c.initial and c.t_out is not None]
@@ -153,14 +153,14 @@ def loops(context: Context, _claim: Claim) -> Measured:
 
 @measures("print_force", "pack", "waveform")
 def print_force(context: Context, _claim: Claim) -> Measured:
-    """Measure the peak force of the single-pulse dot."""
+    """Measure the peak pack force of the single-pulse dot."""
     force = context.print_force
     return Measured({"peak_force_N": force}, f"The dot is printed with {force:.1f} N.")
 
 
 @measures("pack_energy", "pack", "waveform")
 def pack_energy(context: Context, _claim: Claim) -> Measured:
-    """Measure the work done on the pack by the single-pulse dot, and the energy that the pack retains."""
+    """Measure the loading work on the pack by the single-pulse dot, and the energy that the pack absorbs."""
     dot = context.dot
     value = {"loading_work_J": dot.loading_work, "net_loss_J": dot.net_loss}
     work, loss = (dot.loading_work or 0.0) * 1e3, (dot.net_loss or 0.0) * 1e3
@@ -169,14 +169,14 @@ def pack_energy(context: Context, _claim: Claim) -> Measured:
 
 @measures("delivered_energy", "magnet", "waveform")
 def delivered_energy(context: Context, _claim: Claim) -> Measured:
-    """Measure the coil work of the single-pulse cycle."""
+    """Measure the work of the coil in the single-pulse cycle."""
     work = context.single.energy.coil_work
     return Measured({"coil_work_per_dot_J": work}, f"The coil gives {work * 1e3:.3f} mJ.")
 
 
 @measures("two_pulses_660us", *WHOLE)
 def two_pulses_660us(context: Context, claim: Claim) -> Measured:
-    """Measure the peak after the second of two pulses."""
+    """Measure the peak after the second of two pulses fired 660 us apart, which should print no dot."""
     _ = context.dot
     interval = claim.settings["interval_s"]
     motion = context.pulses([0.0, interval], interval + TAIL)
@@ -199,7 +199,7 @@ def two_pulses_660us(context: Context, claim: Claim) -> Measured:
 
 @measures("two_pulses_700us", *WHOLE)
 def two_pulses_700us(context: Context, claim: Claim) -> Measured:
-    """Measure force, flight time and phase of the second of two pulses."""
+    """Measure force, flight time and phase of the second of two pulses fired 700 us apart."""
     interval = claim.settings["interval_s"]
     motion = context.pulses([0.0, interval], interval + TAIL)
     first, second = context.dot, motion.dots[1]
@@ -235,13 +235,13 @@ def two_pulses_700us(context: Context, claim: Claim) -> Measured:
 
 
 def second_coil_work(context: Context, interval: float) -> float:
-    """Return the work of the coil on the armature from the second of two firings on, J."""
+    """Compute the work of the coil on the armature from the second of two firings on, J."""
     both, first = context.pulses([0.0, interval], interval + TAIL), context.pulses([0.0], interval)
     return both.energy.coil_work - first.energy.coil_work
 
 
 def half_rise(waveform: Waveform) -> float:
-    """Return the time after the firing at which a waveform first reaches half its peak, s."""
+    """Compute the time after the firing at which a waveform first reaches half of its peak, s."""
     half = 0.5 * waveform.peak
     start, end = 0.0, waveform.support
     for _ in range(5):
@@ -254,14 +254,14 @@ def half_rise(waveform: Waveform) -> float:
 
 
 def _wanted() -> tuple[int, tuple[float, float]]:
-    """Return the number of dots, and the limits of their relative force, that define buzz printing."""
+    """Return the number of dots, and the limits of their relative force, that count as buzz printing."""
     band = claims()["buzz_printing"].band
     limits = (band["least_force_over_single"]["at_least"], band["largest_force_over_single"]["at_most"])
     return band["dots"]["at_least"], limits
 
 
 def buzz_search(context: Context) -> BuzzSearch:
-    """Return the search for a train that buzz-prints."""
+    """Search for a train that buzz-prints; the result is cached."""
     fewest, forces = _wanted()
     return context.once("buzz", lambda: find_buzz_train(context.hammer, fewest=fewest, forces=forces))
 
@@ -273,7 +273,7 @@ def _described(train: BuzzTrain) -> str:
 
 @measures("buzz_printing", *WHOLE)
 def buzz_printing(context: Context, claim: Claim) -> Measured:
-    """Count the dots of the best train without a backstop touch, and measure their forces."""
+    """Measure number and relative force of the dots that the best train prints without a backstop touch."""
     search = buzz_search(context)
     train = search.best
     if train is None or not train.count:
@@ -310,7 +310,7 @@ def buzz_printing(context: Context, claim: Claim) -> Measured:
 
 @measures("buzz_is_delicate", *WHOLE)
 def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
-    """Count how many of four small changes break the buzz-printing train."""
+    """Count how many of four small changes of interval and pack front break the buzz-printing train."""
     train = buzz_search(context).train
     if train is None:
         return Measured({"cases_broken": None}, "There is no train to be broken.")
@@ -334,7 +334,7 @@ def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
 
 
 def _count(context: Context, hammer: Hammer, train: BuzzTrain, interval: float) -> int:
-    """Return the number of valid dots of a train with the same type, interval and number of pulses."""
+    """Count the buzz-printed dots of a train with another interval or hammer but the same kind and pulses."""
     times = tuple(k * interval for k in range(len(train.times)))
     if train.kind != "uniform":
         times = delayed_train(hammer, interval, len(train.times))

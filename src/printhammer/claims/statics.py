@@ -1,6 +1,6 @@
-"""Claims about the hammer at rest: geometry, rest state, magnet and spring forces, current.
+"""Claims about statics: geometry, rest state, magnet and spring forces, and current range.
 
-Also the claim about elastomer backstops.
+The claim about elastomer backstops is included.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @measures("geometry", "backstop", "pack", "platen")
 def geometry(context: Context, _claim: Claim) -> Measured:
-    """Measure the positions of backstop, pack and platen."""
+    """Measure the positions of backstop, pack and platen, and the thickness of the pack."""
     platen = float(context.need("platen"))
     way = platen - context.front
     thickness = float(getattr(context.hammer.pack, "thickness", way))
@@ -41,7 +41,7 @@ def geometry(context: Context, _claim: Claim) -> Measured:
 
 @measures("rest_state", "magnet", "backstop", "waveform")
 def rest_state(context: Context, _claim: Claim) -> Measured:
-    """Measure the depth of the rest state in the backstop, its force and stability."""
+    """Measure how deep the armature rests in the backstop, the residual force, and the stability."""
     rest = context.rest
     force = float(context.idle.forces_at(0.0)["total"][0])
     equilibrium = min(equilibria(context.hammer), key=lambda e: abs(e.x - rest), default=None)
@@ -59,7 +59,7 @@ def rest_state(context: Context, _claim: Claim) -> Measured:
 
 @measures("return_from_everywhere", "magnet", "spring", "backstop", "platen")
 def return_from_everywhere(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest net force of magnet and spring at zero current between backstop and platen."""
+    """Measure the largest net force of magnet and spring between backstop and platen, at zero current."""
     platen = float(context.need("platen"))
     start, end = context.position, platen
     best_x, best = start, -np.inf
@@ -80,7 +80,7 @@ def return_from_everywhere(context: Context, _claim: Claim) -> Measured:
 
 @measures("release_margin", "magnet", "spring", "backstop")
 def release_margin(context: Context, _claim: Claim) -> Measured:
-    """Measure the net force at the backstop at zero current, as a fraction of the magnet's force."""
+    """Measure the net force at the backstop at zero current, as a fraction of the magnet force."""
     force = StaticForce(context.hammer)
     magnet, spring = force.magnet(context.position), force.spring(context.position)
     if magnet == 0.0:
@@ -99,7 +99,7 @@ def release_margin(context: Context, _claim: Claim) -> Measured:
 
 @measures("current_range", "magnet", "waveform")
 def current_range(context: Context, _claim: Claim) -> Measured:
-    """Measure the largest current of the paper's drives: single pulse, pairs, and trains."""
+    """Measure the largest current of the drives in the paper: single pulse, pairs of pulses, and trains."""
     waveform = context.waveform
     if waveform.quantity != "current":
         raise NotMeasurableError(f"The hammer is driven by a {waveform.quantity}, not by a current")
@@ -129,12 +129,12 @@ def current_range(context: Context, _claim: Claim) -> Measured:
 
 
 _NEVER: Final = 1.0
-"""Firing time after the end of every run, s."""
+"""Firing time beyond the end of every run, s, for a run without current."""
 
 
 @measures("elastomer_backstop", *WHOLE)
 def elastomer_backstop(context: Context, claim: Claim) -> Measured:
-    """Count rebounds from the hammer's backstop and from an elastomer, at the speed of the first touch."""
+    """Count the rebounds from the hammer's backstop and from an elastomer, at equal impact speed."""
     settings = claim.settings
     speed = context.returns[0].v_in
     hard_impact = _impact(context, context.hammer, speed)
@@ -174,7 +174,7 @@ def elastomer_backstop(context: Context, claim: Claim) -> Measured:
 
 
 def _impact(context: Context, hammer: Hammer, speed: float) -> Motion:
-    """Simulate the impact of a hammer on its backstop at a speed, m/s, without current."""
+    """Simulate the impact of a hammer on its backstop at a given speed, m/s, without current."""
     drive = PulseTrain(context.waveform, at=[_NEVER])
     return context.attempt(drive, CYCLE, hammer=hammer, state=(context.position, speed))
 

@@ -20,26 +20,26 @@ _LATTICE: Final = 101  # Points along each axis of the window; arbitrary
 
 
 def window() -> tuple[FloatArray, FloatArray]:
-    """Return centre and half-widths of the window of Fig. 11, (m, m/s)."""
+    """Return centre and half-widths of the window of Fig. 11: displacement, m, and velocity, m/s."""
     settings = claims()["poincare_window"].settings
     low, high = np.array([settings["window_x_m"], settings["window_v_m_per_s"]]).T
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
 def strobe_points(context: Context, period: float, points: int) -> FloatArray:
-    """Return the states at the first firings of a train from rest, (m, m/s), shape (points, 2)."""
+    """Compute the states at the first firings of a train from rest, (m, m/s), shape (points, 2)."""
     _, x, v = context.strobe_train(period, points).strobe
     return np.column_stack([x, v])
 
 
 def scaled(points: FloatArray) -> FloatArray:
-    """Return states in units of the half-widths of the window of Fig. 11."""
+    """Divide states, (m, m/s), by the half-widths of the window of Fig. 11."""
     _, half = window()
     return points / half
 
 
 def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
-    """Return the strobe points of the panels of Fig. 11 by strobe time: all, or the strange ones only."""
+    """Compute the strobe points of the panels of Fig. 11, by name: all panels, or the strange ones only."""
     count = claims()["poincare_window"].settings["points"]
     return {
         panel_name(period): strobe_points(context, period, count)
@@ -50,7 +50,7 @@ def panels(context: Context, *, strange: bool = True) -> dict[str, FloatArray]:
 
 @measures("poincare_window", *WHOLE)
 def poincare_window(context: Context, claim: Claim) -> Measured:
-    """Measure the fraction of strobe points of each panel inside the window, and list the others."""
+    """Measure the fraction of each panel's strobe points inside the window, and list the points outside."""
     centre, half = window()
     shares: dict[str, float] = {}
     outside: dict[str, Any] = {}
@@ -74,7 +74,7 @@ def poincare_window(context: Context, claim: Claim) -> Measured:
 
 @measures("behind_the_backstop", *WHOLE)
 def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
-    """Measure the depth of the deepest strobe point behind the backstop, over the strange panels."""
+    """Measure how far behind the backstop the deepest strobe point of the strange panels lies."""
     depths = {name: context.position - float(points[:, 0].min()) for name, points in panels(context).items()}
     deepest = max(depths, key=lambda name: depths[name])
     value = {"depth_m": depths[deepest], "depths_m": depths}
@@ -85,7 +85,7 @@ def behind_the_backstop(context: Context, _claim: Claim) -> Measured:
 
 @measures("low_rate_fixed_point", *WHOLE)
 def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
-    """Measure the distance between the last points of slow trains."""
+    """Measure the scatter of the last strobe points of slow trains, which should have a fixed point."""
     settings = claim.settings
     last = settings["last_points"]
     apart = {}
@@ -103,7 +103,7 @@ def low_rate_fixed_point(context: Context, claim: Claim) -> Measured:
 
 @measures("cloud_grows", *WHOLE)
 def cloud_grows(context: Context, _claim: Claim) -> Measured:
-    """Measure the 95th percentile of the distance of strobe points from rest, against rate."""
+    """Measure the 95th percentile of the distance of strobe points from the rest state, against rate."""
     rest = scaled(np.array([context.rest, 0.0]))
     radii = {
         name: float(np.percentile(np.linalg.norm(scaled(points) - rest, axis=1), 95.0))
@@ -121,7 +121,7 @@ def cloud_grows(context: Context, _claim: Claim) -> Measured:
 
 @measures("successive_points_apart", *WHOLE)
 def successive_points_apart(context: Context, claim: Claim) -> Measured:
-    """Measure the distance of successive points, as a fraction of that of arbitrary pairs."""
+    """Measure the distance of successive strobe points, relative to that of arbitrary pairs of points."""
     ratios: dict[str, float | None] = {}
     for name, states in panels(context).items():
         points = scaled(states)
@@ -136,7 +136,7 @@ def successive_points_apart(context: Context, claim: Claim) -> Measured:
 
 @measures("points_on_single_pulse_orbit", *WHOLE)
 def points_on_single_pulse_orbit(context: Context, claim: Claim) -> Measured:
-    """Measure the distance of strobe points to the single-pulse orbit, relative to random points."""
+    """Measure the distance of strobe points from the single-pulse orbit, relative to random states."""
     from scipy.spatial import cKDTree
 
     motion, start = context.single, context.returns[0].t_in

@@ -27,20 +27,20 @@ _CHANGED: Final[dict[str, Callable[[int], int]]] = {
     "constants up and down by turns": lambda number: 1 - 2 * (number % 2),
     "constants down and up by turns": lambda number: 2 * (number % 2) - 1,
 }
-"""Simultaneous changes of all constants of a hammer: sign of the change by the index of the constant."""
+"""Simultaneous changes of all constants of a hammer: sign by index of the constant, for each variant."""
 
 _APERIODIC: Final = "no period"
 _PANELS: Final = "panels of Fig. 11"
 
 
 def printed_verdicts() -> dict[float, str]:
-    """Return the verdicts printed on the panels of Fig. 11, by strobe time, s."""
+    """Return the classifications printed on the panels of Fig. 11, by strobe time, s."""
     claim = claims()["poincare"]
     return dict(zip(claim.settings["strobe_times_s"], claim.band["verdicts"], strict=True))
 
 
 def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -> Hammer:
-    """Return a hammer with every constant changed by a fraction, up or down."""
+    """Return a hammer with every constant increased or decreased by the fraction `part`."""
     # Keep the unit of the file, which distinguishes a current from a force.
     return hammer.replace(
         {
@@ -51,12 +51,12 @@ def changed(hammer: Hammer, sign: Callable[[int], int], part: float = _CHANGE) -
 
 
 def panel_name(period: float) -> str:
-    """Return the name of a panel in a report."""
+    """Return the name of a panel in a report: its strobe time in ms."""
     return f"{period * 1e3:.2f} ms"
 
 
 def panel_strobes(context: Context) -> list[Strobe]:
-    """Return the classified first points of the trains of Fig. 11; cached from the claim."""
+    """Compute the strobe points of the panels of Fig. 11, classified; cached for several claims."""
     points = claims()["poincare_window"].settings["points"]
     return context.once(
         _PANELS,
@@ -65,7 +65,7 @@ def panel_strobes(context: Context) -> list[Strobe]:
 
 
 def variants(context: Context, periods: list[float]) -> dict[str, list[Verdict]]:
-    """Return the verdicts on trains by variant of the computation, in the order of the periods, s."""
+    """Classify trains for each variant of constants and tolerance, in the order of the periods, s."""
     hammers = [context.hammer, *(changed(context.hammer, sign) for sign in _CHANGED.values())]
     every = strobes(
         [hammer for hammer in hammers for _ in periods],
@@ -89,7 +89,7 @@ def _verdicts(judged: list[Strobe]) -> list[Verdict]:
 
 @measures("poincare", *WHOLE)
 def poincare(context: Context, claim: Claim) -> Measured:
-    """Compare the verdicts on the panels of Fig. 11, and test whether they survive small changes."""
+    """Compare the classifications of the panels with Fig. 11, and test their robustness to small changes."""
     periods = list(claim.settings["strobe_times_s"])
     printed = list(claim.band["verdicts"])
     by_variant = variants(context, periods)
@@ -132,7 +132,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Run of successive strobe times with one verdict: first and last, s, of a descending scan, and count."""
+    """Interval of successive strobe times, s, in descending order, with one classification."""
 
     name: str
     longest: float
@@ -141,7 +141,7 @@ class Stretch:
 
 
 def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
-    """Return the stretches of a scan from the longest strobe time, s, to the shortest."""
+    """Group a scan of strobe times, s, in descending order, into intervals with one classification."""
     every = []
     for name, group in itertools.groupby(zip(periods, names, strict=True), key=lambda item: item[1]):
         times = [period for period, _ in group]
@@ -150,7 +150,7 @@ def stretches(periods: Sequence[float], names: Sequence[str]) -> list[Stretch]:
 
 
 def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
-    """Return the first of each three consecutive stretches with periods 2, 4 and 8."""
+    """Return the first of every three successive intervals with the periods 2, 4 and 8."""
     return [
         three[0]
         for three in zip(scanned, scanned[1:], scanned[2:], strict=False)
@@ -160,7 +160,7 @@ def cascades(scanned: Sequence[Stretch]) -> list[Stretch]:
 
 @measures("no_period_doubling_cascade", *WHOLE)
 def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
-    """Count period doublings before chaos as the strobe time falls, and periodic windows inside chaos."""
+    """Search for a period-doubling cascade before chaos, and count the periodic windows within chaos."""
     settings = claim.settings
     first, last, step = (
         settings[name] for name in ("first_strobe_time_s", "last_strobe_time_s", "strobe_time_step_s")
@@ -206,9 +206,9 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
 
 
 def _first_strange(context: Context, periods: Sequence[float], names: Sequence[str], way: int) -> int | None:
-    """Return the index of the first strange train from one end of a scan, or None.
+    """Return the index of the first strange train from one end of a scan; None without a strange train.
 
-    Lyapunov exponents are expensive, and only those at the ends of the strange range matter.
+    Since Lyapunov exponents are expensive, they are computed only until the first strange train.
     """
     for place in range(len(names))[::way]:
         if names[place] == _APERIODIC:
@@ -219,7 +219,7 @@ def _first_strange(context: Context, periods: Sequence[float], names: Sequence[s
 
 
 def _window(stretch: Stretch, step: float) -> dict[str, Any]:
-    """Return a stretch for the report; its width includes one step of the scan, s."""
+    """Return an interval of strobe times for the report; its width includes one scan step, s."""
     return {
         "verdict": stretch.name,
         "from_s": stretch.longest,

@@ -1,1 +1,1 @@
-"""Derivatives of states and dots, with respect to states and constants."""
+"""Derivatives of states and dots with respect to initial states and constants."""

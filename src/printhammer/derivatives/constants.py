@@ -1,7 +1,7 @@
-"""Tangent flow of the constants: derivatives of a motion with respect to constants of hammer and drive.
+"""Tangent flow of constants: derivatives of a motion with respect to constants of hammer and drive.
 
 A second pass along a recorded run integrates the columns of `printhammer.kernel.variational`, as for the
-tangent flow of the state (`printhammer.derivatives.states`). docs/tangent.md has the derivation.
+tangent flow of the state (`printhammer.derivatives.states`). The derivation is in docs/tangent.md.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def flow(
     initial: FloatArray,
     nodes: Sequence[int] = (),
 ) -> Flow:
-    """Integrate the columns of constants along a recorded run; arguments as for `carry_columns`.
+    """Integrate the columns of constants along a recorded run; most arguments are as for `carry_columns`.
 
     Derivatives are with respect to ``value / scale`` of each constant.
     """
@@ -50,10 +50,10 @@ def flow(
 
 
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the derivatives of a start from rest at time 0, shape (3, n): m, m/s, m.
+    """Return the derivatives of the initial state at rest at time 0, shape (3, n): m, m/s, m.
 
-    A pulse with a sharp edge fired at that time acts later if its firing does. With a circuit, the shape is
-    (6, n), for a start without current.
+    If a pulse with a sharp edge is fired at time 0, a shift of its firing changes the initial velocity. With
+    a coil circuit, the shape is (6, n), for a start without current.
     """
     columns = np.zeros((3, len(wanted)))
     columns[0] = rest_changes(problem.hammer, wanted)
@@ -72,10 +72,10 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 
 
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
-    """Return the derivatives of a start without current at time 0, shape (6, n), from `columns`: Wb, Wb, V.
+    """Return the derivatives of an initial state without current, shape (6, n); adds rows in Wb, Wb and V.
 
-    The flux linkage is the one at the displacement of the start; a voltage switched on at that time acts
-    later if its firing does.
+    The flux linkage at zero current depends on the initial displacement. If a voltage is switched on at time
+    0, a shift of its firing changes the initial flux linkage.
     """
     magnet: Any = import_module(problem.laws.magnet or problem.laws.absent)
     linkage = getattr(magnet, "magnet_linkage", None) if problem.constants[COUPLED] else None
@@ -109,7 +109,7 @@ def without_current(problem: Problem, wanted: Sequence[Parameter], columns: Floa
 
 
 def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
-    """Return the derivatives [m] of the positions of pack front and backstop, by surface."""
+    """Return the derivatives of the positions of pack front and backstop, m, by surface, shape (n,) each."""
     moves = as_arrays(wanted)["hammer"]
     return {"pack": moves[:, FRONT], "backstop": moves[:, POSITION]}
 
@@ -117,10 +117,10 @@ def surface_moves(wanted: Sequence[Parameter]) -> dict[str, FloatArray]:
 def pack_push_changes(
     problem: Problem, wanted: Sequence[Parameter], state: FloatArray, changes: FloatArray
 ) -> FloatArray:
-    """Return the derivatives [N] of the pack force on the armature, shape (n,).
+    """Return the derivatives of the pack force on the armature, N, shape (n,).
 
-    The state is inside the pack, a row of `Flow.states`; `changes`, shape (3 or more, n), are the derivatives
-    of displacement, velocity and latest local maximum there.
+    `state` is a row of `Flow.states` inside the pack; `changes`, shape (3 or more, n), are the derivatives of
+    displacement, velocity and latest local maximum in this state.
     """
     moves = as_arrays(wanted)["hammer"]
     return np.array(
@@ -129,7 +129,7 @@ def pack_push_changes(
 
 
 def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
-    """Return the rate [N/s] of the pack force at a time of a run, s; NaN except on the loading branch."""
+    """Return the rate of change of the pack force at a time, s, in N/s; NaN off the loading branch."""
     row = problem.resample(record, np.array([t]))[0]
     if int(row[9]) != M.LOADING:
         return math.nan
@@ -143,7 +143,7 @@ def pack_push_rate(problem: Problem, record: Record, t: float) -> float:
 
 
 def _push_change(problem: Problem, moves: FloatArray, state: FloatArray, change: FloatArray) -> float:
-    """Return the derivative [N] of the pack force along a change of constants, state and memory."""
+    """Return the derivative of the pack force, N, in the direction of a change of constants and state."""
     x, v, mode, peak = (float(number) for number in state[:4])
     dx, dv, dp = (float(number) for number in change)
     # A step must neither leave the pack nor change the indentation by much.

@@ -1,8 +1,8 @@
-"""Derivatives of each dot with respect to the constants, from the columns at contacts and peaks.
+"""Derivatives of the dots with respect to constants, from the columns at contacts and peaks.
 
-A touch shifts in time by dt = -(dx - dg) / v, with dx the change of the displacement at a fixed time and dg
-that of the surface; the touch speed changes by dv + a dt. Losses are integrals of power, whose derivatives
-are in the columns.
+The time of a touch changes by dt = -(dx - dg) / v, with dx the change of the displacement at a fixed time and
+dg the change of the surface position; the touch speed changes by dv + a dt. Losses are integrals of power,
+whose derivatives are in the columns.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ DOT_QUANTITIES: Final = {
     "return_time": ("s", "from firing to the first touch of the backstop after the dot"),
     "return_speed": ("m/s", "speed at that touch"),
 }
-"""Unit and meaning of the quantities of a dot."""
+"""Unit and meaning of each quantity of a dot, by name."""
 
 RUN_QUANTITIES: Final = {
     "coil_work": ("J", "work of the coil"),
@@ -44,7 +44,7 @@ RUN_QUANTITIES: Final = {
     "backstop_loss": ("J", "energy that the backstop took"),
     "damping_loss": ("J", "energy that the damping of the armature took"),
 }
-"""Unit and meaning of the quantities of a whole run; the last one exists only for a hammer with damping."""
+"""Unit and meaning of the energies of a whole run, by name; the last is for hammers with damping."""
 
 _ENERGY: Final = 3  # First row of the energies in a column
 _PACK_LOSS: Final = 5  # Row of the pack loss in a column
@@ -54,7 +54,7 @@ _NEAR: Final = 1e-6
 
 
 class Struck(Declared):
-    """Dot that was printed: the rows of its contacts, and its instants of largest indentation and force."""
+    """Printed dot: the rows of its contacts, and the times of largest indentation and force."""
 
     index: int = part("number of the firing")
     touch: int = part("row of the contact with the pack")
@@ -64,7 +64,7 @@ class Struck(Declared):
 
 
 def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck]:
-    """Locate the contacts and instants of all printed dots."""
+    """Locate contacts, largest indentation and largest force of every printed dot."""
     struck: list[Struck] = []
     contacts = motion.contacts
     for row in _touches(contacts):
@@ -76,7 +76,7 @@ def struck_dots(motion: Motion, problem: Problem, record: Record) -> list[Struck
 
 
 def dot_values(motion: Motion) -> FloatArray:
-    """Return the values of `DOT_QUANTITIES` for each firing, SI, shape (dots, q); NaN for a missing value."""
+    """Return the values of `DOT_QUANTITIES` for each firing, SI, shape (dots, q); NaN if missing."""
     values = np.full((len(motion.dots), len(DOT_QUANTITIES)), np.nan)
     names = list(DOT_QUANTITIES)
     for dot in motion.dots:
@@ -93,12 +93,12 @@ def dot_values(motion: Motion) -> FloatArray:
 
 
 def _touches(contacts: Sequence[Contact]) -> list[int]:
-    """Return the row of the contact that makes the dot, for each firing."""
+    """Return the row index of each contact that makes a dot, in order of the firings."""
     return [row for row, number in enumerate(contact_numbers(contacts)) if number == DOT]
 
 
 def _back(contacts: Sequence[Contact], row: int) -> int | None:
-    """Return the row of the first backstop contact after a dot and its extra contacts, or None."""
+    """Return the row of the first backstop contact after a dot and its extra contacts; None without one."""
     following = next((k for k in range(row + 1, len(contacts)) if not contacts[k].extra), None)
     return following if following is not None and contacts[following].surface == "backstop" else None
 
@@ -108,7 +108,7 @@ def _end(record: Record, contact: Contact) -> float:
 
 
 def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
-    """Return the time of largest indentation, s: the zero of the velocity, to full precision."""
+    """Refine the time of largest indentation, s, by Newton's method on the velocity."""
     t = contact.t_peak
     for _ in range(3):
         row = problem.resample(record, np.array([t]))[0]
@@ -120,7 +120,7 @@ def _peak_time(problem: Problem, record: Record, contact: Contact) -> float:
 
 
 def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: float) -> float:
-    """Return the time of the largest pack force, s; the touch itself if the force jumps to its maximum."""
+    """Return the time of the largest pack force, s; the touch time if the force is largest there."""
     from scipy.optimize import minimize_scalar
 
     t_in, t_out = contact.t_in, _end(record, contact)
@@ -146,9 +146,9 @@ def _force_time(problem: Problem, record: Record, contact: Contact, t_peak: floa
 
 
 def _settled(problem: Problem, record: Record, t: float, step: float) -> float:
-    """Return the time near `t`, s, at which the pack force is stationary, by the secant method.
+    """Find the time near `t`, s, at which the pack force is stationary, by the secant method.
 
-    Comparing forces would locate the time to half of the digits only.
+    A comparison of forces would locate the time to only half of the digits.
     """
     before, rate_before = t - step, pack_push_rate(problem, record, t - step)
     for _ in range(6):
@@ -161,14 +161,14 @@ def _settled(problem: Problem, record: Record, t: float, step: float) -> float:
 
 
 def _acceleration(problem: Problem, row: FloatArray, *without: int) -> float:
-    """Return the acceleration, m/s^2, of a row of `Problem.resample`, excluding the forces in `without`."""
+    """Compute the acceleration, m/s^2, from a row of `Problem.resample`, excluding the forces `without`."""
     forces = {k: float(row[k]) for k in range(3, 9) if k not in without}
     drive = float(row[2]) if problem.drive.quantity == "force" else 0.0
     return (math.fsum(forces.values()) + drive) / problem.hammer.mass
 
 
 class Changes(Declared):
-    """Derivatives of the quantities of a run with respect to ``value / scale`` of each constant."""
+    """Derivatives of the quantities of dots and run with respect to ``value / scale`` of each constant."""
 
     dots: FloatArray = part(
         "of `DOT_QUANTITIES`, shape (dots, quantities, n)", more="NaN where a dot is lost or one is not known"
@@ -180,7 +180,7 @@ class Changes(Declared):
 def changes_of(
     motion: Motion, problem: Problem, record: Record, wanted: Sequence[Parameter], initial: FloatArray
 ) -> Changes:
-    """Return the derivatives of all quantities of a run from those of its initial state (`initial`)."""
+    """Compute the derivatives of all quantities of a run from the derivatives of its initial state."""
     struck = struck_dots(motion, problem, record)
     times = record.nodes[:, 0]
     end = float(times[-1])
@@ -207,7 +207,7 @@ def changes_of(
 
 @dataclass(frozen=True)
 class _Look:
-    """Run, flow and constants, from which the derivatives of quantities follow."""
+    """Run, flow and constants from which the derivatives of the quantities of a dot are computed."""
 
     problem: Problem
     record: Record
@@ -217,16 +217,16 @@ class _Look:
     rows: dict[int, int]
 
     def columns(self, t: float) -> tuple[FloatArray, FloatArray]:
-        """Return the state and the columns at a mark."""
+        """Return the state and the columns of derivatives at a mark, by its time, s."""
         row = int(np.searchsorted(self.marks, t))
         return self.flow.states[row], self.flow.changes[row]
 
     def later(self, columns: FloatArray, surface: str, v: float) -> FloatArray:
-        """Return the derivative of the time at which a surface is passed, s."""
+        """Return the derivative of the time, s, at which the armature passes a surface at speed `v`."""
         return np.asarray(-(columns[0] - surface_moves(self.wanted)[surface]) / v)
 
     def dot(self, dot: Struck, contacts: Sequence[Contact]) -> dict[str, FloatArray]:
-        """Return the derivatives of the quantities of a dot, by name."""
+        """Compute the derivatives of the quantities of a dot, by name, shape (n,) each."""
         contact = contacts[dot.touch]
         fired = np.array([parameter.firings[dot.index] for parameter in self.wanted])
         touch = self.flow.passed[self.rows[int(self.record.contacts[dot.touch, 5])], 0]

@@ -1,6 +1,6 @@
-"""Columns of variational equations integrated along a run; the only interface to their kernel.
+"""Integration of variational equations along a recorded run; the only interface to their kernel.
 
-The integration is a second pass over the record of a run, so that other runs do not pay for it.
+The integration is a second pass over the record of a run, so that ordinary runs bear no extra cost.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from printhammer.run.problem import Problem, Record, Stretch
 from printhammer.support.arrays import FloatArray
 
 _VALUE_SPACING: Final = 1e-3
-"""Step, as a fraction of the largest pulse, of the difference quotient of force with respect to the drive."""
+"""Step of the difference quotient of force by drive value, as a fraction of the largest pulse."""
 
 
 class Flow(Declared):
-    """Columns of the variational equations along a run, at given times (the marks)."""
+    """Columns of the variational equations along a run, at given times (marks)."""
 
     states: FloatArray = part(
         "displacement, m, velocity, m/s, mode and latest local maximum, m, at the marks, shape (m, 4); with a"
@@ -68,18 +68,19 @@ def carry_columns(
     problem, stretches
         The run, and its record.
     marks : array, shape (m,)
-        Ascending times, s.
+        Ascending times at which the columns are returned, s.
     initial : array, shape (3, n), with a circuit (3, n) or (6, n)
         Changes of displacement, m, velocity, m/s, and latest local maximum, m, at the first mark; of flux
-        linkage of the coil and of its shorted turn, Wb, and voltage of the reservoir, V, by default none.
-        Where no current flows, the linkage goes with the displacement, and its change is not looked at.
+        linkage of the coil and of its shorted turn, Wb, and voltage of the reservoir, V, by default zero. If
+        no current flows, the displacement determines the linkage, and the given change of the linkage is
+        ignored.
     forcing : tuple, optional
         Derivatives of the equations with respect to constants, see `forcing_of`; by default none, and only
         the initial state changes.
     nodes : sequence of int, optional
-        Ascending indices of nodes at which the columns are returned, too, for a record in one piece.
+        Ascending indices of nodes at which the columns are also returned; requires an undivided record.
     renormalise : bool, optional
-        Whether to orthonormalise the columns at each step and record their growth.
+        Whether to orthonormalise the columns at each step and record the growth.
     """
     forced, circuit, count = forcing is not None, problem.laws.circuit, initial.shape[1]
     rows = V.row_count(forced, circuit)
@@ -120,7 +121,7 @@ def carry_columns(
 
 
 def forcing_of(problem: Problem, changes: dict[str, FloatArray]) -> tuple[Any, ...]:
-    """Pack the derivatives of "hammer", "firings" and "pieces" for n constants into kernel arguments."""
+    """Pack the derivatives by "hammer", "firings" and "pieces" for n constants into kernel arguments."""
     moves = changes["hammer"]
     count = len(moves)
     away = V.SPACING * (np.arange(V.VARIED) - V.MIDDLE)

@@ -1,12 +1,12 @@
 """Constants with respect to which a motion can be differentiated, and their effect on the kernel's arrays.
 
 A constant is named as in a hammer file, such as "pack.stiffness"; constants of the pulse, such as
-"waveform.width", are those of the drive. In addition there are "period" and "rate" of an even train or a
-sinusoidal force, and "firing.3", the time of a single firing, counted from 0. A sampled waveform has one
-constant, "waveform.amplitude", its largest value.
+"waveform.width", are those of the drive. Further constants are "period" and "rate" of an even train or a
+sinusoidal force, and the time of a single firing, such as "firing.3", counted from 0. A sampled waveform has
+a single constant, "waveform.amplitude", its largest value.
 
 Derivatives of the packed arrays are finite differences of fourth order, one-sided if a constant is at an end
-of its range, so that parts need no derivatives of their own.
+of its range, so that the hammer components need no analytic derivatives.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.constants import quantities
 
 _SPACING: Final = 2e-4
-"""Step of the finite differences, as a fraction of the constant or its scale."""
+"""Step of the finite differences, as a fraction of the constant's value or, if that is zero, of its scale."""
 _STENCILS: Final = (
     ((-2, -1, 1, 2), (1.0, -8.0, 8.0, -1.0)),
     ((0, 1, 2, 3, 4), (-25.0, 48.0, -36.0, 16.0, -3.0)),
@@ -39,11 +39,11 @@ _STENCILS: Final = (
 )
 """Offsets and weights, times 12: central, forward, backward; Abramowitz and Stegun (1964), table 25.2."""
 _MOST_SINGLE: Final = 20
-"""Largest number of uneven firings whose times are listed individually; arbitrary."""
+"""Largest number of firings of an uneven train whose times are listed as constants; arbitrary."""
 
 
 class Parameter(Declared):
-    """Constant of a hammer under a drive, with the derivatives of the kernel's arrays."""
+    """Constant of hammer or drive, with the derivatives of the kernel's arrays."""
 
     name: str = part('such as "pack.stiffness", "waveform.width", "period", "firing.1"')
     value: float = part("in SI")
@@ -61,10 +61,10 @@ class Parameter(Declared):
 
 
 def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
-    """List the differentiable constants: those of the hammer, of the pulse, and of the firing times.
+    """List the differentiable constants of a hammer and a drive: hammer, pulse and firing times.
 
-    An even train has its period; any other train of up to 20 firings has the time of each firing but the
-    first. A drive with a waveform per firing has no constants of the pulse.
+    An even train has the constant "period"; any other train of up to 20 firings has a constant for the time
+    of each firing except the first. A drive with different waveforms has no constants of the pulse.
     """
     names = [key for key in hammer.constants if not key.startswith("waveform.")]
     if drive.uniform:
@@ -78,9 +78,9 @@ def parameter_names(hammer: Hammer, drive: Drive) -> list[str]:
 
 
 def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Parameter]:
-    """Return the constants named, with the derivatives of the kernel's arrays.
+    """Build the named constants, with the derivatives of the kernel's arrays.
 
-    Names are such as `parameter_names` lists, or "rate".
+    The names are those listed by `parameter_names`, or "rate".
 
     Raises
     ------
@@ -92,7 +92,7 @@ def parameters(hammer: Hammer, drive: Drive, names: Sequence[str]) -> list[Param
 
 
 def rest_changes(hammer: Hammer, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the derivatives [m] of the rest state with respect to ``value / scale``, shape (n,)."""
+    """Compute the derivatives of the rest displacement, m, with respect to ``value / scale``, shape (n,)."""
     changes = np.zeros(len(wanted))
     for k, parameter in enumerate(wanted):
         # The supply does not affect the state of rest.
@@ -148,7 +148,7 @@ def _parameter(hammer: Hammer, drive: Drive, name: str) -> Parameter:
 
 
 def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
-    """Return the period or rate of an even train, with its first firing fixed, or of a sine."""
+    """Build the constant "period" or "rate" of an even train, with its first firing fixed, or of a sine."""
     period, count = drive.period, len(drive.times)
     if period is None or (count == 1 and not isinstance(drive.waveform, Sine)):
         raise InputError.of("constant", name, "a drive with a single period and several firings")
@@ -168,7 +168,7 @@ def _spacing(drive: Drive, name: str, packed: FloatArray) -> Parameter:
 
 
 def _of_waveform(waveform: Waveform) -> dict[str, tuple[float, str, str]]:
-    """Return value, unit and meaning of the constants of a waveform."""
+    """Return value, unit and meaning of each constant of a waveform, by name."""
     fields = {
         name: (float(getattr(waveform, name)), note.si, note.meaning)
         for name, note in quantities_of(waveform).items()
@@ -187,7 +187,7 @@ def _changed(waveform: Waveform, name: str, value: float) -> Waveform:
 
 
 def _table_change(made: Callable[[float], Waveform], value: float, scale: float, name: str) -> FloatArray:
-    """Return the derivative of a segment table whose segments keep their kinds."""
+    """Compute the derivative of a waveform's segment table, whose segment kinds must not change."""
     kinds = made(value).segments()[:, 1]
 
     def table(moved: float) -> FloatArray:
@@ -204,7 +204,7 @@ def _table_change(made: Callable[[float], Waveform], value: float, scale: float,
 
 
 def _difference(function: Callable[[float], FloatArray], value: float, scale: float, name: str) -> FloatArray:
-    """Return the derivative of an array with respect to ``value / scale``; zero if the array is infinite."""
+    """Compute the derivative of an array with respect to ``value / scale``; infinite entries give zero."""
     for offsets, weights in _STENCILS:
         try:
             middle = function(value)
@@ -224,7 +224,7 @@ def _difference(function: Callable[[float], FloatArray], value: float, scale: fl
 
 
 def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
-    """Return the typical magnitude of the motion in an SI unit such as "N s/m^2.5"."""
+    """Return the typical magnitude of a quantity of the motion, by its SI unit, such as "N s/m^2.5"."""
     way, speed = scales_of(hammer, drive, (hammer.origin, 0.0))
     time, force = way / speed, hammer.mass * speed * speed / way
     known = {
@@ -253,7 +253,7 @@ def _natural(unit: str, hammer: Hammer, drive: Drive) -> float:
 
 
 def as_arrays(wanted: Sequence[Parameter]) -> dict[str, Any]:
-    """Stack the derivatives of several constants: `hammer`, `firings`, `pieces`."""
+    """Stack the arrays `hammer`, `firings` and `pieces` of several constants, by name."""
     return {
         name: np.ascontiguousarray([getattr(parameter, name) for parameter in wanted], dtype=np.float64)
         for name in ("hammer", "firings", "pieces")

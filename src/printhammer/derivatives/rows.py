@@ -5,8 +5,8 @@ the state at the next. A row of equal dots is a fixed point of this map. The eig
 the fixed point are its Floquet multipliers, the factors by which a small error grows from dot to dot: with a
 multiplier outside the unit circle a long row leaves the fixed point, however good its first dots are.
 
-Fixed points are found for many rows at once by Newton's method, with derivatives from central differences of
-neighbours that run in one ensemble.
+The fixed points of many rows are computed at once by Newton's method, with derivatives from central
+differences of neighbouring runs in one ensemble.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from printhammer.run.start import initial_state
 from printhammer.support.arrays import BoolArray, FloatArray
 
 FIRING: Final = 12
-"""Default index of the firing at which the map starts; a row from rest is near the fixed point there."""
+"""Default index of the firing where the map starts; a row from rest is near its fixed point there."""
 
 MORE: Final = 4
-"""Number of dots after that firing, so that the end of the row does not affect the map."""
+"""Number of further dots in the row after the firing where the map starts, so that its end has no effect."""
 
 DOTS: Final = FIRING + MORE
-"""Number of dots of a sufficiently long row."""
+"""Number of dots in a row that is long enough for the default starting firing."""
 
 _SPACING: Final = 1e-5  # Finite-difference step of the state, in its scales
 _CLOSED: Final = 1e-6  # Distance from state to image below which an orbit is closed, in scales of the state
@@ -48,28 +48,28 @@ def row_multipliers(
     closed: bool = True,
     firing: int = FIRING,
 ) -> FloatArray:
-    """Compute the leading multiplier of each of several rows of dots, shape (rows,).
+    """Compute the leading Floquet multiplier of each of several rows of dots, shape (rows,).
 
     Parameters
     ----------
     hammers, drives : sequences
-        A hammer and a drive for each row. A drive starts from rest and has at least four firings more than
-        `firing`; from the firing before `firing` on, firings are identical and equally spaced.
+        One hammer and one drive per row. A drive starts from rest and has at least four firings more than
+        `firing`; from the firing before `firing` on, all firings are identical and equally spaced.
     effort : Effort
         Tolerance and threads.
     closed : bool, optional
         Whether to find the fixed point by Newton's method; otherwise the derivative is evaluated at the state
-        that the row from rest reaches, which is near the fixed point if the dots before are good.
+        that the row from rest reaches, which is near the fixed point if the preceding dots are good.
     firing : int, optional
-        Index of the firing at which the map starts. If the first dots are compensated, their state is the
-        fixed point, and an early firing is nearer to it than a late one.
+        Index of the firing at which the map starts. If the first dots are compensated, they start in the
+        fixed point, so that the state at an early firing is closer to it than at a late firing.
 
     Returns
     -------
     array
         The multiplier of largest absolute value: with its sign if it is real (negative: an error alternates),
-        else its absolute value. NaN if the row is no periodic orbit: a run ends early, Newton's method does
-        not converge, or a pulse is fired while the armature leaves the pack.
+        else its absolute value. NaN if the row is not a periodic orbit: a run ends early, Newton's method
+        does not converge, or a pulse is fired while the armature moves out of the pack.
     """
     if not hammers:
         return np.zeros(0)
@@ -94,7 +94,7 @@ def row_multipliers(
 
 
 def leading(jacobians: FloatArray) -> FloatArray:
-    """Compute the eigenvalues of largest absolute value, (rows,), of matrices (rows, 2, 2); NaN stays NaN.
+    """Compute the eigenvalue of largest absolute value of each 2 x 2 matrix, (rows,); NaN for NaN entries.
 
     A real eigenvalue keeps its sign; a complex pair is represented by its absolute value.
     """
@@ -106,7 +106,7 @@ def leading(jacobians: FloatArray) -> FloatArray:
 
 
 class _Maps:
-    """Strobe maps of rows, in scaled states, shape (rows, 2)."""
+    """Strobe maps of many rows of dots, on scaled states, shape (rows, 2)."""
 
     def __init__(
         self, hammers: Sequence[Hammer], drives: Sequence[Drive], effort: Effort, firing: int
@@ -128,7 +128,7 @@ class _Maps:
         self.current = None if strobes.electric is None else strobes.electric[:, -1]
 
     def images(self, rows: Any, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Compute the images (n, 2) of states of rows, and the derivatives (n, 2, 2)."""
+        """Compute the images (n, 2) of scaled states of given rows, and the derivatives (n, 2, 2)."""
         steps = _SPACING * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
         count, places = len(steps), np.repeat(rows, len(steps))
         states = ((z[:, np.newaxis] + steps) * self.scales[rows][:, np.newaxis]).reshape(-1, 2)
@@ -173,7 +173,7 @@ class _Maps:
 
 
 def _way(hammer: Hammer) -> float:
-    """Return the distance from rest to the pack, m."""
+    """Return the distance from the rest position to the front of the pack, m."""
     if hammer.front is None:
         raise InputError(
             f"{hammer.path}: the hammer has no pack", file=hammer.path, key="pack", expected="one"
@@ -182,7 +182,7 @@ def _way(hammer: Hammer) -> float:
 
 
 def _possible(hammer: Hammer, state: FloatArray) -> bool:
-    """Whether a run can begin with a displacement, m, and a velocity, m/s."""
+    """Whether a displacement, m, and a velocity, m/s, are a valid initial state of a hammer."""
     try:
         initial_state(hammer, state.tolist())
     except InputError:
@@ -191,5 +191,5 @@ def _possible(hammer: Hammer, state: FloatArray) -> bool:
 
 
 def _with_memory(strobes: Strobes) -> BoolArray:
-    """Mask of the strobes inside the pack with a memory, whose state is not in the plane."""
+    """Mask of the strobes at which the pack has a memory, so that (x, v) is not the whole state."""
     return np.array([[components(mode) > 2 for mode in row] for row in strobes.branch.tolist()])

@@ -37,13 +37,13 @@ _INDEPENDENT: Final = "standard deviation for independent constants"
 _WORST: Final = "deviation with all constants at their worst ends"
 
 TOLERANCE: Final = 1e-12
-"""Default tolerance of the run."""
+"""Default integration tolerance of the run."""
 
 
 class Sensitivities(Result):
-    """Derivatives of the printed dots with respect to the constants.
+    """Sensitivities of a run: derivatives of dots and energies with respect to constants.
 
-    Units differ along `quantity` and `constant`, and are coordinates of the table.
+    The units depend on quantity and constant; they are coordinates of the table.
     """
 
     hammer: Hammer = part("the hammer")
@@ -111,13 +111,13 @@ class Sensitivities(Result):
 
     @property
     def lost(self) -> tuple[int, ...]:
-        """Indices of the firings, from 0, whose dot is lost and has no sensitivities."""
+        """Indices of the firings, from 0, whose dots are lost, and which have no sensitivities."""
         return tuple(int(k) for k in np.flatnonzero(np.isnan(self.dots[:, 0])))
 
     @property
     @derived("1", _IN_PARTS, "dot quantity constant")
     def logarithmic(self) -> FloatArray:
-        """Relative change of a quantity of a dot per relative change of a constant, shape (d, q, n).
+        """Relative change of a dot's quantity per relative change of a constant, shape (d, q, n).
 
         NaN for a constant that is zero.
         """
@@ -126,26 +126,26 @@ class Sensitivities(Result):
     @property
     @derived("1", _IN_PARTS, "energy constant")
     def run_logarithmic(self) -> FloatArray:
-        """Relative change of the run's energies per relative change of a constant; NaN for zero energies."""
+        """Relative change of each energy per relative change of a constant; NaN for zero energies."""
         return _relative(self.run_derivatives, self.values, self.run)
 
     def spread(self, spreads: Mapping[str, float | str]) -> Spread:
-        """Propagate relative spreads of constants to the quantities, to first order.
+        """Propagate relative spreads of the constants to the quantities of dots and run, to first order.
 
         Parameters
         ----------
         spreads : mapping
-            Relative spread, such as 0.02 or "2 %", by name of a constant; the others are exact.
+            Relative spread, such as 0.02 or "2 %", by name of a constant; all other constants are exact.
 
         Returns
         -------
         Spread
-            Standard deviations for independent constants, and the worst case.
+            Spread with standard deviations for independent constants, and worst cases.
 
         Raises
         ------
         InputError
-            A name is not one of the constants, a constant is zero, or a spread is not a number from 0 on.
+            A name is not one of the constants, a constant is zero, or a spread is negative or not a number.
         """
         shares = np.zeros(len(self.constants))
         for name, number in spreads.items():
@@ -167,11 +167,11 @@ class Sensitivities(Result):
         )
 
     def notes(self) -> dict[str, Any]:
-        """Return the omitted constants and limits of validity, as attributes of the Dataset."""
+        """Return omitted constants and differentiability, as attributes of the Dataset."""
         return {"smooth": str(self.smooth), "left_out": "; ".join(self.left_out.values())}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the columns, with units and meanings of the quantities as coordinates."""
+        """Return the Dataset variables, with units and meanings of the quantities as coordinates."""
         known = {
             "quantity_unit": ("quantity", "SI unit of the quantity", self.quantities, DOT_QUANTITIES, 0),
             "quantity_meaning": ("quantity", "meaning of the quantity", self.quantities, DOT_QUANTITIES, 1),
@@ -193,7 +193,7 @@ class Sensitivities(Result):
         )
 
     def summary(self) -> Summary:
-        """Summarise the number of dots, the constants, and the status of the run."""
+        """Summarise number of dots, constants, and status of the run."""
         struck = len(self.dots) - len(self.lost)
         rows = [
             ("dots", f"{struck} of {len(self.dots)} dots struck"),
@@ -204,7 +204,7 @@ class Sensitivities(Result):
 
 
 class Spread(Result):
-    """Effect of tolerances of the constants on the dots, to first order."""
+    """Spread of the dots due to tolerances of the constants, to first order."""
 
     sensitivities: Sensitivities = part("what it follows from", repr=False)
     spreads: FloatArray = column("1", "relative spread of a constant", "constant", name="spread")
@@ -225,25 +225,25 @@ class Spread(Result):
     @property
     @derived("quantity_unit", _INDEPENDENT, "dot quantity")
     def deviation(self) -> FloatArray:
-        """Standard deviation of each quantity of each dot for independent constants, SI, shape (d, q)."""
+        """Standard deviation of each quantity of each dot, for independent constants, SI, shape (d, q)."""
         return np.asarray(np.sqrt((self.dots**2).sum(axis=-1)))
 
     @property
     @derived("quantity_unit", _WORST, "dot quantity")
     def worst(self) -> FloatArray:
-        """Deviation with all constants at their worst ends, SI, shape (d, q)."""
+        """Worst-case deviation of each quantity of each dot, all constants at their limits, SI, (d, q)."""
         return np.asarray(self.dots.sum(axis=-1))
 
     @property
     @derived("J", _INDEPENDENT, "energy")
     def run_deviation(self) -> FloatArray:
-        """Standard deviation of each quantity of the run, J, shape (4,)."""
+        """Standard deviation of each energy of the run, for independent constants, J, shape (4,)."""
         return np.asarray(np.sqrt((self.run**2).sum(axis=-1)))
 
     @property
     @derived("J", _WORST, "energy")
     def run_worst(self) -> FloatArray:
-        """Deviation of the quantities of the run with all constants at their worst ends, J, shape (4,)."""
+        """Worst-case deviation of each energy of the run, all constants at their limits, J, (4,)."""
         return np.asarray(self.run.sum(axis=-1))
 
     @property
@@ -256,13 +256,13 @@ class Spread(Result):
         return {"duration": self.sensitivities.duration, **self.sensitivities.notes()}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the deviations, with the values and coordinates of the sensitivities."""
+        """Return the Dataset variables: deviations, with values and coordinates of the sensitivities."""
         kept = self.sensitivities.entries()
         names = [name for name, (note, _) in kept.items() if note.kind == "coordinate"]
         return super().entries() | {name: kept[name] for name in (*names, "value", "run_value")}
 
     def plot(self, **options: Any) -> Figure:
-        """Draw the sensitivities that the spread follows from."""
+        """Draw the sensitivities on which the spread is based."""
         return self.sensitivities.plot(**options)
 
 
@@ -283,18 +283,18 @@ def sensitivities(
     hammer, drive, duration
         As for `printhammer.simulate`.
     constants : sequence of str, optional
-        Names such as "pack.stiffness", "waveform.width", "period", "rate" or "firing.1" (the second firing;
-        they are counted from 0); by default all of the hammer, of the pulse and of the firing times.
+        Names such as "pack.stiffness", "waveform.width", "period", "rate" or "firing.1" (the second firing,
+        since firings are counted from 0); by default all constants of hammer, pulse and firing times.
     state : tuple of float, optional
         Displacement, m, and velocity, m/s, at time 0, independent of the constants; by default the rest
-        state, which depends on them.
+        state, which depends on the constants.
     tolerance : float, optional
         Error allowed in one step of the run.
 
     Returns
     -------
     Sensitivities
-        With a status; a run that could not go on is no exception.
+        Sensitivities with a status; a run that ends early raises no exception.
     """
     check_tolerance(tolerance)
     wanted, left_out = _constants(hammer, drive, constants)
@@ -346,7 +346,7 @@ def sensitivities(
 def _constants(
     hammer: Hammer, drive: Drive, names: Sequence[str] | None
 ) -> tuple[list[Parameter], dict[str, str]]:
-    """Return the constants, and the reasons for which unrequested constants are omitted."""
+    """Return the constants, and the reason for each constant that is omitted unless requested."""
     if names is not None:
         return parameters(hammer, drive, list(dict.fromkeys(names))), {}
     wanted: list[Parameter] = []

@@ -1,8 +1,8 @@
-"""Tangent flow of the state through all contacts, and the Lyapunov exponents of a train.
+"""Tangent flow of the state through all contacts, and Lyapunov exponents of a pulse train.
 
 A neighbouring motion meets every discontinuity slightly earlier or later; docs/tangent.md derives the jumps
 (saltation matrices) that result. The flow is integrated in a second pass over the record of a run, so that
-other runs do not pay for it.
+ordinary runs bear no extra cost.
 """
 
 from __future__ import annotations
@@ -28,19 +28,20 @@ from printhammer.support.arrays import FloatArray
 
 _NODES: Final = 4096  # Nodes of a record in one stretch, which bounds the memory; arbitrary
 _WARM_UP: Final = 100
-"""Firings during which the growth directions converge before growth is counted."""
+"""Number of firings during which perturbations align with the growth directions before averaging."""
 _FEWEST: Final = 8
 """Smallest number of growth factors from which a standard error is estimated."""
 
 
 class TangentMap(Declared):
-    """Derivative of the state at one time with respect to the state at an earlier time (monodromy of a run).
+    """Derivative of the state at one time with respect to the state at an earlier time.
 
     The state is displacement, m, and velocity, m/s; on the unloading branch of a pack with memory also the
-    displacement of the latest local maximum, m (0 in `state_at_start` and `state_at_end` if it is not part of
-    the state). If a voltage drives the coil, the flux linkages of the coil and of its shorted turn, Wb, and
-    the voltage of the reservoir, V, follow, as far as they exist. Without a current the displacement
-    determines the linkage: its row equals that of the displacement, its column is zero.
+    displacement of the latest local maximum, m (0 in `state_at_start` and `state_at_end` if the state does
+    not include a memory). If a voltage drives the coil, the flux linkages of the coil and of its shorted
+    turn, Wb, and the voltage of the reservoir, V, follow if the circuit has them. Without a current, the
+    displacement determines the linkage: the row of the linkage follows that of the displacement, and its
+    column is zero.
     """
 
     matrix: FloatArray = part(
@@ -66,12 +67,12 @@ class TangentMap(Declared):
 
     @property
     def determinant(self) -> float:
-        """Growth factor of volumes in state space; 0 if the state loses its memory on the way.
+        """Growth factor of volumes in state space; 0 if the state loses its memory in between.
 
         Raises
         ------
         ValueError
-            The state at the end has a memory, the state at the start has none.
+            The state at the end includes a memory, the state at the start does not.
         """
         rows, columns = self.matrix.shape
         if rows > columns:
@@ -136,7 +137,7 @@ def tangent_map(
     state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> TangentMap:
-    """Compute the derivative of the state at `end` with respect to the state at `start`.
+    """Compute the derivative of the state at time `end` with respect to the state at time `start`.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def tangent_map(
     drive : Drive
         The drive.
     start, end : float
-        Times, s, in a run from time 0. At a discontinuity, the state after it.
+        Times, s, in a run that begins at time 0. At a discontinuity, the state after it is used.
     state : sequence of float, optional
         Displacement, m, velocity, m/s, and any further components at time 0, as for `printhammer.simulate`;
         by default the rest state.
@@ -155,13 +156,13 @@ def tangent_map(
     Returns
     -------
     TangentMap
-        With a status; a run that could not go on is no exception.
+        Derivative with a status; a run that ends early raises no exception.
 
     Raises
     ------
     InputError
-        Times that are not ascending, an impossible state or tolerance, a hammer without a rest state where
-        no state is given.
+        The times are not ascending, the state or tolerance is invalid, or no state is given and the hammer
+        has no rest state.
     """
     problem = problem_between(hammer, drive, start, end, state, tolerance)
     flow = follow(problem, np.array([start, end]), np.eye(problem.state_size), renormalise=False)
@@ -190,7 +191,7 @@ def problem_between(
     state: Sequence[float] | None,
     tolerance: float,
 ) -> Problem:
-    """Return the problem of a map from `start` to `end`, s, with arguments checked as for `tangent_map`."""
+    """Build the run for a map from `start` to `end`, s, with arguments checked as for `tangent_map`."""
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 <= start < end):
         raise InputError(
             f"start = {start!r} s and end = {end!r} s",
@@ -202,14 +203,15 @@ def problem_between(
 
 
 def components(mode: float) -> int:
-    """Return the number of state components in a mode; the unloading branch has a memory."""
+    """Return the number of mechanical state components in a mode: 3 with a pack memory, else 2."""
     return 3 if mode in (UNLOADING, RELOADING, HELD_UNLOADING) else 2
 
 
 def state_rows(problem: Problem, mode: float, electric: int = 3) -> list[int]:
-    """Return the rows of `Flow.changes` that form the state in a mode; `electric` is the first electric row.
+    """Return the row indices of `Flow.changes` that form the state in a mode.
 
-    They are also the indices of these components in the initial columns of `carry_columns`.
+    `electric` is the index of the first electric row. The components have the same indices in the initial
+    columns of `carry_columns`.
     """
     rows = list(range(components(mode)))
     if problem.laws.circuit:
@@ -219,7 +221,7 @@ def state_rows(problem: Problem, mode: float, electric: int = 3) -> list[int]:
 
 
 def state_of(row: FloatArray) -> tuple[float, float, float]:
-    """Return displacement, m, velocity, m/s, and latest local maximum, m, of a row of `Flow.states`."""
+    """Return displacement, m, velocity, m/s, and latest local maximum, m, from a row of `Flow.states`."""
     return float(row[0]), float(row[1]), float(row[3])
 
 
@@ -233,30 +235,30 @@ def strobe_exponent(
     state: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
 ) -> Exponent:
-    """Compute the Lyapunov exponents of the strobe map, with a standard error.
+    """Compute the Lyapunov exponents of the strobe map of a train, with a standard error.
 
     Two perturbations, initially orthonormal, are integrated along the motion and re-orthonormalised at every
     step (G. Benettin, L. Galgani, A. Giorgilli and J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21). The
-    standard error is that of the mean of an autocorrelated series, from overlapping batch means of length
-    sqrt(n) (M. S. Meketon and B. Schmeiser, Proc. Winter Simulation Conf. 1984, 227; J. M. Flegal and G. L.
-    Jones, Ann. Statist. 38 (2010) 1034).
+    standard error of the mean growth, an autocorrelated series, is estimated by overlapping batch means of
+    length sqrt(n) (M. S. Meketon and B. Schmeiser, Proc. Winter Simulation Conf. 1984, 227; J. M. Flegal and
+    G. L. Jones, Ann. Statist. 38 (2010) 1034).
 
     Parameters
     ----------
     hammer, state, tolerance
         As for `tangent_map`.
     waveform_or_drive : Waveform or Drive
-        Waveform fired every `period`; or a drive: its own firings if it has several, else multiples of the
-        period after its first.
+        Waveform fired every `period`; or a drive, whose firings are used if it has several, else multiples of
+        the period after its first firing.
     period : float, optional
-        Time between firings, s; for a drive by default its own.
+        Time between firings, s; by default the period of the drive.
     first, last : int
-        Firings between which growth is averaged, counted from 1.
+        First and last of the firings between which growth is averaged, counted from 1.
 
     Returns
     -------
     Exponent
-        With a status; a run that could not go on is no exception.
+        Exponents with a status; a run that ends early raises no exception.
     """
     drive, times, spacing = _strobes(waveform_or_drive, period, first, last)
     problem = _problem(hammer, drive, state, tolerance)
@@ -288,8 +290,9 @@ def strobe_exponent(
 def standard_error(series: npt.ArrayLike) -> float:
     """Estimate the standard error of the mean of an autocorrelated series, by overlapping batch means.
 
-    With n numbers, batches of length b = floor(sqrt(n)) and their means m_j, its square is b / ((n - b)(n - b
-    + 1)) sum (m_j - m)^2. Infinite for fewer than eight numbers, or infinite numbers.
+    With n numbers, batches of length b = floor(sqrt(n)) and batch means m_j, the square of the standard error
+    is b / ((n - b)(n - b + 1)) sum (m_j - m)^2. The result is infinite for fewer than eight numbers, or if a
+    number is not finite.
     """
     numbers = np.asarray(series, dtype=np.float64)
     n = numbers.size
@@ -311,7 +314,7 @@ def _problem(hammer: Hammer, drive: Drive, state: Sequence[float] | None, tolera
 def _strobes(
     waveform_or_drive: Waveform | Drive, period: float | None, first: int, last: int
 ) -> tuple[Drive, FloatArray, float]:
-    """Return the drive, the times of the firings 1 to `last`, and the time between them."""
+    """Return the drive, the times of the firings 1 to `last`, s, and the time between firings, s."""
     if not 1 <= first < last:
         raise InputError(
             f"first = {first!r} and last = {last!r}",
@@ -340,9 +343,9 @@ def _strobes(
 
 
 def follow(problem: Problem, marks: FloatArray, initial: FloatArray, *, renormalise: bool) -> Flow:
-    """Simulate a problem up to the last mark and integrate columns of initial states from the first mark.
+    """Simulate a problem up to the last mark and integrate perturbations from the first mark on.
 
-    The record is processed in stretches, so that memory does not grow with the length of the run.
+    The record is processed in segments, so that memory does not grow with the length of the run.
     """
     return problem.in_stretches(
         float(marks[-1]),

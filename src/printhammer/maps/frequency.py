@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LOWEST: Final = 500.0
-"""Default lowest rate of a map of the paper's hammer, Hz, as in Figs. 8 and 9."""
+"""Default lowest rate of a map, Hz, as in Figs. 8 and 9; scaled for other devices than the paper's."""
 
 HIGHEST: Final = 2000.0
-"""Default highest rate of a map of the paper's hammer, Hz, as in Figs. 8 and 9."""
+"""Default highest rate of a map, Hz, as in Figs. 8 and 9; scaled for other devices than the paper's."""
 
 RATES: Final = 512
 """Default number of rates of a map; arbitrary."""
@@ -42,10 +42,10 @@ TIMES: Final = 512
 """Default number of times of a map; arbitrary."""
 
 TAIL: Final = 1e-3
-"""Smallest time after the last firing, s, shown at the lowest rate; arbitrary."""
+"""Default time shown after the last firing at the lowest rate, s; arbitrary. Longer for slow devices."""
 
 MOST_CELLS: Final = 200_000_000
-"""Largest number of displacements in a map; arbitrary, to refuse typing errors."""
+"""Largest number of displacements in a map; arbitrary, catches typing errors in rates and times."""
 
 
 @computation
@@ -60,7 +60,7 @@ def frequency_map(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[Keywords],
 ) -> xr.Dataset:
-    """Compute the displacement against time and firing rate, from rest, and the dot of each firing.
+    """Compute the frequency-time map of a hammer: displacement against time and firing rate, and the dots.
 
     Parameters
     ----------
@@ -72,21 +72,21 @@ def frequency_map(
     pulses : int, optional
         Number of firings at each rate.
     times : array or int, optional
-        Times from the first firing, s or text with units, ascending, or their number, spread evenly from the
-        first firing to 1 ms after the last one at the lowest rate, of a slow device to the end of its
-        window; by default 512.
+        Times from the first firing, s or text with units, ascending; or their number, spread evenly from the
+        first firing to 1 ms after the last firing at the lowest rate, or longer for a slow device; by default
+        512.
     waveform : Waveform, optional
         Waveform of every firing; by default that of the hammer.
     overlap : str, optional
-        "add": overlapping pulses add up; "replace": each firing cuts off the pulse before.
+        "add": overlapping pulses add up; "replace": each firing cuts off the preceding pulse.
 
     Returns
     -------
     xarray.Dataset
-        Over `rate` [Hz] and `time` [s]: `displacement` [m, float32], NaN after the end of a run that could
-        not go on. Over `rate` and `firing`: `fired_at` [s], `struck`, `flight_time` [s] and `peak_force` [N]
-        of its dot, NaN for a lost dot. Over `rate`: `status`, 0 for a run that went as asked; the codes are
-        in its attributes. Provenance is in the attributes of the set.
+        Over `rate` [Hz] and `time` [s]: `displacement` [m, float32], NaN after the end of a run that ended
+        early. Over `rate` and `firing`: `fired_at` [s], `struck`, `flight_time` [s] and `peak_force` [N] of
+        the dot, NaN for a lost dot. Over `rate`: `status`, 0 for a complete run; the codes are in the
+        attributes of `status`. The attributes of the Dataset contain the provenance.
     """
     from printhammer.run.ensemble import Ensemble
 
@@ -128,21 +128,21 @@ def frequency_map(
 
 
 def tail_of(hammer: Hammer, waveform: Waveform) -> float:
-    """Return the time after the last firing at the lowest rate that a map shows, s.
+    """Return the default time shown after the last firing at the lowest rate of a map, s.
 
-    The time covers the response of a slow device to the last firing.
+    For a slow device the time is extended to cover the response to the last firing.
     """
     wait = wait_of(hammer, waveform)
     return wait if wait > CYCLE else TAIL
 
 
 def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArray, FloatArray]:
-    """Compare two maps rate by rate, at the times of the coarser one.
+    """Compute the RMS difference of two maps at each common rate, at the times of the coarser map.
 
     Parameters
     ----------
     computed, measured : xarray.Dataset
-        Maps; the finer one is interpolated linearly.
+        Maps to compare; displacements are interpolated linearly at the times of the coarser map.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
         Rates common to both maps, Hz.
     difference : array, shape (n,)
         Root mean square of the difference of their displacements, m, over the times at which both are known;
-        NaN where there is no such time.
+        NaN without such a time.
     """
     rows, others = matching(computed, measured)
     times = max((chart["time"].values for chart in (measured, computed)), key=_spacing)
@@ -164,7 +164,7 @@ def rms_difference(computed: xr.Dataset, measured: xr.Dataset) -> tuple[FloatArr
 
 
 def summary_of(chart: xr.Dataset, beside: xr.Dataset | None = None) -> Summary:
-    """Summarise size, dots, the first lost dot, and the difference from a measured map."""
+    """Summarise a map: size, dots, first lost dot, status, and the RMS difference from a measured map."""
     rates, time = chart["rate"].values, chart["time"].values
     fired = np.isfinite(chart["fired_at"].values)
     lost = fired & ~chart["struck"].values
@@ -205,7 +205,7 @@ def _spacing(times: FloatArray) -> float:
 
 
 def default_rates(hammer: Hammer, waveform: Waveform | None = None, count: int = RATES) -> FloatArray:
-    """Return the default rates of a map of a device, Hz."""
+    """Return the default rates of a device's map, Hz: scaled from those of the paper's hammer."""
     lowest, highest = (scaled_rate(hammer, rate, waveform) for rate in (LOWEST, HIGHEST))
     return np.linspace(lowest, highest, count)
 

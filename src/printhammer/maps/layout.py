@@ -1,8 +1,8 @@
-"""Dataset of a frequency-time map: variables, units, and files.
+"""Layout of a frequency-time map as a Dataset: variables, units and attributes.
 
-Computed and measured maps have the same layout. `displacement` [m] lies over the dimensions `rate` [Hz] and
-`time` [s, from the first firing on]; the dots lie over `rate` and `firing`, in computed maps only. A missing
-number is NaN.
+Computed and measured maps have the same layout. The variable `displacement` [m] has the dimensions `rate`
+[Hz] and `time` [s, from the first firing]; the dots have the dimensions `rate` and `firing`, and exist in
+computed maps only. A missing number is NaN.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ LAYOUT: Final = {
     "peak_force": Column("N", "largest pack force of the dot", _FIRED),
     "status": Column("1", "how the run ended", ("rate",), dtype=np.int32),
 }
-"""Unit, meaning and dimensions of the variables of a map, by name."""
+"""Unit, meaning and dimensions of each variable of a map, by name."""
 
 PLACES: Final = {"backstop": "backstop_m", "pack": "pack_front_m", "platen": "platen_m"}
-"""Attributes of a map that hold positions of the hammer, m, by the name of the position."""
+"""Attributes of a map that hold the positions of backstop, pack and platen, m, by surface."""
 
 
 def map_dataset(
@@ -50,8 +50,8 @@ def map_dataset(
 ) -> xr.Dataset:
     """Build the Dataset of a map over rates, Hz, and times from the first firing, s.
 
-    `variables` are arrays by name, SI, with the dimensions in `LAYOUT`, including `displacement`;
-    `attributes` belong to the Dataset, `notes` to single variables, by name.
+    `variables` are arrays in SI by name, including `displacement`, with the dimensions of `LAYOUT`.
+    `attributes` belong to the Dataset; `notes` are attributes of single variables, by name.
     """
     more = notes or {}
     values: dict[str, Any] = {"rate": rates, "time": times, **variables}
@@ -64,12 +64,12 @@ def map_dataset(
 
 
 def places_of(chart: xr.Dataset) -> dict[str, float]:
-    """Return the positions of "backstop", "pack" and "platen" stored in a map, m, in this order."""
+    """Return the positions of backstop, pack and platen stored in a map, m, by name; absent ones omitted."""
     return {name: float(chart.attrs[key]) for name, key in PLACES.items() if key in chart.attrs}
 
 
 def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
-    """Return the rates, Hz, of runs that stopped early, by the name of the status."""
+    """Return the rates of the runs that stopped early, Hz, by the name of their status."""
     if "status" not in chart:
         return {}
     codes = str(chart["status"].attrs.get("codes", ""))
@@ -82,7 +82,7 @@ def failed_rates(chart: xr.Dataset) -> dict[str, list[float]]:
 
 
 def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
-    """Return the attributes of a map that describe its hammer: origin of its constants, and positions."""
+    """Return the map attributes that describe a hammer: origin of its constants, and surface positions."""
     statuses = {constant.status for constant in hammer.constants.values()}
     guessed = [status for status in ("reconstructed", "assumed") if status in statuses]
     places = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
@@ -94,7 +94,7 @@ def hammer_attributes(hammer: Hammer) -> dict[str, Any]:
 
 
 def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
-    """Return the row indices of two maps with the same rate, up to a part in 10^9."""
+    """Return the row indices of the rates that two maps share, up to a relative difference of 1e-9."""
     here, there = chart["rate"].values, other["rate"].values
     nearest = np.abs(here[:, np.newaxis] - there).argmin(axis=1)
     same = np.isclose(here, there[nearest], rtol=1e-9, atol=0.0)
@@ -102,14 +102,14 @@ def matching(chart: xr.Dataset, other: xr.Dataset) -> tuple[IntArray, IntArray]:
 
 
 def on_times(chart: xr.Dataset, row: int, times: FloatArray) -> FloatArray:
-    """Interpolate the displacement of one rate, m, at other times, s; NaN next to gaps and outside."""
+    """Interpolate the displacement at one rate, m, at given times, s; NaN in gaps and outside the record."""
     return interpolated(chart["time"].values, chart["displacement"].values[row], times)
 
 
 def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) -> FloatArray:
-    """Interpolate samples linearly; NaN outside, and between a NaN sample and its neighbours.
+    """Interpolate samples linearly at given times; NaN outside, and next to a NaN sample.
 
-    The samples lie at ascending times `at`, s. At the time of a sample the value is the sample itself.
+    The samples are taken at ascending times `at`, s. At the time of a sample, the result equals the sample.
     """
     known, samples = np.asarray(at, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if known.size == 0:

@@ -5,11 +5,11 @@ will become available in the future."
 
 Two layouts of CSV tables are accepted, each with units in the heading, SI or any other:
 
-- one row for each sample: the columns ``rate [Hz],time [us],displacement [um]``, in any order;
-- one row for each time: ``time [us]``, then a column for each rate, such as ``500 Hz [um],1.2 kHz [um]``.
+- one row per sample: the columns ``rate [Hz],time [us],displacement [um]``, in any order; - one row per time:
+``time [us]``, then one column per rate, such as ``500 Hz [um],1.2 kHz [um]``.
 
-Times count from the first firing. Rows may come in any order, and every rate may have times of its own. An
-empty cell, or nan, is a gap.
+Times count from the first firing. Rows may be in any order, and each rate may have different times. An empty
+cell, or nan, is a gap.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _HEADINGS: Final = (
 
 
 class RateRecord(Declared):
-    """Samples at one rate."""
+    """Displacement samples of a measured map at one firing rate."""
 
     rate: float = scalar("Hz", "firing rate")
     times: FloatArray = column("s", "times from the first firing, ascending", "sample")
@@ -53,12 +53,12 @@ class RateRecord(Declared):
 
 
 def read_records(path: Path, columns: str | None = None) -> list[RateRecord]:
-    """Read the records of a table, by rising rate; `columns` as for `load_measured_map`.
+    """Read the displacement records of a CSV table, in ascending order of rate.
 
     Raises
     ------
     InputError
-        The file cannot be read, its heading fits neither layout, a cell is not a number, or a time is
+        The file cannot be read, its heading matches neither layout, a cell is not a number, or a time is
         repeated for one rate.
     """
     told = columns_of(path, columns)
@@ -74,9 +74,9 @@ def read_records(path: Path, columns: str | None = None) -> list[RateRecord]:
 def checked(
     what: str, rate: float, times: FloatArray, displacement: FloatArray, places: Sequence[str]
 ) -> RateRecord:
-    """Validate the samples of one rate, SI, in any order; return a record in ascending order of time.
+    """Validate the samples at one rate, SI, in any order; return a record in ascending order of time.
 
-    Messages name the file, `what`, and the origin of each sample, its entry in `places`.
+    Error messages name the file, `what`, and the line or row of a sample, from `places`.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def _one_column_a_rate(table: Table, names: list[str], told: Columns | None) -> 
 
 
 MOST_TIMES: Final = 8192
-"""Largest number of times of a common grid; beyond it the grid is made coarser. Arbitrary."""
+"""Largest number of times of a common grid; a finer grid is coarsened to this number. Arbitrary."""
 
 _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
 
@@ -158,33 +158,34 @@ _CLASSIC, _HDF5 = b"CDF", b"\x89HDF"
 def load_measured_map(
     path: str | Path, *, times: npt.ArrayLike | None = None, columns: str | None = None
 ) -> xr.Dataset:
-    """Read a measured map, in the layout of `printhammer.frequency_map`.
+    """Read a measured map from a file, in the layout of `printhammer.frequency_map`.
 
     Parameters
     ----------
     path : path
         A CSV file, see `printhammer.maps.measured`; or a NetCDF file or Zarr store with the variables `rate`,
-        `time` and `displacement`, each with its unit in the attribute `units`, any unit. There,
-        `displacement` lies over `rate` and one more dimension, and `time` over that one, or over both where
-        every rate has times of its own.
+        `time` and `displacement`, each with any unit in the attribute `units`. The dimensions of
+        `displacement` are `rate` and one more; those of `time` are the latter, or both if each rate has
+        different times.
     times : array, optional
         Times from the first firing, s, ascending, at which the records are interpolated linearly. By default
-        those of the samples if all rates share them; otherwise evenly spaced times, with the smallest sample
+        the sample times if all rates share them; otherwise evenly spaced times, with the smallest sample
         spacing of any record.
     columns : str, optional
         Declaration of the columns of a CSV file, such as "time=1, 500 Hz=2*50 um/V"; by default the
-        declaration in a file beside it, or else its heading; see `printhammer.support.tables.columns`.
+        declaration in a companion file, or else the heading of the table; see
+        `printhammer.support.tables.columns`.
 
     Returns
     -------
     xarray.Dataset
         `displacement` [m, float32] over `rate` [Hz] and `time` [s]; NaN in gaps, and before and after a
-        record. Dots are not included.
+        record. The Dataset contains no dots.
 
     Raises
     ------
     InputError
-        The file cannot be read or holds something else; the message names file, column and line.
+        The file cannot be read or its content is not a map; the message names file, column and line.
     """
     source = Path(path)
     stored = source.suffix.lower() == ".zarr" or _magic(source).startswith((_CLASSIC, _HDF5))

@@ -1,1 +1,1 @@
-"""Periodic orbits, stable or not, found as fixed points of the stroboscopic map."""
+"""Periodic orbits, stable or not: fixed points of the strobe map, found by Newton's method."""

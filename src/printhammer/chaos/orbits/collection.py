@@ -1,4 +1,4 @@
-"""Result of a search for periodic orbits, with estimates of the number of missing orbits."""
+"""Result of a search for periodic orbits, with estimates of how many orbits are missing."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ _STYLES: Final[dict[str, Style]] = {
 
 
 def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest: int) -> dict[int, int]:
-    """Compute the sums of the indices of the fixed points over 1, 2, ... firings.
+    """Compute the sums of the fixed-point indices of the strobe map over 1, 2, ... firings.
 
-    The index of a fixed point is the sign of det(I - M), M the derivative of the map over so many firings: -1
-    for a saddle with a multiplier beyond +1, else +1. If the map is continuous and maps a disc into itself,
-    the indices of all fixed points in it add up to 1 (S. Lefschetz, Trans. Am. Math. Soc. 28 (1926) 1).
-    `orbits` are pairs of firings and multipliers.
+    The index of a fixed point is the sign of det(I - M), with M the derivative of the map over that number of
+    firings: -1 for a saddle with a multiplier beyond +1, else +1. If the map is continuous and maps a disc
+    into itself, the indices of all fixed points in it add up to 1 (S. Lefschetz, Trans. Am. Math. Soc. 28
+    (1926) 1). `orbits` are pairs of the number of firings and the multipliers of an orbit.
     """
     sums = {}
     for count in range(1, longest + 1):
@@ -60,20 +60,20 @@ def index_sums(orbits: Sequence[tuple[int, npt.NDArray[np.complex128]]], longest
 
 
 def indices_add_up(regime: Regime) -> bool:
-    """Whether the indices of all orbits add up to 1: no pack, and a loss that bounds the motion."""
+    """Whether the fixed-point indices add up to 1: true without a pack, with damping or a backstop."""
     hammer = regime.hammer
     return hammer.pack is None and (hammer.damping is not None or hammer.backstop is not None)
 
 
 def energies_of(regime: Regime) -> list[str]:
-    """Return the names of the energies in a summary: the work of the drive, the losses of the hammer."""
+    """Return the names of the energies in a summary: work of the drive, losses of the hammer's components."""
     work = "drive_work" if regime.fired.quantity == "force" else "coil_work"
     damping = [] if regime.hammer.damping is None else ["damping_loss"]
     return [work, "pack_loss", "backstop_loss", *damping]
 
 
 class Orbits(Result):
-    """Periodic orbits found by a search, and the outcome of its guesses.
+    """Periodic orbits found by a search, and the outcome of its initial guesses.
 
     The list may be incomplete: further orbits may exist.
     """
@@ -94,7 +94,7 @@ class Orbits(Result):
         return f"periodic orbits of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def summary(self) -> Summary:
-        """Tabulate the orbits, a row each, and the outcome of the search."""
+        """Tabulate the orbits, one row per orbit, and the outcome of the search."""
         if not self.found:
             return Summary([self.message])
         columns = [
@@ -122,12 +122,12 @@ class Orbits(Result):
 
     @property
     def stable(self) -> tuple[Orbit, ...]:
-        """The stable orbits."""
+        """Stable orbits of the list, in its order."""
         return tuple(orbit for orbit in self.found if orbit.kind == STABLE)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of orbits of each kind."""
+        """Number of orbits by kind: stable, saddle, unstable, undecided."""
         counts = Counter(orbit.kind for orbit in self.found)
         return {kind: counts[kind] for kind in KINDS if counts[kind]}
 
@@ -135,29 +135,29 @@ class Orbits(Result):
     def coverage(self) -> float:
         """Estimated fraction of further converging guesses that lead to a known orbit; NaN without guesses.
 
-        Not a bound: orbits that no guess came near are not counted.
+        The estimate is not a bound: orbits near no guess are not counted.
 
-        Good-Turing estimate: 1 minus the fraction of guesses whose orbit no other guess led to (I. J. Good,
-        Biometrika 40 (1953) 237).
+        Good-Turing estimate: 1 minus the fraction of guesses that are the only one to converge to their orbit
+        (I. J. Good, Biometrika 40 (1953) 237).
         """
         return 1.0 - self.hits.count(1) / sum(self.hits) if self.hits else math.nan
 
     @property
     def unseen(self) -> float:
-        """Estimated lower bound of the number of orbits that are not in the list.
+        """Estimated lower bound of the number of orbits that the search has missed.
 
-        f1 (f1 - 1) / (2 (f2 + 1)), with f1 orbits that one guess led to and f2 that two guesses led to (A.
-        Chao, Scand. J. Statist. 11 (1984) 265). Orbits that no guess leads to are not estimated; but where
-        the indices do not add up, at least one for each of these numbers of firings.
+        The estimate is f1 (f1 - 1) / (2 (f2 + 1)), with f1 orbits reached from one guess and f2 orbits
+        reached from two guesses (A. Chao, Scand. J. Statist. 11 (1984) 265). The estimate is at least 1 for
+        every number of firings over which the indices do not add up to 1.
         """
         once, twice = self.hits.count(1), self.hits.count(2)
         return max(0.5 * once * max(once - 1, 0) / (twice + 1), float(len(self.incomplete)))
 
     @property
     def indices(self) -> dict[int, int]:
-        """Sums of the indices of the fixed points of the strobe map over 1, 2, ... firings.
+        """Sums of the indices of the fixed points of the strobe map, by number of firings from 1 on.
 
-        See `index_sums`. Empty if no theorem gives the sum.
+        See `index_sums`. Empty if no theorem states the sum.
         """
         if not indices_add_up(self.regime) or any(orbit.kind == UNDECIDED for orbit in self.found):
             return {}
@@ -170,7 +170,7 @@ class Orbits(Result):
 
     @property
     def message(self) -> str:
-        """Summary of the orbits and of the outcome of the guesses, in one line."""
+        """Summary of the orbits and of the outcome of the initial guesses, in one line."""
         what = ", ".join(f"{number} {kind}" for kind, number in self.counts.items())
         count = len(self.found)
         most = "1 firing" if self.longest == 1 else f"up to {self.longest} firings"
@@ -196,18 +196,18 @@ class Orbits(Result):
         return f"{head}{f' ({what})' if what else ''}; {tried}{': ' if ends else ''}{'; '.join(ends)}{sure}"
 
     def notes(self) -> dict[str, Any]:
-        """Return the outcome of the search, for the attributes of the Dataset."""
+        """Return the failures and the message of the search, for the attributes of the Dataset."""
         ends = "; ".join(f"{number}: {reason}" for reason, number in sorted(self.failures.items()))
         return {"failures": ends, "search": self.message}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the properties of the orbits over `orbit`, `firing` and `multiplier`.
+        """Return the Dataset variables: properties over `orbit`, `firing` and `multiplier`.
 
-        Beyond the last firing of an orbit numbers are NaN, and the mode is -1.
+        Numbers beyond the last firing of an orbit are NaN, and the mode there is -1.
         """
         number = Column("1", "number of the orbit", ("orbit",), "coordinate", name="orbit", dtype=np.int32)
         return {"orbit": (number, np.arange(len(self.found))), **stacked(self.found, "orbit", Orbit)}
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Convert the orbits to a table with a row for each firing of each orbit."""
+        """Convert the orbits to a table with one row per firing of each orbit."""
         return orbits_table(self.found, self.attributes)

@@ -1,4 +1,4 @@
-"""Initial guesses of periodic orbits: stretches of motions that nearly return to their starts.
+"""Initial guesses of periodic orbits: segments of motions that nearly return to their starts.
 
 Close returns of a recorded motion lie near unstable orbits (D. Auerbach et al., Phys. Rev. Lett. 58 (1987)
 2387). Here the record is one long train from rest, and many short motions from states spread evenly over the
@@ -24,27 +24,27 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 PHASES: Final = (0.0, 0.5)
-"""Phases of the sections at which orbits are sought; the second is for orbits in the pack at the first."""
+"""Phases of the sections at which orbits are sought; the second serves orbits in the pack at the first."""
 
 _ALIKE: Final = 0.02
-"""Distance, in half-widths, below which guesses are duplicates."""
+"""Distance, in half-widths of the strobe window, below which two guesses are duplicates."""
 _EARLY_ALIKE: Final = 0.1
-"""As `_ALIKE`, for guesses from the beginning of a record, which are to cover the plane."""
+"""Distance, in half-widths, below which two guesses from the first firings of motions are duplicates."""
 _LOOKED_AT: Final = 4000
-"""Number of returns, closest first, that are tested for duplicates."""
+"""Maximum number of close returns, closest first, that are tested for duplicates."""
 _EARLY: Final = 2
-"""Number of firings of a record that count as its beginning."""
+"""Number of first firings of a motion whose close returns count as early."""
 _LEAST: Final = 16
-"""Smallest number of firings for which a motion is followed."""
+"""Smallest number of firings over which a motion is recorded."""
 _ROOM: Final = 1.2  # Extent of the spread beyond the window, in its half-widths
 # Extent of the spread of an unbounded motion: a ball that bounces once a period rises 5 scales
 _SCALES: Final = 6.0
 _PLASTIC: Final = 1.324717957244746
-"""The real root of x^3 = x + 1, whose powers spread points evenly over a square."""
+"""Real root of x^3 = x + 1, whose inverse powers spread points evenly over a square."""
 
 
 class Records(Declared):
-    """States of many motions at the sections of one phase."""
+    """States of many motions at the sections of one phase, as a source of close returns."""
 
     states: FloatArray = part(
         "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run ended before"
@@ -53,21 +53,21 @@ class Records(Declared):
     begins: bool = part("whether the first record is the long one", default=True)
 
     def rows(self, begin: int, end: int) -> Records:
-        """Return the records with indices from `begin` to before `end`."""
+        """Return the records of the motions with indices from `begin` to before `end`."""
         return Records(self.states[begin:end], self.usable[begin:end], begins=not begin)
 
 
 def firings_for(period: int) -> int:
-    """Compute the number of firings for which motions are followed to find orbits of a period."""
+    """Compute the number of firings over which motions are recorded to find orbits of a period."""
     return max(2 * period, _LEAST)
 
 
 def record(
     regime: Regime, starts: FloatArray, firings: int, long: int, threads: int | None = None
 ) -> list[Records]:
-    """Follow a hammer from states at a firing, shape (M, 2); return the records at each of `PHASES`.
+    """Simulate motions from states at a firing, shape (M, 2); return their records at each of `PHASES`.
 
-    The motion from the first state is followed for `long` firings, the others for `firings`.
+    The motion from the first state lasts `long` firings, all other motions `firings` firings.
     """
     longest = max(firings, long) if len(starts) else 0
     drive, _ = regime.train(longest + 1)
@@ -96,11 +96,11 @@ def record(
 
 
 def spread(regime: Regime, count: int, visited: FloatArray) -> FloatArray:
-    """Spread states evenly: half of them over the window, half over the region that motions visit.
+    """Spread states evenly: half over the strobe window, half over the region visited by motions.
 
-    Where backstop and pack do not both bound the displacement, the region is at least six times the scales of
-    the motion, which then are the half-widths of the window: a ball that bounces once a period rises five of
-    them high. States are displacement, m, and velocity, m/s, a row each.
+    If backstop and pack do not both bound the displacement, the region extends over at least six half-widths
+    of the window on either side: a ball that bounces once per period rises to five half-widths. Each row is a
+    state: displacement, m, and velocity, m/s.
     """
     window = regime.window
     low, high = np.array([window.x[0], window.v[0]]), np.array([window.x[1], window.v[1]])
@@ -143,9 +143,9 @@ def first_state(regime: Regime) -> tuple[float, float]:
 def touches(regime: Regime, count: int) -> FloatArray:
     """Compute states at a firing of motions that have just left a rigid backstop, shape (count, 2).
 
-    Phases and speeds are spread evenly, low speeds more densely: near a chatter, where the bounces of an
-    armature accumulate, orbits are so dense that no even spread over the plane resolves them. If a run ends
-    before the firing, the rest state is returned.
+    Phases of the departure are spread evenly, speeds more densely at low values: near chatter, an
+    accumulation of ever lower bounces, orbits are so dense that no even spread over the plane resolves them.
+    If a run ends before the firing, the rest state replaces the state.
     """
     number = np.arange(1, count + 1)
     phases, shares = ((0.5 + number / _PLASTIC**k) % 1.0 for k in (1, 2))
@@ -162,12 +162,13 @@ def touches(regime: Regime, count: int) -> FloatArray:
 def close_returns(
     records: Records, period: int, most: int, scales: FloatArray, within: int
 ) -> tuple[list[Guess], list[Guess]]:
-    """Select the closest returns of records after `period` firings that are no duplicates.
+    """Select the closest returns of motions after `period` firings, without duplicates.
 
     Only the first `within` firings of the short records are used.
 
-    Half of `most` are the closest returns of all, half the closest returns that begin early; distances are in
-    the scales, the half-widths of the window. With a larger `most` both lists are extended.
+    Two lists are returned: the closest of all returns, and the closest of the returns that begin within the
+    first firings, each of at most half of `most`. Distances are divided by `scales`, the half-widths of the
+    strobe window. A larger `most` extends both lists.
     """
     scaled = records.states / scales
     count = scaled.shape[1] - period
@@ -204,10 +205,10 @@ def close_returns(
 def joined(
     shorter: Sequence[Guess], period: int, most: int, scales: FloatArray, known: Collection[tuple[int, int]]
 ) -> list[Guess]:
-    """Concatenate pairs of shorter orbits to guesses of `period` firings.
+    """Concatenate pairs of shorter orbits to initial guesses of `period` firings.
 
     At most `most` pairs are used, those with the smallest jumps between the orbits first; pairs of indices in
-    `known` are left out.
+    `known` are skipped.
     """
     guesses: list[tuple[float, Guess]] = []
     for k, orbit in enumerate(shorter):
@@ -224,7 +225,7 @@ def joined(
 
 
 def _is_new(cycle: FloatArray, kept: FloatArray, apart: float) -> bool:
-    """Whether a cycle differs from all others, up to a cyclic shift."""
+    """Whether a cycle of states differs from all known cycles by more than `apart`, up to a cyclic shift."""
     if not len(kept):
         return True
     return all(

@@ -10,7 +10,7 @@ each further point is the state whose image is a point of the known curve, found
 tangent flow (J. P. England, B. Krauskopf and H. M. Osinga, SIAM J. Appl. Dyn. Syst. 3 (2004) 161).
 
 Lengths are in half-widths of the strobe window. Limitation: a curve ends where the map is not differentiable
-or the state is invalid, as below a rigid backstop; its continuation beyond is not found.
+or the state is invalid, as behind a rigid backstop; its continuation beyond is not computed.
 """
 
 from __future__ import annotations
@@ -33,31 +33,31 @@ from printhammer.support.arrays import FloatArray, IntArray
 
 KINDS: Final = ("stable", "unstable")
 LENGTH: Final = 10.0
-"""Default length of each curve."""
+"""Default arc length of each manifold curve, in half-widths of the strobe window."""
 POINTS: Final = 4000
-"""Default maximum number of points of each curve."""
+"""Default maximum number of points of each manifold curve."""
 SPACING: Final = 0.02
-"""Default target distance of neighbouring points."""
+"""Default target distance of neighbouring points, in half-widths of the strobe window."""
 BEND: Final = 0.2
-"""Angle between neighbouring segments, rad, above which points are added."""
+"""Angle between neighbouring segments, rad, above which a point is inserted."""
 
 _NEAR: Final = 1e-5
-"""Distance from the saddle within which a manifold is straight."""
+"""Distance from the saddle, in half-widths, within which a manifold is treated as straight."""
 _FINEST: Final = 1e-3
-"""Fraction of the spacing below which a bend gets no more points."""
+"""Distance of points, as a fraction of the spacing, below which a bend gets no further point."""
 _TIGHT: Final = 1e-12
-"""Distance of points of a fundamental segment below which a gap of their images is a jump."""
+"""Smallest step along a fundamental segment; a larger gap of the images there is a jump of the map."""
 _SETTLED: Final = 0.1
-"""Extent of the image of a fundamental segment, as a fraction of the spacing, at which a sink is tested."""
+"""Extent of an image of a fundamental segment, relative to the spacing, below which a sink is sought."""
 _CLOSE: Final = 1e-10  # Relative residual at which Newton's method has converged
 _NEWTON: Final = 8  # Iteration limit of Newton's method
 _FEW: Final = 4  # Number of points from which the prediction is a cubic
 
 
 class Manifolds(Result, rows="point"):
-    """Stable and unstable manifolds of one saddle: curves from each of its states to both sides.
+    """Stable and unstable manifolds of a saddle: curves from each of its states to both sides.
 
-    A jump of the strobe map, where a contact happens at the section, appears as a row of NaN.
+    A jump of the strobe map, where a contact happens at the section, is represented by a row of NaN.
     """
 
     orbit: Orbit = part("the saddle")
@@ -80,12 +80,12 @@ class Manifolds(Result, rows="point"):
         return f"manifolds of the {self.orbit.name} of {self.orbit.regime.hammer.name}"
 
     def points(self, number: int) -> FloatArray:
-        """Return displacement, m, and velocity, m/s, along one of the curves, shape (n, 2)."""
+        """Return the points of one curve, by its number: displacement, m, and velocity, m/s, shape (n, 2)."""
         rows = self.curve == number
         return np.column_stack([self.x[rows], self.v[rows]])
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return points over `point`, and kind and end of each curve over `curves`."""
+        """Return the Dataset variables: states over `point`, kind and end of each curve over `curves`."""
         own = super().entries()
         ends = np.array(self.ends, "U16")
         own["end"] = Column("", "why the curve ends", ("curves",), name="end"), ends
@@ -108,7 +108,7 @@ def manifolds(
     Parameters
     ----------
     orbit : Orbit
-        A saddle, see `printhammer.orbits`.
+        A saddle, from `printhammer.orbits`.
     length : float, optional
         Arc length of each curve, in half-widths of the strobe window.
     points : int, optional
@@ -121,12 +121,12 @@ def manifolds(
     Returns
     -------
     Manifolds
-        For an orbit of n firings 2 n curves of each kind.
+        Manifolds with 2 n curves of each kind for an orbit of n firings.
 
     Raises
     ------
     InputError
-        The orbit is not a saddle with a derivative, or an argument is not as described above.
+        The orbit is not a saddle with known multipliers, or an argument is not as described above.
     """
     if not orbit.ok or orbit.kind != SADDLE:
         raise InputError(
@@ -171,28 +171,28 @@ class _Limits:
 
 @dataclass
 class _Curve:
-    """A curve starting at a saddle, in half-widths of the window."""
+    """Points of a manifold curve, starting at the saddle, and the reason for the end of the curve."""
 
     points: FloatArray
     end: str
 
 
 class Scaled:
-    """The strobe map and its derivative, in half-widths of the window."""
+    """Strobe map and its derivative, with states in half-widths of the strobe window."""
 
     def __init__(self, regime: Regime, tolerance: float) -> None:
         self.maps, self.scales = ExactMaps(regime, Effort(tolerance, threads=1)), regime.window.half_widths
 
     def inward(self, states: FloatArray) -> FloatArray:
-        """Convert states, m and m/s, to half-widths."""
+        """Convert states, m and m/s, to half-widths of the strobe window."""
         return np.asarray(states / self.scales)
 
     def outward(self, points: FloatArray) -> FloatArray:
-        """Convert points in half-widths to states, m and m/s."""
+        """Convert states in half-widths of the strobe window to m and m/s."""
         return np.asarray(points * self.scales)
 
     def image(self, point: FloatArray, firings: int) -> tuple[FloatArray, FloatArray]:
-        """Compute the image of a point and the derivative; NaN if the run fails."""
+        """Compute the image of a scaled state and the derivative there; NaN if the run fails."""
         images = self.maps(self.outward(point)[np.newaxis], np.array([firings]))
         if images.reasons[0] != CLOSED:
             return np.full(2, np.nan), np.full((2, 2), np.nan)
@@ -201,9 +201,10 @@ class Scaled:
 
 
 def _direction(own: Scaled, saddle: FloatArray, firings: int, stable: bool) -> tuple[FloatArray, float, int]:
-    """Return the eigenvector at a saddle, its factor over a number of firings, and that number.
+    """Return the eigenvector at a saddle, its growth factor per step, and the firings of a step.
 
-    With a negative multiplier a state changes sides, so that one step is two periods of the orbit.
+    If the multiplier is negative, images alternate between the sides of the saddle, so that one step is two
+    periods.
     """
     _, jacobian = own.image(saddle, firings)
     # The smaller eigenvalue would be lost in the rounding of the trace.
@@ -263,7 +264,7 @@ def _unstable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits
 
 
 def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> FloatArray | None:
-    """Find the stable fixed point within the spacing from a point by Newton's method; None if not found."""
+    """Find the stable fixed point within one spacing of a point by Newton's method; None if not found."""
     guess = point
     for _ in range(_NEWTON):
         image, jacobian = own.image(guess, firings)
@@ -279,7 +280,7 @@ def _sink(own: Scaled, point: FloatArray, firings: int, spacing: float) -> Float
 
 
 def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
-    """Whether a curve needs a point after its k-th point."""
+    """Whether a point has to be inserted after the k-th point of a curve."""
     here, there = row[k], row[k + 1]
     step = float(np.hypot(*(there - here)))
     if not math.isfinite(step):
@@ -294,7 +295,7 @@ def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
 
 
 def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: _Limits) -> _Curve:
-    """Continue a stable manifold: each point is the state whose image lies on the known curve."""
+    """Continue a stable manifold: each new point is the state whose image lies on the known curve."""
     vector, shrink, firings = _direction(own, saddle, firings, stable=True)
     made = _Inward(saddle, side * _NEAR * vector, shrink)
     place, step, total = 1.0, 0.05, 0.0
@@ -333,9 +334,9 @@ def _stable(own: Scaled, saddle: FloatArray, side: float, firings: int, limits: 
 
 @dataclass
 class _Inward:
-    """Known section of a stable manifold, parametrised so that a preimage is 1 further along.
+    """Known part of a stable manifold, parametrised so that a preimage is 1 further along.
 
-    Up to the parameter 1 it is straight.
+    Up to the parameter 1 the curve is treated as straight.
     """
 
     saddle: FloatArray
@@ -350,13 +351,13 @@ class _Inward:
         self.places.append(1.0)
 
     def ahead(self, step: float) -> FloatArray:
-        """Extrapolate the curve linearly a step beyond its last parameter."""
+        """Extrapolate the curve along its last direction from the saddle, a step beyond its end."""
         return np.asarray(self.saddle + (self.points[-1] - self.saddle) * self.shrink**-step)
 
     def at(self, place: float) -> FloatArray:
         """Interpolate the point at a parameter: beyond 1 by the cubic through four neighbours.
 
-        Interpolated are distances from the saddle, divided by the distances of the linear map.
+        The interpolated quantity is the offset from the saddle, divided by the offset under the linear map.
         """
         if place <= 1.0:
             return np.asarray(self.saddle + self.shrink ** (1.0 - place) * self.reach)
@@ -374,7 +375,7 @@ class _Inward:
 def _preimage(
     own: Scaled, wanted: FloatArray, guess: FloatArray, firings: int, spacing: float
 ) -> FloatArray | None:
-    """Find the preimage of a point near a guess by Newton's method; None if not found."""
+    """Find the preimage of a point, close to a guess, by Newton's method; None if not found."""
     point = guess
     for _ in range(_NEWTON):
         image, jacobian = own.image(point, firings)
@@ -391,12 +392,12 @@ def _preimage(
 
 
 def _angle(one: FloatArray, other: FloatArray) -> float:
-    """Compute the angle between two directions, rad."""
+    """Compute the angle between two vectors of the plane, rad."""
     across = one[0] * other[1] - one[1] * other[0]
     return abs(math.atan2(across, float(one @ other)))
 
 
 def _along(points: FloatArray) -> FloatArray:
-    """Compute the arc length along a curve at its points; a jump has length 0."""
+    """Compute the arc length along a curve at each of its points; a jump adds no length."""
     steps = np.nan_to_num(np.hypot(*np.diff(points, axis=0).T))
     return np.concatenate([[0.0], np.cumsum(steps)])

@@ -4,10 +4,10 @@ On an unstable orbit an error of the state grows exponentially with the number o
 the states at the starts of several segments, and the end of each segment has to be the start of the next
 (multiple shooting; H. B. Keller, Numerical Methods for Two-Point Boundary-Value Problems, Blaisdell 1968).
 
-Images of many states under the strobe map are computed in two ways: exactly, with the tangent flow, or fast,
-as an ensemble.
+Images of many states under the strobe map are computed by either of two methods: exactly, with the tangent
+flow, or fast, as an ensemble.
 
-The fast way integrates three neighbours of each state, and takes the derivative from their differences,
+The fast method integrates each state and two neighbours, and approximates the derivative by differences,
 accurate enough for the first iterations of Newton's method.
 """
 
@@ -37,7 +37,7 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import BoolArray, FloatArray, IntArray, TextArray
 
 CLOSED: Final = ""
-"""Status of an orbit that closes; otherwise the status is the reason why it does not."""
+"""Status of a closed orbit (empty); any other status is the reason why the orbit does not close."""
 
 STUCK: Final = "comes no closer"
 TOO_LONG: Final = "too many iterations"
@@ -45,12 +45,12 @@ SINGULAR: Final = "singular derivative"
 
 _LONGEST_STEP: Final = 1.0
 _LEAST_SHARE: Final = 2.0**-7
-"""Longest step, in half-widths of the window, and smallest step fraction of the damping."""
+"""Longest Newton step, in half-widths of the strobe window; smallest damping factor of a step."""
 
 
 @dataclass(frozen=True)
 class Images:
-    """Images of many states, a row each: states, derivatives, differentiability, reasons of failure."""
+    """Images of many states, one per row: states, derivatives, differentiability, reasons of failure."""
 
     states: FloatArray
     jacobians: FloatArray
@@ -59,7 +59,7 @@ class Images:
 
     @classmethod
     def empty(cls, count: int) -> Images:
-        """Return images that have not been computed yet."""
+        """Return a table of images filled with NaN, to be computed."""
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, 2, 2), np.nan),
@@ -69,21 +69,21 @@ class Images:
 
 
 class StrobeMaps(Protocol):
-    """Computes the images of states, shape (n, 2), each after its own number of firings, shape (n,)."""
+    """Interface that computes the images of states, (n, 2), each after its own number of firings, (n,)."""
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Compute the images."""
+        """Compute the images of states under the strobe map, with derivatives."""
 
 
 class Guess(Declared):
-    """A stretch of a motion that nearly closes."""
+    """Initial guess of a periodic orbit: states at the starts of segments that nearly close."""
 
     states: FloatArray = part("states at the starts of the segments, shape (m, 2)")
     firings: IntArray = part("number of firings in each segment, shape (m,)")
 
 
 class Closing(Guess):
-    """Result of Newton's method for one guess."""
+    """Outcome of Newton's method for one initial guess: a closed orbit, or the reason for failure."""
 
     jacobians: FloatArray = part("derivative of the end of each segment by its start, shape (m, 2, 2)")
     residual: float = part("largest distance of an end from the next start, in half-widths of the window")
@@ -92,7 +92,7 @@ class Closing(Guess):
 
     @property
     def closed(self) -> bool:
-        """Whether the orbit closes."""
+        """Whether Newton's method closed the orbit."""
         return self.reason == CLOSED
 
 
@@ -106,12 +106,12 @@ def close_orbits(
     enough: float,
     iterations: int,
 ) -> list[Closing]:
-    """Converge guesses of orbits, with equal numbers of segments, by damped Newton's method.
+    """Converge initial guesses of orbits, with equal numbers of segments, by damped Newton's method.
 
     Guesses are states at the starts of the segments, shape (n, m, 2), with numbers of firings, shape (n, m);
-    the scales are the half-widths of the window, m and m/s. In units of these, iteration stops at the
-    residual `goal`, and a residual of `enough` is accepted if it gets no smaller; `iterations` is the maximum
-    number of evaluations of each orbit.
+    the scales are the half-widths of the window, m and m/s. In units of the scales, the iteration stops at
+    the residual `goal`; a residual of `enough` is accepted if it stops decreasing. `iterations` is the
+    maximum number of steps tried per orbit.
     """
     search = _Search(maps, guesses, firings, scales)
     for _ in range(iterations):
@@ -122,7 +122,7 @@ def close_orbits(
 
 
 class _Search:
-    """State of Newton's method for many guesses; all distances in half-widths."""
+    """State of Newton's method for many initial guesses at once; distances in half-widths of the window."""
 
     def __init__(self, maps: StrobeMaps, guesses: FloatArray, firings: IntArray, scales: FloatArray) -> None:
         count, self.segments = guesses.shape[:2]
@@ -141,7 +141,7 @@ class _Search:
         self.open &= np.isfinite(self.residual)
 
     def step(self, goal: float, enough: float) -> IntArray:
-        """Try one step of every open orbit; return the indices of these orbits."""
+        """Try one damped step of every orbit that is still open; return the indices of these orbits."""
         self._end(self.open & (self.residual <= goal), CLOSED)
         rows = np.flatnonzero(self.open)
         if not rows.size:
@@ -164,7 +164,7 @@ class _Search:
         return rows
 
     def result(self, enough: float) -> list[Closing]:
-        """Return the outcome of every initial guess."""
+        """Return the outcome of every initial guess, in input order."""
         self._end(self.open & (self.residual <= enough), CLOSED)
         return [
             Closing(
@@ -183,7 +183,7 @@ class _Search:
         self.open[rows] = False
 
     def _evaluate(self, z: FloatArray, rows: IntArray) -> tuple[Images, FloatArray, FloatArray, TextArray]:
-        """Compute the images of all starts, the gaps to the following starts, their norms, and reasons."""
+        """Compute images of all segment starts, gaps to the following starts, their norms, and failures."""
         images = self.maps((z * self.scales).reshape(-1, 2), self.firings[rows].reshape(-1))
         ends = images.states.reshape(z.shape) / self.scales
         defects = ends - np.roll(z, -1, axis=1)
@@ -202,7 +202,7 @@ class _Search:
         reasons: TextArray,
         which: BoolArray | None = None,
     ) -> None:
-        """Accept the values at the new points, and compute the next steps."""
+        """Store the values at accepted points, and compute the next full steps."""
         chosen = np.ones(len(residual), np.bool_) if which is None else which
         shape = (len(residual), self.segments, 2, 2)
         jacobians = images.jacobians.reshape(shape) * self.scales / self.scales[:, np.newaxis]
@@ -235,19 +235,19 @@ class _Search:
 
 
 _SPACING: Final = 1e-5
-"""Finite-difference step, in half-widths of the window."""
+"""Finite-difference step of a state, in half-widths of the strobe window."""
 _PIECE: Final = 30_000
 """Maximum number of states integrated in one batch, which bounds the memory."""
 
 
 class ExactMaps:
-    """Images with derivatives from the tangent flow, one at a time in threads."""
+    """Exact images: one state at a time, in threads, with derivatives from the tangent flow."""
 
     def __init__(self, regime: Regime, effort: Effort) -> None:
         self.regime, self.effort = regime, effort.quiet
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Compute the images of states, each after its own number of firings."""
+        """Compute the exact images of states, each after its own number of firings."""
 
         def image(i: int) -> Image:
             return image_of(self.regime, states[i], int(firings[i]), self.effort.tolerance, contacts=False)
@@ -260,7 +260,7 @@ class ExactMaps:
 
 
 class FastMaps:
-    """Images after `longest` firings at most with derivatives from differences, in an ensemble."""
+    """Fast images, after at most `longest` firings: an ensemble, with derivatives from differences."""
 
     def __init__(self, regime: Regime, longest: int, effort: Effort) -> None:
         regime.check_planar()
@@ -270,7 +270,7 @@ class FastMaps:
         self.scales = regime.window.half_widths
 
     def __call__(self, states: FloatArray, firings: IntArray) -> Images:
-        """Compute the images of states, each after its own number of firings."""
+        """Compute the images of states as an ensemble, each after its own number of firings."""
         images = Images.empty(len(states))
         step, hammer = _SPACING * self.scales, self.regime.hammer
         neighbours = states[:, np.newaxis] + np.array([[0.0, 0.0], [step[0], 0.0], [0.0, step[1]]])

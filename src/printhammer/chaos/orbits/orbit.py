@@ -38,8 +38,10 @@ NEUTRAL: Final = 1e-6
 """Distance of the absolute value of a multiplier from 1 within which stability is undecided."""
 
 CLOSES: Final = 1e-6
-"""Largest distance from itself after a whole period, in half-widths of the window and units of the larger
-multiplier if that is more than 1, with which an orbit counts as one."""
+"""Largest closing error of a valid orbit, in half-widths of the strobe window.
+
+If the larger multiplier exceeds 1 in absolute value, the limit is multiplied by it.
+"""
 
 _OK: Final = "ok"
 _KIND: Final = Column(
@@ -60,10 +62,10 @@ _POINTS: Final = 2001  # Number of points of the motion's time grid
 
 
 class Orbit(Result):
-    """A periodic motion of a hammer under a periodic drive.
+    """Periodic orbit of a hammer under a periodic drive, with its multipliers, contacts and dots.
 
-    Its Floquet multipliers are the eigenvalues of the monodromy matrix, the derivative of the state after a
-    period of the orbit with respect to the initial state.
+    Its Floquet multipliers are the eigenvalues of the monodromy matrix, which is the derivative of the state
+    after one period of the orbit with respect to the initial state.
     """
 
     regime: Regime = part("hammer, periodic drive, and phase of the section at which the orbit was found")
@@ -128,7 +130,7 @@ class Orbit(Result):
 
     @property
     def ok(self) -> bool:
-        """Whether the orbit exists: Newton's method converged."""
+        """Whether the orbit exists, i.e. Newton's method converged."""
         return self.status == _OK
 
     @property
@@ -140,15 +142,15 @@ class Orbit(Result):
     @property
     @derived("s", "time after which the motion repeats", kind="column")
     def period(self) -> float:
-        """Time after which the motion repeats, s."""
+        """Period of the orbit, s: its number of firings times the drive period."""
         return self.firings * self.regime.period
 
     @property
     def kind(self) -> str:
-        """Fate of small perturbations of the state.
+        """Stability of the orbit: the fate of small perturbations of the state.
 
         "stable": all decay; "saddle": some grow and others decay; "unstable": all grow; "undecided": a
-        multiplier lies within 1e-6 of the unit circle, or the motion has no derivative.
+        multiplier is within 1e-6 of the unit circle, or the motion has no derivative.
         """
         sizes = np.abs(self.multipliers)
         if not np.isfinite(sizes).all() or (np.abs(sizes - 1.0) <= NEUTRAL).any():
@@ -163,31 +165,31 @@ class Orbit(Result):
     @property
     @derived("1", "backstop contacts in a period of the orbit", kind="column", dtype=np.int32)
     def backstop_contacts(self) -> int:
-        """Number of backstop contacts in a period of the orbit."""
+        """Number of backstop contacts in one period of the orbit."""
         return sum(contact.surface == "backstop" for contact in self.contacts)
 
     @property
     @derived("1", "pack contacts in a period of the orbit", kind="column", dtype=np.int32)
     def pack_contacts(self) -> int:
-        """Number of pack contacts in a period of the orbit."""
+        """Number of pack contacts in one period of the orbit."""
         return sum(contact.surface == "pack" for contact in self.contacts)
 
     @property
     @derived("1", "dots that the firings of a period make", kind="column", dtype=np.int32)
     def printed(self) -> int:
-        """Number of dots that the firings of a period print."""
+        """Number of dots printed in one period of the orbit."""
         return sum(dot.struck for dot in self.dots)
 
     @property
     @derived("1", "firings of a period that make no dot", kind="column", dtype=np.int32)
     def lost(self) -> int:
-        """Number of firings of a period that print no dot."""
+        """Number of firings in one period of the orbit that print no dot."""
         return len(self.dots) - self.printed
 
     @property
     @derived("s", "from the firing to the touch of the pack", "firing", name="flight_time")
     def flight_times(self) -> FloatArray:
-        """Time from each firing to its dot, s; NaN for a lost dot."""
+        """Flight time of the dot of each firing, s; NaN for a lost dot."""
         return _numbers(dot.flight_time for dot in self.dots)
 
     @property
@@ -198,7 +200,7 @@ class Orbit(Result):
 
     @property
     def name(self) -> str:
-        """Short name, such as "period-2 saddle"."""
+        """Short name of the orbit, such as "period-2 saddle"."""
         return f"period-{self.firings} {self.kind}" if self.ok else f"no period-{self.firings} orbit"
 
     @property
@@ -207,7 +209,7 @@ class Orbit(Result):
         return {**super().provenance, "period": self.regime.period}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return states over `firing`, multipliers over `multiplier`, and scalars of the whole orbit."""
+        """Return the Dataset variables: states over `firing`, multipliers, and scalars of the orbit."""
         own = super().entries()
         # Under a continuous periodic force there are firings but no dots.
         for name in ("flight_time", "peak_force"):
@@ -228,13 +230,14 @@ class Orbit(Result):
         return own
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Convert the orbit to a table with a row for each firing; values of the whole orbit repeat."""
+        """Convert the orbit to a table with one row per firing; values of the whole orbit are repeated."""
         return orbits_table([self], self.attributes)
 
     def motion(self) -> Motion:
-        """Re-integrate one period of the orbit from its section.
+        """Integrate one period of the orbit again, from its section, as a `Motion`.
 
-        The motion begins `phase` periods after a firing of a train that has fired before, so not at time 0.
+        The motion begins `phase` periods after a firing, within a train that has been fired before; its start
+        time is therefore not 0.
 
         Raises
         ------
@@ -247,7 +250,7 @@ class Orbit(Result):
 
 
 def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orbit:
-    """Return the result for an orbit that was not found, with the reason."""
+    """Build the result for an orbit that was not found, with the reason as its status."""
     none = np.full(firings, np.nan)
     return Orbit(
         regime=regime,
@@ -270,7 +273,7 @@ def no_orbit(regime: Regime, firings: int, tolerance: float, status: str) -> Orb
 
 
 def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
-    """Compute the properties of a converged orbit, or return the reason for its failure."""
+    """Compute the properties of a converged orbit; with a failure, return a result without numbers."""
     firings = int(closing.firings.sum())
     if not closing.closed:
         return no_orbit(regime, firings, tolerance, closing.reason)
@@ -310,10 +313,11 @@ def orbit_of(regime: Regime, closing: Closing, tolerance: float) -> Orbit:
 
 
 def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
-    """Compute the eigenvalues of a product of matrices, shape (m, 2, 2), the last factor on the left.
+    """Compute the multipliers: eigenvalues of a product of matrices, (m, 2, 2), the last factor on the left.
 
-    Trace and determinant are used, the latter as the product of the factors' determinants, since the small
-    eigenvalue of a strong contraction would be lost in the rounding of the product.
+    The eigenvalues are computed from trace and determinant, and the determinant as the product of the
+    factors' determinants, since the rounding of the matrix product would destroy the small eigenvalue of a
+    strong contraction.
     """
     product = np.eye(2)
     for factor in jacobians:
@@ -329,7 +333,7 @@ def multipliers_of(jacobians: FloatArray) -> npt.NDArray[np.complex128]:
 
 
 class _Run:
-    """A run of several drive periods from a section on, in a train that has fired before."""
+    """Run over several drive periods, from a section, within a train that has been fired before."""
 
     def __init__(self, regime: Regime, start: FloatArray, periods: int, tolerance: float) -> None:
         self.regime, self.periods = regime, periods
@@ -341,15 +345,15 @@ class _Run:
 
     @property
     def motion(self) -> Motion:
-        """Motion along the orbit, on its own time grid."""
+        """Motion along the orbit, sampled on a uniform time grid."""
         end = float(self.sections[-1])
         times = np.linspace(float(self.sections[0]), float(self.record.nodes[-1, 0]), _POINTS)
         return Motion(self.problem, self.record, end, times, "default")
 
     def at_firings(self) -> FloatArray:
-        """Return displacement, velocity, mode and memory at as many firings as there are periods.
+        """Return displacement, velocity, mode and memory at the firing of each period, one row per period.
 
-        The first firing is the last one before the section, or at it.
+        The first row belongs to the last firing at or before the section.
         """
         firings = self.regime.moments(self.train, self.periods, 0.0)
         marks = firings[:-1] if self.regime.phase == 0.0 else firings[1:]
@@ -361,7 +365,7 @@ class _Run:
 def _contacts_and_dots(
     regime: Regime, start: FloatArray, firings: int, tolerance: float
 ) -> tuple[Rows[Contact], Rows[Dot]]:
-    """Return the contacts and dots that begin in one period of an orbit; the run continues until they end."""
+    """Return the contacts and dots that begin in one period of an orbit; the run lasts until they end."""
     skipped = 0 if regime.phase == 0.0 or regime.drive is not None else 1
     run = _Run(regime, start, firings + skipped + 1, tolerance)
     motion, period = run.motion, firings * regime.period
@@ -399,7 +403,7 @@ def _numbers(values: Iterable[float | None]) -> FloatArray:
 
 
 def orbits_table(orbits: Sequence[Orbit], attributes: Mapping[str, Any]) -> pd.DataFrame:
-    """Convert orbits to a table with a row for each firing of each orbit."""
+    """Convert orbits to a table with one row per firing of each orbit."""
     import pandas as pd
 
     tables = []

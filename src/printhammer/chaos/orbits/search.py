@@ -1,4 +1,4 @@
-"""Search for periodic orbits, stable and unstable: close returns of motions, converged by Newton's method."""
+"""Search for periodic orbits, stable or not: close returns of motions, converged by Newton's method."""
 
 from __future__ import annotations
 
@@ -21,14 +21,13 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.collection import Orbits
 
 LONGEST: Final = 8
-"""Default of the largest orbit period to search for, in firings."""
+"""Default largest orbit period to search for, in firings."""
 
 MOST_FIRINGS: Final = 64  # Largest orbit period that can be searched for, in firings
 STARTS: Final = 1024
 GUESSES: Final = 48
 FOLLOW: Final = 2
-"""Number of states from which motions are followed, of guesses for each number of firings, and firings of the
-orbits through which branches are followed."""
+"""Defaults of `orbits`: numbers of starts and of guesses, and largest period of followed branches."""
 
 
 @computation
@@ -44,8 +43,8 @@ def orbits(
 ) -> Orbits:
     """Search for the periodic orbits of a hammer under a periodic drive, stable and unstable.
 
-    Motions from rest and from states spread over the plane are followed; each close return after a number of
-    firings is an initial guess for Newton's method on the strobe map. The search is deterministic, for any
+    Motions are simulated from rest and from states spread over the plane; each close return after a number of
+    firings is an initial guess for Newton's method on the strobe map. The result does not depend on the
     number of threads.
 
     Parameters
@@ -55,21 +54,22 @@ def orbits(
     longest : int, optional
         Largest orbit period to search for, in firings, at most 64.
     starts : int, optional
-        Number of states, beside the rest state, from which motions are followed, rounded up to 128, 1024,
-        2048, 4096 and so on. A search with more starts or guesses finds all orbits of a search with fewer.
+        Number of states, in addition to the rest state, from which motions are simulated, rounded up to 128,
+        1024, 2048, 4096 and so on. A search with more starts or guesses finds all orbits of a search with
+        fewer.
     guesses : int, optional
-        Number of guesses for each number of firings in each block of starts, rounded up to 8, 48, 96 and so
-        on; eight times as many for 1, four times for 2, and twice for 3 and 4. Further guesses are
-        concatenations of known shorter orbits.
+        Number of guesses per number of firings in each block of starts, rounded up to 8, 48, 96 and so on; it
+        is multiplied by eight for 1 firing, by four for 2 firings, and by two for 3 and 4 firings. Further
+        guesses are concatenations of known shorter orbits.
     follow : int, optional
         Largest period, in firings, of the orbits whose branches are followed over 5 % of the drive period on
-        either side; where a branch returns to the period of the drive there are further orbits. 0 for no
+        either side; where a branch returns to the period of the drive, a further orbit exists. 0 follows no
         branches.
 
     Returns
     -------
     Orbits
-        Orbits, with the outcome of the guesses; a search that finds no orbit is not an exception.
+        Orbits, with the outcome of the guesses; a search that finds no orbit raises no exception.
     """
     regime = Regime.of_firing(hammer, firing)
     most, several = read_count(longest, "longest"), read_count(guesses, "guesses")
@@ -90,7 +90,7 @@ def orbit(
     effort: Effort = MAP_EFFORT,
     **_keywords: Unpack[InThreads],
 ) -> Orbit:
-    """Find the periodic orbit near a strobe point.
+    """Find the periodic orbit near a state at a section, by Newton's method.
 
     Parameters
     ----------
@@ -101,14 +101,14 @@ def orbit(
     firings : int, optional
         Period of the orbit, in firings.
     phase : float, optional
-        Phase of the section, by default that of the regime. At this phase the armature must not be on its way
-        out of the pack, where the state includes a memory.
+        Phase of the section, by default that of the regime. At this phase the armature must not be moving out
+        of the pack, since its state would then include a memory.
 
     Returns
     -------
     Orbit
-        The orbit, of fewer firings if the motion repeats after a divisor of `firings`. Has a status: an orbit
-        that is not found is not an exception.
+        The orbit, of fewer firings if the motion repeats after a divisor of `firings`. The status reports an
+        orbit that is not found; no exception is raised.
     """
     regime, count = Regime.of(regime, phase=phase), read_count(firings, "firings")
     states = [read_state(state)]

@@ -3,14 +3,14 @@
 States that agree q firings apart do not prove a period q. Near a period doubling the states alternate about
 an orbit that they approach with a multiplier close to -1: states two firings apart agree long before states
 one firing apart do. Near an unstable orbit, and near the birth of a stable one, states move so slowly that
-they seem stationary. So the states alone show a period q only if
+they seem stationary. Therefore the states alone prove a period q only if
 
 - states q firings apart agree as closely as the noise of the runs allows, and
-- states q / p firings apart are well apart, for all primes p that divide q, and their distance does not
-  shrink any more; cycles due to the steps of the integrator, which follow the state, are far smaller.
+- states q / p firings apart are well apart, for all primes p that divide q, and their distance no longer
+  shrinks; cycles caused by the adaptive steps of the integrator are far smaller.
 
 Otherwise the period is the smallest divisor d of q for which Newton's method finds a stable orbit of d
-firings close to the states, which these approach.
+firings close to the states that the states approach.
 """
 
 from __future__ import annotations
@@ -28,27 +28,27 @@ from printhammer.run.regime import Regime
 from printhammer.support.arrays import BoolArray, FloatArray
 
 AGREES: Final = 1e-8
-"""Distance of states, in half-widths of the window, at which agreement is complete."""
+"""Distance of states, in half-widths of the strobe window, below which they agree completely."""
 
 DISTINCT: Final = 1e-3
-"""Distance, in half-widths, above which states differ beyond the noise of any run."""
+"""Distance of states, in half-widths of the strobe window, above which they differ by more than noise."""
 
 LIES_ON: Final = 1e-6
-"""Distance from a stable orbit, in half-widths, within which states lie on it up to noise."""
+"""Distance from a stable orbit, in half-widths, within which a state lies on the orbit up to noise."""
 
 NEAR: Final = 0.1
-"""Distance, in half-widths, within which an orbit of fewer firings is sought."""
+"""Distance from the states, in half-widths, within which an orbit of fewer firings is sought."""
 
 _SHRINKS: Final = 1e-5
 _NOISE: Final = 1e-9
-"""Relative and absolute decrease of a distance that counts as shrinking, the latter in half-widths."""
+"""Smallest decreases of a distance that count as shrinking: relative, and absolute in half-widths."""
 _ITERATIONS: Final = 20  # Iteration limit of Newton's method
 
 NO_ORBIT: Final = "Newton's method finds no stable orbit of {} there that the states approach"
 
 
 class Settled(Declared):
-    """Orbit to which a motion has settled."""
+    """Orbit to which a motion has settled, or the reason why it is undecided."""
 
     period: int | None = part("firings after which the orbit repeats; None if undecided")
     states: FloatArray = part("displacement, m, and velocity, m/s, at its firings, shape (period, 2)")
@@ -60,7 +60,7 @@ class Settled(Declared):
 
 
 def shown(points: FloatArray, period: int) -> BoolArray:
-    """Mask of the motions whose states alone show the period, all agreeing `period` firings apart.
+    """Mask of the motions whose states, which agree `period` firings apart, alone prove the period.
 
     Points, shape (n, m, k), are the states at m successive firings, divided by the scales.
     """
@@ -72,12 +72,12 @@ def shown(points: FloatArray, period: int) -> BoolArray:
 
 
 def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray) -> Settled:
-    """Find the orbit to which one motion has settled, whose states agree `period` firings apart.
+    """Determine the orbit to which a motion has settled whose states agree `period` firings apart.
 
     Points, shape (m, k), are displacement, m, velocity, m/s, and further components of the state, at
-    successive sections; the scales, shape (k,), the half-widths of the window. If no derivative exists,
-    because a section falls into the pack or on a touch without velocity, or a current flows there, the states
-    alone decide.
+    successive sections; the scales, shape (k,), are the half-widths of the strobe window. If the strobe map
+    has no derivative, because a section falls into the pack or on a touch without velocity, or because a
+    current flows at the section, the states alone decide.
     """
     scaled = (points / scales)[np.newaxis]
     plane, states = scales[:2], points[:, :2]
@@ -110,9 +110,10 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
 def is_approaching(
     points: FloatArray, orbit: FloatArray, within: float = NEAR, lies_on: float = LIES_ON
 ) -> bool:
-    """Whether states, shape (m, 2), approach the states of an orbit in its order, or lie on it.
+    """Whether states, shape (m, 2), lie on an orbit or approach it, in its order.
 
-    False if they come to rest beside the orbit: then their steps shrink, but their distance from it does not.
+    False if the states converge to a point beside the orbit: their steps then shrink, but their distance from
+    the orbit does not.
     """
     count = len(orbit)
     whole = points[len(points) % count :].reshape(-1, count, 2)
@@ -126,15 +127,16 @@ def is_approaching(
 
 
 def noise_about(multiplier: float) -> float:
-    """Compute the distance from an orbit, in half-widths, that the noise of runs allows.
+    """Compute the distance from a stable orbit, in half-widths, that noise of the runs can cause.
 
-    The smaller the largest multiplier, the further away is the boundary of the basin.
+    The allowed distance grows as the largest multiplier falls, since the boundary of the basin is then
+    further away.
     """
     return max(LIES_ON, DISTINCT * (1.0 - multiplier))
 
 
 def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
-    """Find the orbit as `settled` does, without derivatives."""
+    """Determine the orbit from the states alone, without derivatives of the strobe map."""
     early, late = _apart(scaled, period, period)
     shrinking = [bool(_shrinking(scaled, d, period)[0]) for d in _largest_divisors(period)]
     if late[0] > max(AGREES, early[0]) or any(shrinking):
@@ -144,7 +146,7 @@ def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
 
 
 def _apart(points: FloatArray, count: int, period: int) -> tuple[FloatArray, FloatArray]:
-    """Compute mean distances of states `count` firings apart, early and late, over whole periods."""
+    """Compute the mean distance of states `count` firings apart, at the beginning and at the end."""
     apart = np.abs(points[:, count:] - points[:, :-count]).max(axis=2)
     part = period * max(apart.shape[1] // (4 * period), 1)
     return apart[:, :part].mean(axis=1), apart[:, -part:].mean(axis=1)
@@ -156,7 +158,7 @@ def _shrinking(points: FloatArray, count: int, period: int) -> BoolArray:
 
 
 def _largest_divisors(period: int) -> list[int]:
-    """Return the maximal proper divisors of a number."""
+    """Return the largest proper divisors of a number: its quotients by its prime factors."""
     primes = [p for p in range(2, period + 1) if period % p == 0 and all(p % k for k in range(2, p))]
     return [period // p for p in primes]
 

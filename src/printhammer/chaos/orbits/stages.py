@@ -1,4 +1,4 @@
-"""Stages of a search for orbits: blocks of starts, batches of guesses, branches through orbits.
+"""Stages of a search for periodic orbits: blocks of starts, batches of guesses, branches through orbits.
 
 *Branches.* Further orbits at the same period lie on the branches through known orbits.
 
@@ -45,14 +45,14 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.orbit import Orbit
 
 SHARE: Final = 0.05
-"""Change of the period on either side over which a branch is followed, as a fraction of the period."""
+"""Range of drive periods over which a branch is followed, on either side, as a fraction of the period."""
 
 _PARTS: Final = 5.0  # As in `printhammer.chaos.continuation.tracer`
 _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
 def crossings(orbit: Orbit) -> list[FloatArray]:
-    """Find the states at which the branch through an orbit, along the period, returns to its period."""
+    """Find the states at which the branch of an orbit, followed in the period, returns to its period."""
     regime, own = orbit.regime, orbit.regime.period
     if PERIOD not in regime.names:
         return []
@@ -76,28 +76,28 @@ def crossings(orbit: Orbit) -> list[FloatArray]:
 
 
 _LONG: Final = 400
-"""Number of firings of the train from rest in which close returns are sought."""
+"""Number of firings of the train from rest whose close returns are guesses."""
 _BLOCKS: Final = (128, 1024)  # Numbers of starts to which more are rounded up; the last is doubled repeatedly
 _BATCHES: Final = (8, 48)
-"""Numbers of starts and of guesses to which more are rounded up; the last is doubled repeatedly."""
+"""Ladder of numbers of guesses: a request is rounded up to a rung; the last rung doubles repeatedly."""
 _EVEN: Final = 8
-"""Number of firings below which orbits get proportionally more guesses."""
+"""Orbit period, in firings, below which orbits get more guesses, in inverse proportion to the period."""
 _JOINED: Final = 48
-"""Maximum number of guesses, per number of firings, that join two shorter orbits in a stage."""
+"""Maximum number of guesses per stage and period that are concatenations of two shorter orbits."""
 _TOUCHES: Final = 4
-"""Number of spread states per state just behind a touch of a rigid backstop."""
+"""Number of spread states for each state just after a touch of a rigid backstop."""
 _COMPLETED: Final = 6
 _MORE: Final = 512
-"""Largest period for which more returns are tried if the indices show a gap, and their number."""
+"""Largest period, in firings, for which further returns are tried if the indices show a gap; their number."""
 _SAME: Final = 1e-6
-"""Distance, in half-widths of the window, below which states of two orbits are the same."""
+"""Distance, in half-widths of the strobe window, below which two orbits share a state."""
 _FAST: Final[dict[str, Any]] = {"goal": 1e-9, "enough": 1e-7, "iterations": 30}
 _EXACT: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 8}
 LONE: Final[dict[str, Any]] = {"goal": 1e-13, "enough": 1e-9, "iterations": 60}
 
 
 def shortest(closing: Closing, scales: FloatArray) -> Closing:
-    """Reduce an orbit that repeats a shorter orbit to the latter."""
+    """Shorten a closed orbit whose states repeat after a fraction of its firings."""
     ends = np.cumsum(closing.firings)
     total = int(ends[-1])
     for k in range(1, len(closing.states)):
@@ -111,23 +111,23 @@ def shortest(closing: Closing, scales: FloatArray) -> Closing:
 
 @dataclass
 class _Known:
-    """A known orbit, with the number of guesses that led to it and the stages that found it."""
+    """Known orbit of a search, with the number of guesses that led to it and the stages that found it."""
 
     closing: Closing
     stages: list[tuple[int, int]]
     hits: int = 1
 
     def is_visible(self, block: int, batch: int) -> bool:
-        """Whether the orbit was found with no more starts and no more guesses than a stage has."""
+        """Whether a stage with at most these starts and guesses has found the orbit."""
         return any(i <= block and j <= batch for i, j in self.stages)
 
 
 @dataclass
 class Search:
-    """A search in progress.
+    """Search for periodic orbits in stages, in progress.
 
-    The search is in stages: starts come in blocks and guesses in batches, and the result of a stage depends
-    only on stages with no more starts and no more guesses. So no orbit is lost with more of either.
+    Starts come in blocks and guesses in batches. The result of a stage depends only on stages with no more
+    starts and no more guesses, so that a larger search never loses an orbit of a smaller search.
     """
 
     regime: Regime
@@ -144,7 +144,7 @@ class Search:
         self.done, self.all = 0, 1
 
     def run(self, starts: int) -> Orbits:
-        """Search in motions from at least `starts` states."""
+        """Run the search with motions from at least `starts` states; return the orbits."""
         self.blocks, self.batches = _steps(_BLOCKS, starts), _steps(_BATCHES, self.several)
         rest = np.array([first_state(self.regime)])
         self.all = 3 + 2 * self.longest * len(self.blocks) * len(self.batches)
@@ -191,7 +191,7 @@ class Search:
         self.effort.report(self.done, self.all)
 
     def _through(self, regime: Regime, records: Records) -> list[_Known]:
-        """Find the different orbits through one section."""
+        """Find all different orbits with a section at the phase of a regime, from recorded motions."""
         fast = FastMaps(regime, self.longest, self.effort.at(TOLERANCE))
         different: list[_Known] = []
         seen: set[bytes] = set()
@@ -215,9 +215,9 @@ class Search:
         return self._refined(regime, different)
 
     def _further(self, fast: FastMaps, different: list[_Known], records: Records, seen: set[bytes]) -> None:
-        """Try further returns: those of searches for shorter orbits, of longer motions, and after a touch.
+        """Try further close returns: from longer motions, and from motions just after a touch.
 
-        They come last, so that no orbit of the earlier stages is lost.
+        These guesses are tried last, so that no orbit of the earlier stages is lost.
         """
         first = len(different)
         begin, last = 0, len(self.batches) - 1
@@ -248,7 +248,7 @@ class Search:
                 self._try(fast, different, more, (len(self.blocks) - 1, last))
 
     def _complete(self, fast: FastMaps, different: list[_Known], records: Records) -> None:
-        """Try more returns for periods whose indices do not add up to 1, where orbits are missing."""
+        """Try more close returns for each period whose indices do not add up to 1: orbits are missing."""
         stage = len(self.blocks) - 1, len(self.batches) - 1
         for period in range(1, min(self.longest, _COMPLETED) + 1):
             own = [
@@ -260,12 +260,12 @@ class Search:
                 self._try(fast, different, [guess for both in returns for guess in both], stage)
 
     def _batch(self, guesses: list[Guess], batch: int, period: int) -> list[Guess]:
-        """Return the guesses that are new in a batch."""
+        """Return the guesses that a batch adds to the preceding batches."""
         begin, end = (_share(count, period) // 2 for count in (0, *self.batches)[batch : batch + 2])
         return guesses[begin:end]
 
     def _joined(self, different: list[_Known], period: int, stage: tuple[int, int]) -> list[Guess]:
-        """Join pairs of the orbits of a stage that no earlier stage has joined."""
+        """Concatenate pairs of the orbits visible to a stage that no earlier stage has concatenated."""
         block, batch = stage
         seen = [orbit for orbit in different if orbit.is_visible(block, batch)]
         before = [
@@ -278,7 +278,7 @@ class Search:
     def _try(
         self, maps: ExactMaps | FastMaps, different: list[_Known], tried: list[Guess], stage: tuple[int, int]
     ) -> None:
-        """Converge guesses, and add new orbits."""
+        """Converge guesses by Newton's method, and add the orbits that are new."""
         options = _FAST if isinstance(maps, FastMaps) else LONE
         for guess in tried:
             self.tried[int(guess.firings.sum()) - 1] += 1
@@ -286,7 +286,7 @@ class Search:
             self._add(different, _Known(closing, [stage]))
 
     def _refined(self, regime: Regime, different: list[_Known]) -> list[_Known]:
-        """Converge orbits with the requested tolerance."""
+        """Converge orbits again, with the requested tolerance."""
         exact = ExactMaps(regime, self.effort)
         refined: list[_Known] = []
         closings = _closed(exact, [orbit.closing for orbit in different], self.scales, _EXACT)
@@ -295,7 +295,7 @@ class Search:
         return refined
 
     def _add(self, different: list[_Known], new: _Known) -> None:
-        """Add a converged orbit unless it is known: orbits that share a state are the same."""
+        """Add a closed orbit unless it is known; orbits that share a state are the same."""
         if not new.closing.closed:
             self.failures[new.closing.reason] += 1
             return
@@ -312,7 +312,7 @@ class Search:
         different.append(replace(new, closing=closing))
 
     def _is_repeat(self, orbit: Orbit) -> bool:
-        """Whether an orbit converged as one segment repeats after a fraction of its firings."""
+        """Whether an orbit that converged as one segment repeats after a fraction of its firings."""
         return any(
             self._is_same(orbit, replace(orbit, x=orbit.x[[k]], v=orbit.v[[k]], memory=orbit.memory[[k]]))
             for k in range(1, orbit.firings)
@@ -320,7 +320,7 @@ class Search:
         )
 
     def _describe(self, described: list[tuple[Orbit, int]], known: Sequence[tuple[Regime, _Known]]) -> None:
-        """Add the properties of orbits, without those already found at another section."""
+        """Compute the properties of orbits, and add those not yet found at another section."""
         quiet = self.effort.quiet
         orbits = quiet.mapped(lambda pair: orbit_of(pair[0], pair[1].closing, quiet.tolerance), known)
         for orbit, (_regime, own) in zip(orbits, known, strict=True):
@@ -339,7 +339,7 @@ class Search:
                 described.append((orbit, own.hits))
 
     def _along(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add the orbits on the branches through known orbits, and orbits from guesses that join these."""
+        """Add orbits on the branches through short orbits, and orbits from concatenations with them."""
         first = [orbit for orbit, _hits in described]
         short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
         states = self.effort.quiet.mapped(crossings, short)
@@ -370,9 +370,9 @@ class Search:
             self._describe(described, [(every[0].regime, known) for known in different])
 
     def _mirror(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add the mirror images of orbits, x -> -x half a period later, if no surface is one-sided.
+        """Add the mirror images of orbits, x -> -x half a period later, if no surface acts on one side.
 
-        If the forces are not odd, Newton's method finds none, or another orbit.
+        If the forces are not odd, Newton's method finds no orbit, or a different orbit.
         """
         for orbit, hits in list(described):
             regime = orbit.regime
@@ -397,17 +397,17 @@ class Search:
 
 
 def _share(guesses: int, period: int) -> int:
-    """Return the number of guesses for a number of firings, so that the work is about the same for each."""
+    """Return the number of guesses for a period, so that every period takes about the same work."""
     return guesses * max(1, _EVEN // period)
 
 
 def _doubled(first: int, below: int) -> list[int]:
-    """List a number and its doubles below a limit."""
+    """List a number and its doubles, by factors of 2, below a limit."""
     return [first << k for k in range(below.bit_length()) if first << k < below]
 
 
 def _steps(ladder: Sequence[int], most: int) -> list[int]:
-    """List the rungs of a ladder, continued by doubling, up to the first that is at least `most`."""
+    """List the rungs of a ladder, extended by doubling, up to the first rung of at least `most`."""
     rungs = list(ladder)
     while rungs[-1] < most:
         rungs.append(2 * rungs[-1])
@@ -415,7 +415,7 @@ def _steps(ladder: Sequence[int], most: int) -> list[int]:
 
 
 def _guess(orbit: Orbit, maps: ExactMaps) -> Guess:
-    """Return the states of an orbit at its sections; only the first if a section falls into the pack."""
+    """Build a guess from the states of an orbit at its sections; one segment if a section is in the pack."""
     states = [orbit.section]
     for _ in range(orbit.firings - 1):
         images = maps(states[-1][np.newaxis], np.ones(1, np.int64))
@@ -431,7 +431,7 @@ def _closed(
     scales: FloatArray,
     options: Mapping[str, Any],
 ) -> list[Closing]:
-    """Return the converged orbits, one per guess; guesses with equal numbers of segments are batched."""
+    """Converge guesses by Newton's method; return the outcomes, one per guess, in input order."""
     known: dict[int, Closing] = {}
     counts = [len(guess.firings) for guess in tried]
     for segments in sorted(set(counts)):

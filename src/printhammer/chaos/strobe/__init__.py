@@ -1,1 +1,1 @@
-"""Stroboscopic maps: states of a train at its firings, and what kind of motion they show."""
+"""Strobe maps: states of a pulse train at its firings, and classification of the motion."""

@@ -1,18 +1,18 @@
-"""Stroboscopic map: from the state at a section to the state some firings later, with its derivative.
+"""Strobe map: from the state at a section to the state some firings later, with its derivative.
 
 The strobe map is the Poincaré map of a section at a fixed phase of the drive. Its derivative over a period of
 an orbit is the monodromy matrix, whose eigenvalues are the Floquet multipliers; at a touch of a surface, the
 tangent flow is multiplied by the saltation matrix (docs/tangent.md).
 
-At a section the state is displacement and velocity, unless the armature is in the pack on its way out: then
-the memory of the pack belongs to the state, and the status of the image is "in the pack"; a section at
-another phase of the period avoids this. With a driver of the coil, no current may flow at the section, else
-the status is "a current flows".
+At a section the state is displacement and velocity, unless the armature is moving out of the pack: then the
+memory of the pack belongs to the state, and the status of the image is "in the pack". A section at another
+phase of the period avoids this. If a voltage drives the coil, no current may flow at the section, else the
+status is "a current flows".
 
 *Quiet section.* The phase of the drive at which an orbit is farthest from all its contacts.
 
-Where an impact on a rigid backstop meets the section the state jumps, and in the pack on its way out the
-armature has a memory beside its state. Any orbit can be observed at another phase.
+If an impact on a rigid backstop meets the section, the state jumps; if the armature is moving out of the pack
+at the section, the state includes a memory. Any orbit can be observed at another phase.
 """
 
 from __future__ import annotations
@@ -39,32 +39,32 @@ from printhammer.run.supply import emf, linkage
 from printhammer.support.arrays import FloatArray
 
 MAP_TOLERANCE: Final = 1e-13
-"""Tolerance of the map: its noise limits the accuracy of a fixed point."""
+"""Tolerance of the strobe map; its noise limits the accuracy of a fixed point."""
 
 MAP_EFFORT: Final = Effort(MAP_TOLERANCE)
 
 IN_PACK: Final = "in the pack"
-"""Status where the state at a section includes a memory of the pack."""
+"""Status of an image if the state at a section includes a memory of the pack."""
 
 WITH_MEMORY: Final = tuple(
     MODE_NAMES.index(name) for name in ("unloading", "reloading", "held on the unloading branch")
 )
-"""Modes whose state includes a memory."""
+"""Indices of the modes of motion whose state includes a memory of the pack."""
 CURRENT: Final = "a current flows"
-"""Status where the coil carries a current at a section, which then belongs to the state."""
+"""Status of an image if the coil carries a current at the section, which then belongs to the state."""
 _OK: Final = "ok"
 RANGE_LEFT: Final = "range left"
-"""Status of a displacement that no motion can have."""
+"""Status of an image if no motion can start with the displacement, e.g. behind a rigid backstop."""
 
 _TURN_STEPS: Final = 60  # Iteration limit of the root search for an extremum
 _STILL: Final = 1e-9
-"""Relative speed at which an extremum counts as located: the error of its place is quadratic."""
+"""Speed, relative to the scale, at which an extremum is located: its displacement error is quadratic."""
 STILL_COIL: Final = 1e-9
-"""Current, or its flux linkage, relative to the typical one, that counts as zero."""
+"""Current or flux linkage, relative to a typical value, below which the coil counts as currentless."""
 
 
 class Image(Declared):
-    """Image of a state under the strobe map."""
+    """Image of a state under the strobe map, with derivative, contacts and distance from a grazing."""
 
     state: FloatArray = part(
         'displacement, m, and velocity, m/s, at the end, shape (2,); NaN unless the status is "ok"'
@@ -111,9 +111,9 @@ def image_of(
 ) -> Image:
     """Compute the image of a state, (m, m/s), under the iterated strobe map, with its derivative.
 
-    The earlier pulses are under way at the start, as in a train that has always been fired. A run that ends
-    early, or a state where no force law holds, has a status and is not an exception. Contacts and the margin
-    take about a third of the time.
+    Pulses of earlier firings are still active at the start, as in an endless train. A run that ends early, or
+    a state outside the range of a force law, sets the status and raises no exception. Contacts and the margin
+    take about a third of the computation time.
     """
     regime.check_planar()
     train, _ = regime.train(firings)
@@ -155,7 +155,7 @@ def image_of(
 
 
 def is_possible(hammer: Hammer, x: float, v: float) -> bool:
-    """Whether a motion can begin with a displacement, m, and a velocity, m/s."""
+    """Whether a motion can start with a displacement, m, and a velocity, m/s."""
     try:
         initial_state(hammer, (x, v))
     except InputError:
@@ -164,12 +164,12 @@ def is_possible(hammer: Hammer, x: float, v: float) -> bool:
 
 
 def is_usable(hammer: Hammer, x: float, v: float) -> bool:
-    """Whether displacement, m, and velocity, m/s, alone are a state: not so on the way out of the pack."""
+    """Whether displacement, m, and velocity, m/s, are the whole state: not when moving out of the pack."""
     return not (v <= 0.0 and x > front_with_memory(hammer))
 
 
 def front_with_memory(hammer: Hammer) -> float:
-    """Return the front of the pack, m; infinite without a pack that has a memory."""
+    """Return the front position of a pack with a memory, m; infinite without such a pack."""
     if hammer.pack is None or not getattr(import_module(hammer.pack.module), "MEMORY", False):
         return math.inf
     return hammer.pack.front
@@ -180,7 +180,7 @@ def _no_image(status: str) -> Image:
 
 
 def margin_of(problem: Problem, record: Record) -> float:
-    """Compute the signed nearness of a grazing in a run, see `Image`."""
+    """Compute the signed distance of a run from a grazing; see the field `margin` of `Image`."""
     hammer, (way, speed) = problem.hammer, problem.scales
     surfaces = [place for place in (hammer.position, hammer.front) if place is not None]
     _, x, sign = turns(problem, record)
@@ -193,7 +193,7 @@ def margin_of(problem: Problem, record: Record) -> float:
 
 
 def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Locate all local extrema: times, s, displacements, m, and 1 for a maximum, -1 for a minimum."""
+    """Locate all local extrema of a run; return times, s, displacements, m, and signs (1: a maximum)."""
     nodes = record.nodes
     before, after = nodes[:-1, 2], nodes[1:, 2]
     rows = np.flatnonzero(
@@ -233,7 +233,7 @@ _ON_IMPACT: Final = 1e-3
 def quiet_section(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Regime, FloatArray] | None:
-    """Choose the quietest phase for an orbit; return the regime and the state of the orbit there.
+    """Choose the phase farthest from all contacts of an orbit; return the regime and the state there.
 
     Parameters
     ----------
@@ -249,7 +249,7 @@ def quiet_section(
     Returns
     -------
     tuple or None
-        None if a run ends early.
+        Regime with the new phase, and state at its section; None if a run ends early.
     """
     flight = _around(regime, state, firings, tolerance)
     if flight is None:
@@ -282,7 +282,7 @@ def is_on_impact(regime: Regime, state: FloatArray, firings: int, tolerance: flo
 def _around(
     regime: Regime, state: FloatArray, firings: int, tolerance: float
 ) -> tuple[Problem, Record, FloatArray] | None:
-    """Integrate an orbit from a section; return it and times since a section with a contact, ascending."""
+    """Integrate an orbit from a section; return problem, record and times since a section with a contact."""
     train, _ = regime.train(firings + 1)
     begin, *_, end = (float(time) for time in regime.moments(train, firings))
     try:
@@ -297,7 +297,7 @@ def _around(
 
 
 def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: float) -> FloatArray:
-    """Compute the state, (m, m/s), at the next section of another phase; NaN if the run ends before."""
+    """Compute the state, (m, m/s), at the next section of another phase; NaN if the run ends early."""
     train, _ = regime.train(2)
     begin = float(regime.moments(train, 1)[0])
     problem = Problem(regime.hammer, train, (float(state[0]), float(state[1])), begin, tolerance)
@@ -309,9 +309,9 @@ def state_later(regime: Regime, state: FloatArray, phase: float, tolerance: floa
 def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatArray | None:
     """Compute the state, (m, m/s), at which the mirror image of a motion passes the section.
 
-    The mirror image is x -> -x, about the origin of the magnet's gap, half a period later: a motion of the
-    same hammer if its forces are odd, as in Duffing's equation. None where a pack, a backstop or pulses act
-    on one side only; NaN where a run ends before.
+    The mirror image, x -> -x about the hammer's origin, half a period later, is a motion of the same hammer
+    if the forces are odd, as in Duffing's equation. None if a pack, a backstop or pulses act on one side
+    only; NaN if a run ends early.
     """
     hammer = regime.hammer
     if hammer.pack is not None or hammer.backstop is not None or regime.drive is None:
@@ -321,7 +321,7 @@ def mirror_image(regime: Regime, state: FloatArray, tolerance: float) -> FloatAr
 
 
 def _busy(contacts: FloatArray, begin: float, end: float) -> FloatArray:
-    """Sample the times since the section at which there is a contact, densely enough."""
+    """Sample the times since the section during which there is a contact, at 20 points per contact."""
     times = [np.zeros(0)]
     for _surface, t_in, _v_in, t_out, *_ in contacts:
         low, high = (begin if np.isnan(t_in) else t_in), (end if np.isnan(t_out) else t_out)

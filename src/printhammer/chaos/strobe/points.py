@@ -1,16 +1,17 @@
-"""Strobe points: the state of the armature once a period, as in the Poincaré plots of Fig. 11.
+"""Strobe points: the state of the armature once per period, as in the Poincaré plots of Fig. 11.
 
-A train of firings is an iterated map, the stroboscopic map, in the plane of displacement and velocity: from
-the state at one firing to the state at the next. If a firing falls inside a pack contact, the state also
-includes the branch of the pack's law and its memory, the latest local maximum.
+A pulse train defines an iterated map, the strobe map, in the plane of displacement and velocity: from the
+state at one firing to the state at the next. If a firing falls inside a pack contact, the state also includes
+the branch of the pack's law and its memory, the latest local maximum.
 
-*The integrators of 1983.* Strobe points and classifications as computed by the two integrators of the paper,
-with its schedule of steps.
+*The integrators of 1983.* Strobe points can also be computed by the two integrators of the paper, with the
+paper's step sizes.
 
-The panels of Fig. 11 were judged by eye from such points. Fixed steps that locate no contact do not compute
-the motion: every touch adds an error, and the errors define a map of their own, which jumps where a step just
-reaches a contact or just misses it. It has no tangent, so that no exponent supports a classification: here a
-train is strange if no period up to 64 is found, the criterion of a reader of such a plot.
+The panels of Fig. 11 were classified by eye from such points. Integrators with fixed steps that do not locate
+contacts do not compute the motion accurately: every touch adds an error, and the result is a different map,
+which is discontinuous where a step just reaches or just misses a contact. This map has no derivative, and no
+exponent can support a classification. A train is therefore called strange if it has no period up to 64, as a
+reader of such a plot would decide.
 """
 
 from __future__ import annotations
@@ -53,14 +54,14 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 POINTS = 200
-"""Default number of points, as in Fig. 11."""
+"""Default number of strobe points, as in Fig. 11."""
 
 _SETTLED = 1000
-"""Number of points, and of firings to discard before them, of a settled series."""
+"""Number of strobe points of a settled series, and of firings discarded before its first point."""
 
 
 class Strobe(Result):
-    """States of a hammer under a periodic drive, one each period."""
+    """Strobe points: states of a hammer under a periodic drive, one per period."""
 
     hammer: Hammer = part("the hammer")
     drive: Drive = part("the drive")
@@ -101,7 +102,7 @@ class Strobe(Result):
         return f"strobe points of {self.hammer.name}, every {self.period:.9g} s"
 
     def summary(self) -> Summary:
-        """Summarise points and classification."""
+        """Summarise the strobe points and the classification of the motion."""
         known = np.isfinite(self.x)
         at = f", {self.phase:g} of a period later" if self.phase else ""
         rows: list[FactRow] = [
@@ -126,11 +127,11 @@ class Strobe(Result):
 
     @property
     def window(self) -> Window:
-        """Window in which the points are drawn."""
+        """Window of displacement and velocity in which the points are drawn and scaled."""
         return window_of(self.hammer, self.drive)
 
     def entries(self) -> Entries:
-        """Return the state components by name, including the current where it is a state variable."""
+        """Return the Dataset variables by name, including the current if it is a state variable."""
         return {name: entry for name, entry in super().entries().items() if entry[1] is not None}
 
     def notes(self) -> dict[str, Any]:
@@ -150,7 +151,7 @@ def strobe(
     verdict: bool = True,
     **firing: Unpack[Firing],
 ) -> Strobe:
-    """Compute the state of a hammer once a period of its drive, and classify the motion.
+    """Compute the state of a hammer once per period of its drive, and classify the motion.
 
     Parameters
     ----------
@@ -166,8 +167,8 @@ def strobe(
     tolerance : float, optional
         As for `printhammer.simulate`.
     verdict : bool, optional
-        Whether to judge the motion, at the firings 1001 to 2000 whatever the points and their phase; see
-        `printhammer.chaos.strobe.verdict`.
+        Whether to classify the motion, by the firings 1001 to 2000, independent of the points and their
+        phase; see `printhammer.chaos.strobe.verdict`.
     **firing
         How the hammer is fired: period or rate, waveform, drive, overlap and phase of the points, as for
         `printhammer.Regime.of`.
@@ -175,7 +176,7 @@ def strobe(
     Returns
     -------
     Strobe
-        With a status; a run that ends early is not an exception.
+        Strobe points with a status; a run that ends early raises no exception.
     """
     (points_of_train,) = strobes(
         Regime.of(hammer, **firing),
@@ -212,22 +213,22 @@ def strobes(
     Parameters
     ----------
     hammers, periods, drives, waveform, overlap, phase
-        Hammers or regimes and how they are fired, see `printhammer.run.regime.regimes_of`.
+        Hammers or regimes, and the firing of hammers, see `printhammer.run.regime.regimes_of`.
     points, transient, verdict
         As for `strobe`, for all trains.
     states : sequence, optional
         Displacement, m, velocity, m/s, and further components of the state at the first firing of each train,
         as for `printhammer.simulate`, all of one form; by default the rest state.
     firings : tuple of int, optional
-        First and last firing that is judged; the very first firing is number 1.
+        First and last firing that are classified; the very first firing is number 1.
     every_exponent : bool, optional
-        Whether to compute the exponent of periodic trains too, which takes several times as long as their
-        points and does not change the classification.
+        Whether to compute the exponents of periodic trains, too; this takes several times as long as the
+        points, and does not change the classification.
 
     Returns
     -------
     list of Strobe
-        One for each train.
+        Strobe points of each train.
     """
     count, skipped = read_count(points, "points"), read_count(transient, "transient", least=0)
     if not 1 <= firings[0] < firings[1]:
@@ -253,9 +254,9 @@ def strobes(
 
 
 def points_of(series: Any, firing: Firing) -> Any:
-    """Return given points, or compute the settled strobe points of a regime or hammer.
+    """Return the given points, or compute the settled strobe points of a hammer or regime.
 
-    InputError as for `strobe`, or if points are given together with keywords of firing.
+    InputError as for `strobe`, or if points are given together with keywords that describe the firing.
     """
     if isinstance(series, Hammer | Regime):
         return strobe(series, points=_SETTLED, transient=_SETTLED, verdict=False, **firing)
@@ -267,7 +268,7 @@ def points_of(series: Any, firing: Firing) -> Any:
 def strobe_of(
     train: Train, firing: IntArray, states: States, tolerance: float, judged: Verdict | None
 ) -> Strobe:
-    """Build the strobe points of a train from its states at some firings and its classification."""
+    """Build the result `Strobe` of a train from its states at some firings and its classification."""
     return Strobe(
         hammer=train.hammer,
         drive=train.drive,
@@ -309,13 +310,13 @@ def scheme_strobes(
     Returns
     -------
     list of Strobe
-        One for each train, with its classification: a period, "strange" where no period up to 64 is found, or
-        "undecided" where the scheme failed on the way.
+        Strobe points of each train, with a classification: a period, "strange" without a period up to 64, or
+        "undecided" if the scheme failed before the last firing.
 
     Raises
     ------
     InputError
-        The scheme or the reading is not known, or a hammer has no rest state or waveform.
+        The scheme or the reading is unknown, or a hammer has no rest state or waveform.
     """
     if scheme not in SCHEMES or reading not in READINGS:
         known = f"{' or '.join(SCHEMES)}, and {', '.join(READINGS)}"

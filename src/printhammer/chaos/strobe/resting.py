@@ -1,4 +1,4 @@
-"""Motions that come to rest on a rigid backstop: they forget their past, and repeat exactly.
+"""Motions that come to rest on a rigid backstop: they forget their past and repeat exactly.
 
 A ball on a shaken table may bounce ever lower and lie still until the table launches it again, always at the
 same phase. The motion that follows is the same each time: a superstable cycle, whose multipliers are 0. It
@@ -16,7 +16,7 @@ from printhammer.support.arrays import FloatArray
 
 
 def exact_cycle(states: FloatArray) -> int:
-    """Return the period, at most n // 2, of exactly repeating states, shape (n, k); else 0."""
+    """Return the period, at most n // 2, of states, shape (n, k), that repeat exactly; 0 without a period."""
     ended = np.flatnonzero((states[:-1] == states[-1]).all(axis=1))
     for count in (len(states) - 1 - int(place) for place in ended[::-1]):
         if count <= len(states) // 2 and np.array_equal(states[count:], states[:-count]):
@@ -25,9 +25,9 @@ def exact_cycle(states: FloatArray) -> int:
 
 
 def rests_of(regime: Regime, states: FloatArray, tolerance: float) -> int:
-    """Mask of the states, (m, m/s), at firings after which the armature rests before the next firing.
+    """Count the states, (m, m/s), at firings after which the armature rests before the next firing.
 
-    The derivative of the state at the next firing is then 0.
+    After a rest, the derivative of the next state with respect to the present state is 0.
     """
     at_firings = regime.at_firings
     images = (image_of(at_firings, state, 1, tolerance, contacts=False) for state in states)

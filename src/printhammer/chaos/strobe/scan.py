@@ -1,7 +1,7 @@
-"""Classification of very many trains, with an early test for periodic trains.
+"""Classification of many trains, with an early test that recognises periodic trains.
 
-Most trains settle within a few firings, and need not be followed to firing 2000 to know their period. A train
-is periodic as soon as
+Most trains settle within a few firings, so that their period is known long before firing 2000. A train is
+periodic as soon as
 
 - its states q firings apart agree a hundred times closer than the classification requires, over a window of
   at least 2 q firings, no smaller number of firings does as closely as the classification requires, and the
@@ -31,17 +31,17 @@ from printhammer.run.effort import DEFAULT, Effort, Keywords, computation
 from printhammer.run.regime import Regime
 
 STAGES: Final = (32, 128)
-"""Numbers of firings after which periodicity is tested."""
+"""Numbers of firings after which trains are tested for an early period."""
 
 CLOSER: Final = 1e-2
-"""Agreement of an early periodic train, as a fraction of the agreement of the classification."""
+"""Agreement required for an early period, as a fraction of the agreement of the classification."""
 
 LARGEST_MULTIPLIER: Final = 0.99
-"""Largest absolute eigenvalue of an early periodic train."""
+"""Largest absolute eigenvalue of the derivative over a period that is allowed for an early period."""
 
 _SHORT: Final = 301
 _SURE: Final = 5.0
-"""Number of firings of the first exponent, and number of standard errors required of it."""
+"""Firings of the first, short exponent, and standard errors by which it has to be positive."""
 
 
 @computation
@@ -67,8 +67,8 @@ def scan(
     Returns
     -------
     list of Verdict
-        A classification names the firings that it rests on: fewer than 1001 to 2000 for trains decided early,
-        see the head of this module.
+        Classification of each train, with the firings that it is based on: fewer than 1001 to 2000 for trains
+        decided early, see the head of this module.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def scan(
 def _settled(
     trains: Sequence[Train], states: Sequence[States], firings: tuple[int, int], effort: Effort
 ) -> list[Verdict | None]:
-    """Classify the trains that have settled; None for the others."""
+    """Classify the trains that have settled to a stable period early; None for all others."""
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]
     periods: dict[int, int] = {}
     for i, row in enumerate(distances):
@@ -119,8 +119,8 @@ def _settled(
 def largest_multiplier(train: Train, states: States, period: int, tolerance: float) -> float:
     """Compute the largest absolute eigenvalue of the derivative of the state over a period.
 
-    Infinite if the period begins inside the pack, where the state has a memory, if a shorted turn or a
-    capacitor belongs to the state, or if the derivative is unknown.
+    The result is infinite if the period begins inside the pack, where the state has a memory, if the state
+    includes a shorted turn or a capacitor, or if the derivative is unknown.
     """
     from printhammer.derivatives.states import tangent_map
 
@@ -142,7 +142,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
 
 
 def _followed(trains: Sequence[Train], exponents: bool, effort: Effort) -> list[Verdict]:
-    """Classify trains that are followed to the end."""
+    """Classify the trains that were not decided early, by the firings 1001 to 2000."""
     judged, tolerance = (FIRST, LAST), effort.tolerance
     states, _ = run_trains(trains, np.arange(FIRST, LAST + 1), None, effort)
     distances = [own.distances(train) for own, train in zip(states, trains, strict=True)]

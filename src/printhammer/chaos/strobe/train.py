@@ -1,6 +1,7 @@
-"""Trains from rest to their last strobe point, run in parallel, and classification of them.
+"""Pulse trains from an initial state to their last strobe point, run in parallel, and their classification.
 
-States that continue a train where another ended, and trains that may be run segment by segment.
+The module also provides the state from which one train continues another, and runs of one period each for
+trains without memory.
 """
 
 from __future__ import annotations
@@ -28,28 +29,28 @@ from printhammer.run.supply import current_scale
 from printhammer.support.arrays import FloatArray, IntArray
 
 State = tuple[float, ...]
-"""Displacement, m, velocity, m/s, and further components: `printhammer.run.start.Beyond`."""
+"""State at a firing: displacement, m, velocity, m/s, and the fields of `printhammer.run.start.Beyond`."""
 
 NO_CURRENT: Final = AT_REST[2:]
-"""Electric part of a state without current."""
+"""Electric components of a state without current."""
 
 FROM_REST: Final[State] = (math.nan, math.nan, *AT_REST)
-"""State that represents a train from rest, with no firing before."""
+"""Placeholder for the state of a train that starts from rest, without earlier firings."""
 
 LONG_CYCLE: Final = 5
-"""Shortest cycle, in firings, that is tested for rests on the backstop. Arbitrary."""
+"""Shortest cycle, in firings, that is tested for rests on the backstop; arbitrary."""
 
 STRETCH: Final = 1
-"""Number of firings in a run, for trains that may be run segment by segment.
+"""Number of firings per run, for trains that are run segment by segment.
 
-Rounding of the time, and so of the phase of a force, is proportional to the time; a ball that comes to rest
-on a table and leaves it again amplifies it by 1e8. Runs of one period each have the same rounding, so that a
-motion that forgets its past repeats exactly.
+The rounding error of the time, and hence of the phase of a force, is proportional to the time; an armature
+that comes to rest on a rigid backstop and leaves it again amplifies the error by 1e8. Runs of one period each
+have the same rounding, so that a motion that forgets its past repeats exactly.
 """
 
 
 def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: float | FloatArray) -> IntArray:
-    """Determine the branches of the pack on which states lie, 0 outside the pack."""
+    """Determine the branch of the pack's law on which each state lies, 0 outside the pack."""
     branches = np.where(x > front, branch, 0).astype(np.int64)
     for held, part_of in HELD_BRANCHES.items():
         branches[branches == held] = part_of
@@ -59,7 +60,7 @@ def pack_branches(x: FloatArray, branch: npt.NDArray[np.integer[Any]], front: fl
 def handed_on(
     hammer: Hammer, x: float, v: float, mode: int, memory: float, electric: Sequence[float] = NO_CURRENT
 ) -> State:
-    """Return the state that continues a train; `FROM_REST` if none can."""
+    """Return the state from which the next train continues; `FROM_REST` if no train can continue from it."""
     begun = state_to_begin(hammer, x, v, mode, memory)
     return FROM_REST if begun is None else (*begun, *electric)
 
@@ -75,11 +76,11 @@ def is_memoryless(regime: Regime) -> bool:
 
 
 _BEFORE: Final = 100
-"""Number of firings before an exponent is averaged."""
+"""Number of firings discarded before the exponent of a continued train is averaged."""
 
 
 class Train(Declared):
-    """A regime fired from a state on, with no firing before."""
+    """Regime fired from an initial state on, without earlier firings."""
 
     regime: Regime = part("hammer and periodic drive")
     drive: Drive = part("a sequence of pulses, or the endless force")
@@ -92,15 +93,15 @@ class Train(Declared):
 
     @classmethod
     def of(cls, regime: Regime, firings: int, state: tuple[float, ...] | None = None) -> Self:
-        """Build a train for states up to a firing.
+        """Build a train whose states are needed up to a given firing.
 
-        One more pulse is fired at the end of the run, so that no state depends on where that is.
+        One more pulse is fired, so that no state depends on the end of the run.
         """
         return cls(regime, regime.pulses(firings + 1), state)
 
     @property
     def hammer(self) -> Hammer:
-        """The hammer."""
+        """Hammer that is fired."""
         return self.regime.hammer
 
     @property
@@ -109,7 +110,7 @@ class Train(Declared):
         return self.regime.period
 
     def times(self, firings: IntArray) -> FloatArray:
-        """Return the times of firings, s, the very first one being number 1."""
+        """Return the times of firings, s, by their numbers, the first firing being number 1."""
         if len(self.drive.times) > 1:
             return np.asarray(self.drive.times[firings - 1], dtype=np.float64)
         return np.asarray(self.drive.times[0] + self.period * (firings - 1.0), dtype=np.float64)
@@ -117,7 +118,7 @@ class Train(Declared):
 
 @dataclass(frozen=True)
 class States:
-    """States of one train; see `printhammer.chaos.strobe.points.Strobe`."""
+    """States of one train at some firings; for the fields see `printhammer.chaos.strobe.points.Strobe`."""
 
     t: FloatArray
     x: FloatArray
@@ -128,32 +129,32 @@ class States:
     current: FloatArray | None = None
 
     def distances(self, train: Train) -> FloatArray:
-        """Compute the closing errors of the states, see `printhammer.chaos.strobe.verdict.repeats`."""
+        """Compute the largest distances of states q firings apart; see `verdict.repeats`."""
         front = math.inf if train.hammer.front is None else train.hammer.front
         return repeats(self.points, pack_branches(self.x, self.branch, front), _scales(train))
 
     @property
     def points(self) -> FloatArray:
-        """Displacement, velocity and memory, with a driver also current, a row for each firing."""
+        """States, one row per firing: displacement, velocity and memory, with a driver also current."""
         current = [] if self.current is None else [self.current]
         return np.column_stack([self.x, self.v, self.memory, *current])
 
     def scaled(self, train: Train) -> FloatArray:
-        """Normalise the points by the half-widths of the window."""
+        """Return the states divided by the half-widths of the window and the current scale."""
         return np.asarray(self.points / _scales(train))
 
     def settled(self, train: Train, distances: FloatArray) -> Settled | None:
-        """Find the orbit to which the train has settled, from successive states; None if aperiodic."""
+        """Find the orbit to which the train has settled; None if its states do not repeat."""
         period = period_of(distances)
         if period is None:
             return None
         return settled(train.regime.at_firings, self.points, period, _scales(train))
 
     def resting(self, train: Train, distances: FloatArray, tolerance: float) -> tuple[int, int] | None:
-        """Find the cycle of a motion that rests on the backstop, in firings, and its rests; else None.
+        """Return the cycle of a motion that rests on the backstop, in firings, and its rests; else None.
 
-        The cycle is 0 if the motion does not repeat; then at least two rests are required. Cycles of a few
-        firings are left out: rounding does not change them.
+        The cycle is 0 if the motion does not repeat; then at least two rests are required. Cycles of less
+        than 5 firings are excluded, since rounding does not change them.
         """
         if not is_memoryless(train.regime):
             return None
@@ -178,7 +179,7 @@ def run_trains(
     *,
     every_exponent: bool = False,
 ) -> tuple[list[States], list[Verdict | None]]:
-    """Compute the states of trains at chosen firings, at the phases of their regimes, and classifications.
+    """Compute the states of trains at chosen firings, at the phases of their regimes; classify the trains.
 
     A classification covers the firings from the first to the last of `judged`; None for no classification.
     Exponents of periodic trains are computed only with `every_exponent`.
@@ -242,13 +243,13 @@ def run_trains(
 
 
 FINER: Final = (0.1, 0.01)
-"""Factors of the tolerance at which the period of a motion that comes to rest is recomputed."""
+"""Factors on the tolerance at which the period of a motion that comes to rest is computed again."""
 
 
 def _at_finer(
     trains: Sequence[Train], judged: tuple[int, int], effort: Effort
 ) -> list[tuple[tuple[float, str], ...]]:
-    """Compute tolerances and periods of trains at a tenth and a hundredth of the tolerance.
+    """Compute the periods of trains at a tenth and a hundredth of the tolerance, with the tolerances.
 
     Between two rests small errors grow; if they reach the size of the motion, rounding decides its period.
     """
@@ -269,7 +270,7 @@ def _at_finer(
 def _ensemble(
     trains: Sequence[Train], ends: Sequence[float], tolerance: float, states: FloatArray | None = None
 ) -> Ensemble:
-    """Run trains to given times, s, from states at time 0, by default their own."""
+    """Build the ensemble that runs trains to given times, s, from their own or given states."""
     begun = [train.state for train in trains if train.state is not None]
     own = np.array(begun) if len(begun) == len(trains) else None
     return Ensemble(
@@ -284,9 +285,9 @@ def _ensemble(
 def _in_stretches(
     trains: Sequence[Train], every: Sequence[FloatArray], effort: Effort
 ) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, list[str], FloatArray]:
-    """Compute states of trains at times, s, a row each, statuses, and the times reached.
+    """Compute states of trains at times, s, one row per train, with statuses and the times reached.
 
-    The runs are a few periods long, so that time and its rounding stay small.
+    Each run lasts one period, so that the time and its rounding error stay small.
     """
     shape = len(trains), max(len(times) for times in every)
     x, v, memory = (np.full(shape, np.nan) for _ in range(3))
@@ -333,7 +334,7 @@ def _in_stretches(
 def exponents_onward(
     begun: Sequence[tuple[Regime, tuple[float, ...]]], points: int, effort: Effort
 ) -> list[Exponent]:
-    """Compute the largest exponents of trains that continue from states at a firing.
+    """Compute the largest exponents of trains that continue from a state at a firing.
 
     The exponents are averaged over `points` firings, after a hundred firings.
     """
@@ -344,7 +345,7 @@ def exponents_onward(
 
 
 def exponents_of(trains: Sequence[Train], firings: tuple[int, int], effort: Effort) -> list[Exponent]:
-    """Compute the largest exponents of trains over a range of firings, in parallel."""
+    """Compute the exponents of trains over a range of firings, in parallel."""
     from printhammer.derivatives.states import strobe_exponent
 
     return effort.mapped(

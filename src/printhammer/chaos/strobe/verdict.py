@@ -1,4 +1,4 @@
-"""Classification of strobe points, periodic or strange, with its evidence.
+"""Classification of the motion of a train: periodic, strange, superstable or undecided, with evidence.
 
 A train of period T has the period q if its states q firings apart agree, and q is the smallest such number;
 if they agree but still move, Newton's method has to confirm the period, see
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from printhammer.chaos.orbits.settled import Settled
 
 LARGEST_PERIOD: Final = 64
-"""Largest period to search for, in firings."""
+"""Largest period of a train that is searched for, in firings."""
 
 AGREEMENT: Final = 1e-6
-"""Distance, in half-widths of the window, within which states agree."""
+"""Distance, in half-widths of the strobe window, within which two states agree."""
 
 SIGNIFICANT: Final = 3.0
-"""Number of standard errors by which the exponent of a strange train has to be positive."""
+"""Number of standard errors by which the exponent of a strange train has to exceed zero."""
 
 SUPERSTABLE: Final = "superstable"
 """Classification of a motion that repeatedly comes to rest on its backstop, without a period up to 64."""
@@ -37,16 +37,16 @@ SUPERSTABLE: Final = "superstable"
 FORGETS: Final = "no exponent: the motion comes to rest on the backstop and forgets its past"
 
 FIRST: Final = 1001
-"""Default of the first judged firing; the very first firing is number 1."""
+"""Default first firing used for the classification; the very first firing is number 1."""
 
 LAST: Final = 2000
-"""Default of the last judged firing."""
+"""Default last firing used for the classification."""
 
 _STOPPED: Final = "the run ended before firing"
 
 
 class Verdict(Declared):
-    """Kind of motion that a train leads to, with the evidence."""
+    """Classification of the motion of a train, with the evidence."""
 
     name: str = part('"period-1", "period-2", ..., "strange", "superstable" or "undecided"')
     period: int | None = part("number of firings after which the states repeat")
@@ -81,7 +81,7 @@ class Verdict(Declared):
 
     @property
     def stopped(self) -> bool:
-        """Whether the run ended before the last firing to be judged."""
+        """Whether the run ended before the last firing needed for the classification."""
         return self.reason.startswith(_STOPPED)
 
     @property
@@ -101,7 +101,7 @@ class Verdict(Declared):
 
     @property
     def phrases(self) -> list[str]:
-        """Evidence as a list of phrases."""
+        """Evidence for the classification, as a list of phrases."""
         phrases = []
         if self.period is not None:
             phrases.append(f"states {_firings(self.period)} apart agree to {self.distance:.1e} of the window")
@@ -131,11 +131,11 @@ class Verdict(Declared):
 
     @property
     def evidence(self) -> str:
-        """Evidence in one line."""
+        """Evidence for the classification, in one line."""
         return "; ".join(self.phrases)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return classification and evidence by name, for JSON; None for unknown values."""
+        """Return classification and evidence as a dictionary for JSON; None for unknown values."""
         return {
             "verdict": self.name,
             "nearest_period": self.nearest,
@@ -165,10 +165,10 @@ def _finite(number: float) -> float | None:
 def repeats(
     states: FloatArray, branches: IntArray, scales: FloatArray, longest: int = LARGEST_PERIOD
 ) -> FloatArray:
-    """Compute the largest distance of states q apart, for q from 1 on, shape (longest,).
+    """Compute the largest distance of states q firings apart, for q from 1 on, shape (longest,).
 
     States, shape (n, 3), are displacement, velocity and memory of the pack at successive firings; their
-    branches, shape (n,), those of the force law inside the pack, 0 outside. A distance is the largest
+    `branches`, shape (n,), are those of the pack's force law, 0 outside the pack. A distance is the largest
     absolute difference of a component, in units of its scale: infinite if states q apart lie on different
     branches, if a state is unknown, or if q exceeds half of n, so that every state is compared at least once.
     """
@@ -184,7 +184,7 @@ def repeats(
 
 
 def period_of(distances: FloatArray) -> int | None:
-    """Return the smallest q whose states agree, from the distances of `repeats`; None without such q."""
+    """Return the smallest q for which states q firings apart agree; None if no q is small enough."""
     agree = np.flatnonzero(distances <= AGREEMENT)
     return int(agree[0]) + 1 if agree.size else None
 
@@ -198,12 +198,12 @@ def verdict(
     settled: Settled | None = None,
     resting: tuple[int, int] | None = None,
 ) -> Verdict:
-    """Classify a train by the distances from `repeats` over a range of firings.
+    """Classify a train by the distances from `repeats`, its exponent, and its settled orbit.
 
     `exponent` is the largest exponent over these firings, None if it was not computed; `stopped` is the
-    status of a run that ended before the last of them. `settled` is the result of confirming the number of
-    firings after which the states agree; without it that number is the period. `resting` are the period of a
-    motion that comes to rest, in firings, 0 if unknown, and the number of rests.
+    status of a run that ended before the last of them. `settled` is the confirmation of the number of firings
+    after which the states agree; without a confirmation, that number is the period. `resting` contains the
+    period of a motion that comes to rest, in firings, 0 if unknown, and the number of rests.
     """
     period = None if stopped else period_of(distances)
     closest = period
@@ -247,12 +247,12 @@ def verdict(
 
 
 def is_positive(exponent: Exponent) -> bool:
-    """Whether an exponent is known, and positive by `SIGNIFICANT` standard errors."""
+    """Whether an exponent exceeds zero by `SIGNIFICANT` standard errors; False if it is unknown."""
     return bool(exponent.ok and exponent.smooth and exponent.value > SIGNIFICANT * exponent.standard_error)
 
 
 def _without_period(exponent: Exponent | None) -> tuple[str, str]:
-    """Return the classification of an aperiodic train, with the reason if it is undecided."""
+    """Classify an aperiodic train by its exponent; return the class, and the reason if it is undecided."""
     name = "undecided"
     if exponent is None:
         return name, "no period, and the exponent was not computed"
