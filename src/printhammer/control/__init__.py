@@ -1,1 +1,1 @@
-"""Better drives: compensation tables, feedback, bursts of least work."""
+"""Drive control: compensation tables, learning, feedback, bursts of least work, thermal limits."""

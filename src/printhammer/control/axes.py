@@ -1,4 +1,4 @@
-"""Compensation tables along one more axis known to the firmware: rail, coil temperature, gap, or forms."""
+"""Compensation tables with one more axis that the firmware knows: rail, coil temperature, gap or forms."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _MILLIONTH: Final = 1e-6  # Resolution of axis values other than lengths in a C 
 
 @dataclass(frozen=True)
 class Axis:
-    """A quantity that is known to the firmware and changes the hammer."""
+    """A quantity, such as the rail voltage, that the firmware knows and that changes the hammer."""
 
     unit: str
     meaning: str
@@ -54,13 +54,13 @@ class Axis:
 
 
 def _on_rail(hammer: Hammer, value: float) -> Hammer:
-    """Return the hammer with its driver on another rail, V."""
+    """Return a copy of the hammer with another rail voltage of its driver, V."""
     _check_driver(hammer, "rail")
     return hammer.replace("waveform.voltage", value)
 
 
 def _warm(hammer: Hammer, value: float) -> Hammer:
-    """Return the hammer with another coil temperature, degC."""
+    """Return a copy of the hammer with another coil temperature, degC."""
     _check_driver(hammer, "temperature")
     return hammer.replace("coil.temperature", value)
 
@@ -97,7 +97,7 @@ class AxisTables:
     tables: tuple[CompensationTable, ...]
 
     def at(self, value: float | str) -> CompensationTable:
-        """Interpolate the table at a value; entries of different branches are taken from the nearer value."""
+        """Interpolate the tables at an axis value; if branches differ, the nearer value's entry is used."""
         asked = read_number(value, AXES[self.axis].unit, self.axis)
         least, most = self.values[0], self.values[-1]
         if not least <= asked <= most:
@@ -114,7 +114,7 @@ class AxisTables:
         return replace(first, **times, deviation=np.full_like(first.deviation, np.nan))
 
     def strategy(self, hammer: Hammer, value: float | str) -> TableStrategy:
-        """Return the table for a value as a drive strategy, with the pulses of that value."""
+        """Return the table for an axis value as a drive strategy, with the hammer's pulses at that value."""
         table = self.at(value)
         table.check_hammer(hammer)
         place = read_number(value, AXES[self.axis].unit, self.axis)
@@ -146,7 +146,7 @@ class AxisTables:
         return header_text(head, first.rates, times, unit, along)
 
     def quantised(self, tick: float | str) -> AxisTables:
-        """Return the tables rounded to a timer tick, s or text."""
+        """Return a copy with all times rounded to a timer tick, s, or text with a unit."""
         return replace(self, tables=tuple(table.quantised(tick) for table in self.tables))
 
     def size(self, tick: float | str = NANOSECOND) -> int:
@@ -156,7 +156,7 @@ class AxisTables:
         return size_of(first.rates.size, times[COLUMNS[0]].shape[-1], bits, len(self.values))
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the rows of all tables, with the axis value as first column."""
+        """Return the rows of all tables as a data frame, with the axis value as first column."""
         import pandas as pd
 
         head = f"{self.axis} [{AXES[self.axis].unit}]"
@@ -166,7 +166,7 @@ class AxisTables:
         return pd.concat(parts, ignore_index=True)
 
     def to_dataset(self) -> xr.Dataset:
-        """Return all tables, with the axis as first dimension."""
+        """Return all tables as a Dataset, with the axis as first dimension."""
         import xarray as xr
 
         along = xr.DataArray(np.array(self.values), dims=self.axis, name=self.axis)
@@ -177,7 +177,7 @@ class AxisTables:
     def save(self, path: str | Path, *, tick: float | str = NANOSECOND, budget: int | None = None) -> None:
         """Write the tables as a C header (.h), or as .csv, .json, .nc, .zarr or .parquet, by the file suffix.
 
-        A header has times in ticks, s, and must fit the budget, bytes.
+        In a header, times are whole multiples of `tick`, s, and the arrays must fit into `budget` bytes.
         """
         suffix = Path(path).suffix.lower()
         if suffix == ".h":

@@ -1,10 +1,10 @@
 """Dead time: the time from switching on to impact, as a function of rail voltage and coil temperature.
 
-A warm coil draws less current and a low rail lets the current rise more slowly, so the dot comes later and
+A warm coil draws less current, and on a low rail the current rises more slowly, so the dot comes later and
 softer. Firmware that knows both can fire earlier and longer. For each rail and temperature of a grid, the
-hammer's own pulse is simulated from rest; then the pulse width is solved for that gives a constant impact
-speed ("blow"), by default that of the own pulse at the rail and temperature of the hammer file. The results
-can be exported as a C header with tables and an interpolating function.
+hammer's own pulse is simulated from rest; then the pulse width that gives a constant impact speed ("blow") is
+computed; by default, the blow is the impact speed of the own pulse at the rail and temperature of the hammer
+file. The results can be exported as a C header with tables and an interpolating function.
 """
 
 from __future__ import annotations
@@ -108,13 +108,13 @@ static inline int32_t {prefix}_between(
 
 
 MOST: Final = 10_000
-"""Largest number of pairs of rail and temperature in a grid."""
+"""Largest number of pairs of rail voltage and coil temperature in a grid."""
 
 LONGEST: Final = 8.0
 """Width of the longest pulse, and length of a simulation, in flight times at the nominal rail."""
 
 SHORTEST: Final = 1.0 / 64.0
-"""Width of the shortest pulse, as a fraction of the flight time with the longest."""
+"""Width of the shortest pulse, as a fraction of the flight time with the longest pulse."""
 
 _DOUBLINGS: Final = 6  # Iteration limit of the doublings that bracket the width
 _WIDTH_ERROR: Final = 1e-9  # Tolerance of the width, in flight times
@@ -127,14 +127,16 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
     hammer: Hammer = part("driven hammer")
     blow: float = scalar("m/s", "impact speed that the solved widths give")
     own_width: float = scalar("s", "width of the hammer's own pulse")
-    own_time: float = scalar("s", "time from switching on to impact with it at nominal rail and temperature")
+    own_time: float = scalar(
+        "s", "time from switching on to impact with the own pulse at nominal rail and temperature"
+    )
     voltage: FloatArray = coordinate("V", "rail voltage", "voltage")
     temperature: FloatArray = coordinate("degC", "temperature of the coil", "temperature")
     time: FloatArray = column(
         "s",
         "time from switching on to impact with the hammer's own pulse",
         "voltage temperature",
-        more="NaN, as the three columns that follow, if the hammer does not reach the pack",
+        more="NaN, as the next three columns, if the hammer does not reach the pack",
     )
     speed: FloatArray = column("m/s", "impact speed with the own pulse", "voltage temperature")
     current: FloatArray = column("A", "largest current with the own pulse", "voltage temperature")
@@ -147,9 +149,9 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
     )
     width: FloatArray = column(
         "s",
-        "pulse width that gives the blow",
+        "pulse width that gives the impact speed `blow`",
         "voltage temperature",
-        more="NaN, as the two columns that follow, if no width gives the blow",
+        more="NaN, as the next two columns, if no width gives that impact speed",
     )
     width_time: FloatArray = column(
         "s", "time from switching on to impact with that width", "voltage temperature"
@@ -158,11 +160,11 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the hammer."""
         return f"dead time of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate the times over rail and temperature, and state where no width gives the impact speed."""
+        """Tabulate times and widths by rail and temperature; state where no width gives the impact speed."""
         own = f"{quantity(self.own_width, 's')}, impact after {quantity(self.own_time, 's')}"
         rail, coil = np.meshgrid(self.voltage, self.temperature, indexing="ij")
         columns = [
@@ -196,7 +198,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
     @property
     def reached(self) -> float:
-        """Largest blow reached at every rail and temperature that gives any, m/s; 0 if none does."""
+        """Largest impact speed that every rail and temperature with an impact can reach, m/s; 0 if none."""
         known = self.strongest[np.isfinite(self.strongest)]
         return float(known.min()) if known.size else 0.0
 
@@ -221,7 +223,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
 
 @dataclass(frozen=True)
 class _Fired:
-    """Outcome of one firing from rest; NaN if nothing is struck."""
+    """Outcome of one firing from rest: time, s, and speed, m/s, of impact, current, A, heat, J; or NaN."""
 
     time: float = np.nan
     speed: float = np.nan
@@ -251,8 +253,8 @@ def dead_time(
     temperature : sequence of float or str, optional
         Coil temperatures, degC; by default 20, 60 and 100 degC.
     blow : float or str, optional
-        Impact speed, m/s, that the widths are solved for; by default that of the own pulse at nominal rail
-        and temperature, which a lower rail or a warmer coil may not reach.
+        Impact speed, m/s, that the computed widths give; by default the impact speed of the own pulse at
+        nominal rail and temperature, which a lower rail or a warmer coil may not reach.
 
     Raises
     ------
@@ -311,7 +313,7 @@ def dead_time(
 
 
 def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_Fired, float]:
-    """Return the firing at the nominal rail, and the simulation length, s; `InputError` without impact."""
+    """Simulate a firing at the nominal rail; return its outcome and the length of later simulations, s."""
     span = 4.0 * float(waveform.width)  # type: ignore[attr-defined]
     for _ in range(_DOUBLINGS):
         fired = _fire(hammer, waveform, span, tolerance)
@@ -326,7 +328,7 @@ def _reference(hammer: Hammer, waveform: Waveform, tolerance: float) -> tuple[_F
 
 
 def _fire(hammer: Hammer, pulse: Waveform, span: float, tolerance: float) -> _Fired:
-    """Simulate one firing from rest for `span`, s; the numbers are NaN if nothing is struck."""
+    """Simulate one firing from rest for `span`, s; the outcome is NaN if the hammer strikes nothing."""
     from printhammer.drive.trains import PulseTrain
     from printhammer.run.simulate import simulate
 
@@ -363,7 +365,7 @@ def _same_blow(
 
 
 def _shortest(pulse: Waveform, width: float) -> float:
-    """Return the smallest width, s, of the form `width` times a power of two, that a pulse accepts."""
+    """Return the smallest valid width of a pulse, s, among `width` times the powers of two."""
     for doubling in range(2 * _DOUBLINGS):
         with suppress(InputError):
             of_width(pulse, width * 2.0**doubling)

@@ -1,4 +1,4 @@
-"""Thermal duty: the largest dot rate at which a coil stays below a temperature, and the time it bears more.
+"""Thermal duty: the largest dot rate at which a coil stays below a limit, and bursts at higher rates.
 
 The coil is modelled as one thermal mass, or as two: winding, temperature T, and surrounding body, temperature
 B.
@@ -67,7 +67,7 @@ class DotHeat:
 
     @property
     def most(self) -> float:
-        """Largest rate at which the driver switches off between dots, Hz."""
+        """Largest dot rate at which the driver still switches off between dots, Hz."""
         return 1.0 / self.on_time if self.on_time > 0.0 else math.inf
 
     def at(self, temperature: float) -> float:
@@ -79,14 +79,14 @@ class DotHeat:
 
 
 def dot_heat(heat: float | str, feed: str = "voltage") -> DotHeat:
-    """Return the heat of one dot from its value at 20 degC, J, and the driver's constant quantity."""
+    """Build the heat of one dot from its value at 20 degC, J, and the quantity that is held constant."""
     if feed not in FEEDS:
         raise InputError.of("feed", feed, f"one of {', '.join(FEEDS)}")
     return DotHeat((REFERENCE,), (read_positive(heat, "J", "heat"),), feed)
 
 
 def read_temperature(value: float | str, name: str) -> float:
-    """Read a temperature, degC or text with that unit, and check that it is above `COLDEST`.
+    """Parse a temperature, a number in degC or text with that unit, and check that it is above `COLDEST`.
 
     Raises
     ------
@@ -100,25 +100,25 @@ def read_temperature(value: float | str, name: str) -> float:
 
 
 def _share(feed: str, temperature: float) -> float:
-    """Return the heat of one dot relative to that at 20 degC."""
+    """Return the ratio of the heat of one dot at a temperature, degC, to the heat at 20 degC."""
     warm = 1.0 + COPPER * (temperature - REFERENCE)
     return {"voltage": 1.0 / warm, "current": warm, "energy": 1.0}[feed]
 
 
 HOTTEST: Final = 1500.0
-"""Upper bound of a steady temperature, degC, above the melting point of copper."""
+"""Upper bound of the search for a steady temperature, degC; above the melting point of copper."""
 
 _TOLERANCE: Final = 1e-9  # Relative and absolute tolerance of the temperatures
 
 
 @dataclass(frozen=True)
 class ThermalCoil:
-    """A coil as one thermal mass, or two."""
+    """Thermal model of a coil: one thermal mass (winding), or two (winding and body)."""
 
     resistance: float
     """Thermal resistance from the winding to the body, or to ambient without a body, K/W."""
     capacity: float | None = None
-    """Heat capacity of the winding, J/K; None if unknown, and then times are NaN."""
+    """Heat capacity of the winding, J/K; None if unknown; burst times are then NaN."""
     body_resistance: float = 0.0
     """Thermal resistance from the body to ambient, K/W; 0 for one thermal mass."""
     body_capacity: float | None = None
@@ -165,7 +165,7 @@ class ThermalDuty(Result, rows="ambient burst"):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the temperature limit of the coil."""
         return f"thermal duty of a coil up to {self.limit:g} degC"
 
     @property
@@ -286,7 +286,7 @@ def thermal_duty(
 
 
 def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> float:
-    """Solve for the steady winding temperature, degC, at an ambient temperature and a rate, Hz; or inf."""
+    """Solve for the steady winding temperature, degC, at an ambient and a dot rate, Hz; inf if none."""
 
     def excess(temperature: float) -> float:
         return rate * heat.at(temperature) * coil.whole - (temperature - ambient)
@@ -295,7 +295,7 @@ def steady(coil: ThermalCoil, heat: DotHeat, ambient: float, rate: float) -> flo
 
 
 def time_to(coil: ThermalCoil, heat: DotHeat, limit: float, ambient: float, rate: float) -> float:
-    """Integrate the warming from ambient temperature at a rate, Hz; return the time to the limit, s."""
+    """Integrate the warming from ambient temperature at a dot rate, Hz; return the time to the limit, s."""
     if limit <= ambient:
         return 0.0
     # At or below the largest continuous rate the limit is never exceeded.

@@ -89,14 +89,14 @@ class ImpactEstimate(Declared):
 
 
 class ImpactEstimator:
-    """Estimator of impact times from samples of the coil, for one pulse of a hammer.
+    """Estimator of impact times from samples of the coil's current or voltage, for one pulse of a hammer.
 
     Parameters
     ----------
     hammer : Hammer
         The nominal hammer, with a pack and a voltage-driven coil.
     sampling : Sampling
-        Sampling of the coil.
+        Sampling of the coil's current or voltage.
     pulse : Waveform, optional
         The fired pulse; by default that of the hammer.
 
@@ -170,12 +170,12 @@ class ImpactEstimator:
 
     @property
     def times(self) -> FloatArray:
-        """Times of the samples after the firing, s."""
+        """Times of the samples since the firing, s, shape (count,)."""
         return np.asarray(self.step * np.arange(self.count), np.float64)
 
     @property
     def clearness(self) -> float:
-        """Amplitude of the nominal impact's signature, in standard deviations of a sample."""
+        """Signal-to-noise ratio: amplitude of the nominal impact's signature over the noise of a sample."""
         return float(self._filters[2][len(self._filters[2]) // 2]) / self.sampling.deviation
 
     def __call__(self, samples: FloatArray) -> float:
@@ -221,12 +221,12 @@ class ImpactEstimator:
         return ImpactEstimate(shown - self.sampling.delay, flag, clearness)
 
     def _is_clipped(self, windows: FloatArray) -> BoolArray:
-        """Whether windows contain readings at the upper end of the range."""
+        """Whether each window contains readings at the upper end of the converter's range, a mask."""
         full_scale = self.sampling.full_scale or math.inf
         return np.asarray((windows >= full_scale - self.sampling.step).any(axis=-1))
 
     def _energy(self, windows: FloatArray) -> FloatArray:
-        """Return the sums of squares of windows after removal of their straight-line fits."""
+        """Return the sum of squares of each window after removal of its straight-line fit."""
         return np.asarray((windows**2).sum(axis=1) - ((windows @ self._base) ** 2).sum(axis=1))
 
     def _likeness(self, windows: FloatArray) -> FloatArray:
@@ -257,7 +257,7 @@ class ImpactEstimator:
         return shifts, rows, np.sqrt((rows**2).sum(axis=1))
 
     def _dot(self) -> tuple[float, float]:
-        """Simulate the nominal dot; return its flight time and contact time, s."""
+        """Simulate the dot of the nominal hammer; return its flight time and contact time, s."""
         dot: Any = simulate(self.hammer, PulseTrain(self.pulse), points=2).dots[0]
         if dot.flight_time is not None and dot.contact_time is not None:
             return float(dot.flight_time), float(dot.contact_time)
@@ -320,7 +320,7 @@ class ImpactEstimator:
 
 
 def _vertex(score: FloatArray, place: int) -> float:
-    """Return the vertex of the parabola through a maximum and its neighbours, in steps from the maximum."""
+    """Return the vertex of the parabola through a maximum and its neighbours, as an offset in steps."""
     if not 0 < place < score.size - 1:
         return 0.0
     before, here, after = score[place - 1 : place + 2].tolist()
@@ -377,7 +377,7 @@ class Sampling(Declared):
 
     @property
     def step(self) -> float:
-        """Quantisation step, A or V; NaN without a range."""
+        """Quantisation step of the converter, A or V; NaN without a range."""
         return math.nan if self.full_scale is None else self.full_scale / 2.0**self.bits
 
     @property
@@ -386,7 +386,7 @@ class Sampling(Declared):
         return math.hypot(self.noise, self.step / math.sqrt(12.0))
 
     def of(self, motion: Motion) -> FloatArray:
-        """Return the true signal at the output times of a motion, A or V."""
+        """Return the noise-free coil current, A, or voltage, V, at the output times of a motion."""
         values = motion.current if self.signal == "current" else motion.voltage
         return np.asarray(values, np.float64)
 
@@ -396,7 +396,7 @@ class Sampling(Declared):
         return slow if self.delay == 0.0 else np.interp(times - self.delay, times, slow)
 
     def clipped(self, values: FloatArray) -> FloatArray:
-        """Clip values to the range, A or V."""
+        """Clip values, A or V, to the range of the converter."""
         span = math.inf if self.full_scale is None else self.full_scale
         return np.clip(values, 0.0, span)
 

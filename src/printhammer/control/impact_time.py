@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from printhammer.results.result import Entries
 
 LEVELS: Final = (0.001, 0.003, 0.01)
-"""Default standard deviations of a sample, relative to the peak current or 10 V."""
+"""Default standard deviations of a sample, as fractions of the peak current or of 10 V."""
 
 MOST: Final = 2000
 """Largest number of sampling settings in a study."""
@@ -43,10 +43,11 @@ _CELLS: Final = "noise sampling_rate bits"
 
 
 class ImpactTime(Result, rows=_CELLS):
-    """Errors of impact times that are estimated from the current or the voltage of the coil.
+    """Errors of impact times that are estimated from the coil's current or voltage, by sampling setting.
 
-    Bias and standard deviation on the nominal hammer are due to noise, sampling and quantisation; those over
-    units add the differences between hammers, which averaging over dots does not reduce.
+    Bias and standard deviation on the nominal hammer are due to noise, sampling and quantisation; bias and
+    standard deviation over units also contain the differences between hammers, which averaging over dots does
+    not reduce.
     """
 
     hammer: Hammer = part("nominal hammer")
@@ -73,7 +74,7 @@ class ImpactTime(Result, rows=_CELLS):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with hammer and signal."""
         return f"time of impact of {self.hammer.name} from the {self.signal} of its coil"
 
     def summary(self) -> Summary:
@@ -102,7 +103,7 @@ class ImpactTime(Result, rows=_CELLS):
         return Summary([Grid(columns, self.title, most=24), said])
 
     def entries(self) -> Entries:
-        """Return the arrays, with the noise in the unit of the signal."""
+        """Return the result arrays, with the noise in the unit of the signal."""
         entries = super().entries()
         note, values = entries["noise"]
         return {**entries, "noise": (replace(note, unit=self.unit), values)}
@@ -128,7 +129,7 @@ class ImpactTime(Result, rows=_CELLS):
 
     @property
     def unit(self) -> str:
-        """SI unit of the noise."""
+        """SI unit of the signal and its noise, "A" or "V"."""
         return UNITS[self.signal]
 
 
@@ -179,7 +180,8 @@ def impact_time(
     known : bool, optional
         Whether the estimator knows delay and bandwidth of the probe.
     dots : int, optional
-        Number of dots of the nominal hammer, and of all units together, per setting.
+        Number of simulated dots per setting: as many of the nominal hammer, and as many of all units
+        together.
     units : int, optional
         Number of hammers drawn from the variability.
     variability : Variability, optional
@@ -187,7 +189,7 @@ def impact_time(
     seed : int, optional
         Seed for the units and for the noise.
     progress : callable, optional
-        Called with the number of finished settings and of all.
+        Called with the number of finished settings and the total number.
     """
     volts = signal == "voltage"
     levels = np.unique([read_number(each, UNITS.get(signal, "A"), "noise") for each in noise])
@@ -284,7 +286,7 @@ def _largest_current(hammer: Hammer) -> float:
 
 
 def unit_record(unit: Hammer, estimator: ImpactEstimator, probe: Sampling) -> tuple[FloatArray, float]:
-    """Simulate the probe signal, A or V, of one dot of a unit, and its impact time, s."""
+    """Simulate the probe signal, A or V, of one dot of a unit; return it with the true impact time, s."""
     each = PHASES if probe.delay or probe.bandwidth is not None else 1
     times = np.asarray(estimator.step / each * np.arange(each * estimator.count), np.float64)
     motion = simulate(
@@ -318,6 +320,6 @@ def flight_deviation(estimator: ImpactEstimator, records: Sequence[Any]) -> floa
 
 
 def root_mean_square(errors: FloatArray) -> float:
-    """Return the RMS of the errors that are not NaN; NaN if all are."""
+    """Return the RMS of the errors that are not NaN; NaN if all errors are NaN."""
     known = errors[np.isfinite(errors)]
     return float(np.sqrt(np.mean(known**2))) if known.size else np.nan

@@ -1,4 +1,4 @@
-"""Pulses of other widths, and the peak and decay of their currents.
+"""Pulses with changed widths, and the peak and decay of their coil currents.
 
 The current of a voltage-driven coil depends on the motion, so the hammer is simulated; other currents are
 known in advance.
@@ -32,10 +32,10 @@ _DOUBLINGS: Final = 6  # Iteration limit of the doublings of the simulated time
 
 
 def current_bound(hammer: Hammer, largest: float | str | None = None, key: str = "largest_current") -> float:
-    """Return a bound on the current, A, from a number, a text with a unit or, for None, the device.
+    """Return the current limit, A: a stated number or text with a unit, or by default that of the hammer.
 
-    That of a device is 2 A or, if that is more, what its own pulse reaches at the largest width, rounded up
-    to 0.1 A.
+    The default limit is 2 A or, if that is more, the peak current of the hammer's own pulse at the largest
+    width, rounded up to 0.1 A.
     """
     if largest is not None:
         return read_positive(largest, "A", key)
@@ -94,7 +94,7 @@ def widest(
     halvings: int,
     peak: Callable[[Waveform], float] = lambda pulse: pulse.peak,
 ) -> float:
-    """Find by bisection the largest width, s, at which the peak current stays within a bound, A.
+    """Find by bisection the largest pulse width, s, at which the peak current stays within a bound, A.
 
     The search covers the widths from `low` to `high`. The bound is assumed to hold at `low`, which is
     returned if it holds nowhere above. `peak` maps a pulse to its largest current, A.

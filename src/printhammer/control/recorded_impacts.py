@@ -24,7 +24,7 @@ from printhammer.support.arrays import FloatArray
 from printhammer.support.tables.readings import Readings, read_table
 
 _BITS: Final = 24
-"""Resolution of a converter without noticeable rounding; a record's rounding is part of its noise."""
+"""Resolution, bits, of a converter without noticeable rounding; a record's rounding counts as noise."""
 
 _UNITS: Final = 20  # Number of simulated units behind an uncertainty; arbitrary
 
@@ -32,7 +32,7 @@ VAGUE: Final = "vague"
 """Flag of an estimate that is at least as uncertain as the nominal flight time."""
 
 _QUIET: Final = 1e-4
-"""Smallest noise of a sample, as a fraction of the largest value."""
+"""Smallest noise of a sample, as a fraction of the record's largest value."""
 
 _UNEVEN: Final = 0.01
 """Largest spread of the time steps of a record, as a fraction of their median."""
@@ -55,14 +55,16 @@ class RecordedImpacts(Result, rows="record"):
         "RMS error of estimates that are not flagged, over simulated units of the production",
         "record",
     )
-    clearness: FloatArray = column("1", "size of the impact's signature over the noise of a sample", "record")
+    clearness: FloatArray = column(
+        "1", "amplitude of the impact's signature over the noise of a sample", "record"
+    )
     flag: tuple[str, ...] = column(
-        "", "reason to doubt the estimate", "record", more="empty without a reason"
+        "", "reason to doubt the estimate", "record", more="empty for a trusted estimate"
     )
 
     @property
     def title(self) -> str:
-        """Title of the summary: hammer and signal."""
+        """One-line title with hammer and recorded signal."""
         return f"times of impact of {self.hammer.name} in records of the {self.signal} of its coil"
 
     def summary(self) -> Summary:
@@ -152,7 +154,7 @@ def recorded_impacts(
 
 
 def _errors_of_units(estimator: ImpactEstimator, units: Sequence[Hammer]) -> tuple[float, float]:
-    """Return the RMS errors over units of estimates that are not flagged and of the nominal time, s."""
+    """Return two RMS errors over units, s: of the estimates that are not flagged, and of the nominal time."""
     records = [unit_record(unit, estimator, estimator.sampling) for unit in units]
     errors, believed = errors_of(estimator, records, len(records), np.random.default_rng(0))
     return root_mean_square(errors[believed]), flight_deviation(estimator, records)

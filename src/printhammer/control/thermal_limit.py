@@ -44,11 +44,11 @@ class ThermalLimit(Result):
     ambient: FloatArray = column("degC", "ambient temperature", "row")
     rate: FloatArray = column("Hz", "largest dot rate, as stated", "row")
     fitted: FloatArray = column("Hz", "largest dot rate, from the fit", "row")
-    warming: FloatArray = column("K s", "warming of the winding per dot rate on this rail", "row")
+    warming: FloatArray = column("K s", "warming of the winding per hertz of dot rate on this rail", "row")
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the temperature limit."""
         return f"largest temperature of a coil, {self.limit:.4g} degC"
 
     def summary(self) -> Summary:
@@ -135,7 +135,7 @@ def thermal_limit(
 
 
 def read_rates(path: Path) -> dict[str, list[float]]:
-    """Read a file of rates, with `COLUMNS`, the rail optional, as arguments of `thermal_limit`."""
+    """Read a file of rates, with `COLUMNS` (the rail is optional), as arguments of `thermal_limit`."""
     from printhammer.support.tables.readings import read_table
 
     wanted = {name: COLUMNS[name] for name in ("ambient", "rate")}

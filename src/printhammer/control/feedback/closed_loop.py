@@ -61,8 +61,8 @@ class FeedbackStrategy(Declared):
     def loops(self, hammer: Hammer, patterns: Sequence[tuple[int, ...]], rate: float) -> list[Loop]:
         """Simulate the closed loop on a hammer for each pattern, from rest.
 
-        The controller does not know the driven hammer and observes it only through the sensor. Patterns are
-        indices of the slots with a dot; `rate` is the slot rate, Hz.
+        The controller does not know the driven hammer and observes the hammer only through the sensor.
+        Patterns are indices of the slots with a dot; `rate` is the slot rate, Hz.
         """
         controller = self.controller
         rest = np.array([rest_state(hammer), 0.0, -1.0, 0.0])
@@ -92,7 +92,7 @@ class FeedbackStrategy(Declared):
         return loops
 
     def _legs(self, hammer: Hammer, now: Sequence[tuple[Loop, int]], ends: FloatArray) -> list[Leg]:
-        """Return the stages up to `ends`; the pack of a dot's slot takes over at its firing."""
+        """Split the time up to `ends` into stages; the pack changes to that of a dot's slot at the firing."""
         if self.places is None:
             return [Leg([hammer] * len(now), ends)]
         before = [self.places[loop.slots[max(dot - 1, 0)]] for loop, dot in now]
@@ -103,7 +103,7 @@ class FeedbackStrategy(Declared):
         return [Leg(before, turns), Leg(after, ends)]
 
     def _see_contacts(self, hammer: Hammer, now: Sequence[tuple[Loop, int]]) -> None:
-        """Advance runs until their latest contacts are over, and update the estimates from these."""
+        """Advance runs until their latest contacts are over, and update the estimates from these contacts."""
         loops = [loop for loop, _dot in now]
         starts = np.array([loop.time for loop in loops])
         over = [loop.touched.end if loop.touched is not None else loop.time for loop in loops]
@@ -123,7 +123,7 @@ class FeedbackStrategy(Declared):
         self.controller.estimate(loops, flights)
 
     def _carry(self, legs: list[Leg], loops: list[Loop], since: FloatArray) -> tuple[Samples, Samples]:
-        """Advance runs through stages; return the samples of contacts and, from `since` on, of flights."""
+        """Advance runs through stages; return sensor samples of contacts and, from `since` on, flights."""
         controller, sensor, ends = self.controller, self.sensor, legs[-1].ends
         starts = np.array([loop.time for loop in loops])
         # An empty time span for a run without a contact.
@@ -172,7 +172,7 @@ class FeedbackStrategy(Declared):
         used: BoolArray,
         x: FloatArray,
     ) -> None:
-        """Advance runs to the end of a stage where necessary; fill in x at the samples up to `until`."""
+        """Advance runs to the end of a stage if needed; fill in displacements at samples up to `until`."""
         hammers, ends = leg
         inside = np.array([loop.state[2] in _BRANCHES for loop in loops])
         moves = np.array([loop.time < end for loop, end in zip(loops, ends, strict=True)])

@@ -69,14 +69,14 @@ _DOTS: Final = "strategy pattern dot"
 
 
 class Feedback(Result, rows=_DOTS):
-    """Comparison of drive strategies; feedback is the last one."""
+    """Comparison of drive strategies on all patterns of eight slots; feedback is the last strategy."""
 
     hammer: Hammer = part("nominal hammer, for which the controller is designed")
     driven: Hammer = part("driven hammer")
     driver: Driver = part("driver of the coil for feedback")
     sensor: PositionSensor = part("sensor of the controller")
     limits: Limits = part("limits on the dots")
-    single: Nominal = part("single-pulse dot of the nominal hammer, which judges all dots")
+    single: Nominal = part("single-pulse dot of the nominal hammer, with which all dots are compared")
     rate: float = scalar("Hz", "slot rate")
     strategies: tuple[str, ...] = coordinate("", "name of the drive strategy", "strategy", name="strategy")
     passed: BoolArray = column("1", "whether all dots are within limits", "strategy pattern", dtype=np.int8)
@@ -100,7 +100,7 @@ class Feedback(Result, rows=_DOTS):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the driven hammer."""
         return f"feedback on {self.hammer.name}"
 
     def summary(self) -> Summary:
@@ -124,16 +124,16 @@ class Feedback(Result, rows=_DOTS):
         return Summary([Grid(columns)])
 
     def entries(self) -> Entries:
-        """Return the columns, and the sensor readings of the recorded run."""
+        """Return the columns of the comparison, and the sensor readings of the recorded run."""
         samples = {
-            "sample_time": (Column("s", "time of a sample in the run shown", ("sample",)), self.run.times),
-            "shown": (Column("m", "what the sensor showed", ("sample",)), self.run.shown),
+            "sample_time": (Column("s", "time of a sample in the recorded run", ("sample",)), self.run.times),
+            "shown": (Column("m", "reading of the sensor", ("sample",)), self.run.shown),
         }
         named = {name: (replace(note, name=name), values) for name, (note, values) in samples.items()}
         return {**super().entries(), **named}
 
     def notes(self) -> dict[str, Any]:
-        """Return driver, sensor, limits, and the pattern of the recorded run."""
+        """Return driver, sensor, limits and the pattern of the recorded run, as attributes of the Dataset."""
         return {
             "driven_fingerprint": self.driven.fingerprint,
             "largest_current": self.driver.current,

@@ -1,9 +1,9 @@
 """Feedback controller: model of the nominal hammer, observer of the driven hammer, and control of the coil.
 
-Before each touch it chooses the pulses that follow, from the estimated time and speed of the touch. It
-releases the armature before a first impact and adds the missing energy with a push into the pack; it catches
-the returning armature and throws it again if the next dot is due soon; and it brakes the armature before the
-backstop if there is time to come to rest.
+Before each touch the controller chooses the pulses that follow, from the estimated time and speed of the
+touch. It releases the armature before a first impact and adds the missing energy with a push into the pack;
+it catches the returning armature and throws it again if the next dot is due soon; and it brakes the armature
+before the backstop if there is time to come to rest.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from printhammer.support.arrays import FloatArray, IntArray
 from printhammer.support.threads import Progress
 
 LEADS: Final = {PUSHED: 30e-6, FREE: 10e-6}
-"""Time between decision and touch, s, by kind of touch: a push may have to end at the touch, and does not
-begin before it."""
+"""Time between decision and touch, s, by kind of touch; a push may have to end at the touch, and never begins
+before the touch."""
 
 WINDOW: Final = 120e-6  # Length of the time window of samples, s
 # Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s
@@ -63,7 +63,7 @@ _POLICIES: Final = 8  # Size of the policy cache
 
 
 class Ahead(NamedTuple):
-    """Consequences of an action.
+    """Predicted consequences of an action: the pulse to fire, and the next touch.
 
     Times after a touch, s, of the throw, of departure from the pack and of the next touch; width of the push,
     s; kind and speed, m/s, of the next touch.
@@ -81,7 +81,7 @@ class Controller:
     """A controller designed for a nominal hammer and the driver of its coil.
 
     The hammer needs a pack and a backstop. `limits` normalise the deviations of dots; `threads` defaults to
-    one per core; `progress` is called with the number of finished steps and of all steps of `fronts`.
+    one per core; `progress` is called with the number of finished steps of `fronts` and the total number.
 
     Raises
     ------
@@ -116,11 +116,11 @@ class Controller:
 
     @cached_property
     def force(self) -> FreeForce:
-        """Force of magnet and spring on the flying armature."""
+        """Interpolated force of magnet and spring on the flying armature."""
         return FreeForce(self.hammer, self.hammer.origin, self.plant.front, self.driver.current)
 
     def launch(self, loop: Loop, dot: int) -> None:
-        """Fire from rest, timed so that the dot touches when it is due."""
+        """Add a launch from rest, timed so that the armature touches the pack when the dot is due."""
         start = self.start
         learned = loop.learned
         late = (learned.front * self.stroke - start.place_slope * learned.scale) / start.speed
@@ -194,7 +194,7 @@ class Controller:
         return np.diag([_PLACE_ERROR * self.stroke, _SPEED_ERROR, loop.learned.scale_error]) ** 2
 
     def decide(self, now: Sequence[tuple[Loop, int]], policy: Policy) -> None:
-        """Decide how runs continue after their coming touches, each with the index of its dot."""
+        """Choose the pulses of runs after their coming touches; each touch has the index of its dot."""
         kind = np.array([loop.kind for loop, _dot in now])
         speed = np.array([loop.speed for loop, _dot in now])
         touch = np.array([loop.touch for loop, _dot in now])
@@ -267,7 +267,7 @@ class Controller:
             self._throw(loop, float(touch[k]), ahead[k])
 
     def _ahead(self, choice: Choice, way: IntArray) -> list[Ahead]:
-        """Return the consequences of the chosen actions."""
+        """Predict the consequences of the chosen actions, one per run."""
         table, rows = self.fronts.table, np.arange(len(way))
         columns = (
             table.fire[way],
@@ -280,7 +280,7 @@ class Controller:
         return [Ahead(*row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
     def _throw(self, loop: Loop, touch: float, ahead: Ahead) -> None:
-        """Throw the armature at the end of the last pulse."""
+        """Add a firing that throws the armature at the end of the last pulse."""
         self._fire(loop, loop.pulses[-1].at[-1], ahead.width)
         clear = max(ahead.leaves, ahead.fire) if ahead.width != ALWAYS else ahead.leaves
         loop.since = touch + clear
@@ -288,13 +288,13 @@ class Controller:
         loop.touch, loop.speed = touch + ahead.touch, ahead.speed
 
     def _push(self, loop: Loop, pulse: Pulse, release: float, back: float) -> None:
-        """Push into the pack from the touch to the release, if required, then apply the return current."""
+        """Add a push into the pack from touch to release, if required, followed by the return current."""
         if loop.kind == FREE and release > 0.0:
             pulse.switch(max(loop.touch, loop.time), self.driver.current)
         pulse.switch(max(loop.touch + release, loop.time), back)
 
     def _land(self, loop: Loop, dot: int, release: float, brake: float, width: float) -> None:
-        """Print a dot and brake the armature on its return."""
+        """Add the pulses that print a dot and brake the armature on its return to the backstop."""
         pulse = loop.pulses[-1]
         self._push(loop, pulse, 0.0 if np.isnan(release) else release, 0.0)
         if not np.isnan(brake):

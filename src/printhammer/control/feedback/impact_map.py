@@ -61,7 +61,7 @@ class ForceMap:
 
     @property
     def off(self) -> int:
-        """Index of the return current closest to zero."""
+        """Index of the return current that is closest to zero."""
         return int(np.argmin(np.abs(self.back)))
 
     def release_for(self, force: float) -> FloatArray:
@@ -77,7 +77,7 @@ class ForceMap:
         return releases
 
     def force_at(self, row: int, release: float, back: float) -> float:
-        """Interpolate the force of a touch, relative to the single pulse."""
+        """Interpolate the peak force of a touch, as a fraction of the single-pulse force."""
         number = int(np.argmin(np.abs(self.back - back)))
         return float(np.interp(release, self.release, self.force[row, number]))
 
@@ -196,7 +196,7 @@ def impact_map(
 
 
 def first_pulse(kind: int, release: float, back: float, fire: float, driver: Driver) -> Switched:
-    """Return the current from just before the touch up to the next push."""
+    """Return the current waveform from just before the touch up to the next push."""
     at, levels = [0.0], [driver.current if kind == PUSHED else 0.0]
     if release > 0.0:
         at.append(AHEAD)

@@ -1,4 +1,4 @@
-"""State of one run of the closed loop: firings, motion, and the controller's estimates and plan."""
+"""State of one closed-loop run: firings, motion, and the controller's estimates and plan."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Learned:
     scale_error: float = SCALE_ERROR
 
     def drift(self) -> None:
-        """Add the process noise to both standard deviations, up to their prior values."""
+        """Add the process noise to the standard deviations of front and scale, up to their prior values."""
         self.front_error = float(min(np.hypot(self.front_error, _FRONT_DRIFT), FRONT_ERROR))
         self.scale_error = float(min(np.hypot(self.scale_error, _SCALE_DRIFT), SCALE_ERROR))
 
@@ -75,7 +75,7 @@ class Learned:
 
 @dataclass
 class Touched:
-    """Contact with the pack, from which the position of its front is estimated.
+    """Contact with the pack, from which the position of the pack's front is estimated.
 
     `start` is before and `end` after the contact, s. At the start, `state` (3,) holds
     displacement, m, speed, m/s, and current scale, with their `covariance` (3, 3).
@@ -89,7 +89,7 @@ class Touched:
 
 @dataclass(frozen=True)
 class Printed:
-    """Contact as estimated when its pulse was chosen, before it revealed the position of the front."""
+    """Contact as predicted when its pulse was chosen, before its samples corrected the pack front."""
 
     # Time, s, speed, m/s, and kind of the touch
     touch: float
@@ -104,7 +104,7 @@ class Printed:
 
 @dataclass
 class Loop:
-    """One run of the closed loop."""
+    """State of one closed-loop run: pattern, firings, motion, estimates and plan."""
 
     slots: tuple[int, ...]  # Indices of the slots with a dot
     due: FloatArray  # Requested touch times, s, (dots,)
@@ -134,7 +134,7 @@ class Loop:
         return float(self.due[dot + 1] - self.due[dot]) if dot + 1 < len(self.due) else np.inf
 
     def drive(self, edge: float) -> PulseSequence:
-        """Return the drive of all firings so far."""
+        """Return the drive that consists of all firings so far."""
         return PulseSequence([pulse.waveform(edge) for pulse in self.pulses], [p.fired for p in self.pulses])
 
     def recent(self, driver: Driver) -> BoundedSequence:

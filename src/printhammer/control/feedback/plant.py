@@ -28,7 +28,7 @@ from printhammer.support.threads import Progress
 
 @dataclass(frozen=True)
 class Plant:
-    """A hammer, the driver of its coil, its single-pulse dot, and the number of threads for simulations."""
+    """Plant: a hammer, the driver of its coil, its single-pulse dot, and the threads for simulations."""
 
     hammer: Hammer
     driver: Driver
@@ -59,7 +59,7 @@ class Plant:
         strobes: Any = None,
         progress: Progress | None = None,
     ) -> tuple[BoolArray, DotTable, Strobes]:
-        """Simulate drives from rest, or from states (drives, 2), m and m/s, up to an end, s.
+        """Simulate drives from rest, or from states (drives, 2), m and m/s, up to an end time, s.
 
         Returns whether each simulation reached its end, the dots of the firings, and the states at `strobes`.
         """
@@ -86,11 +86,11 @@ class Driver(Declared):
         read_positive(self.edge, "s", "edge of the driver")
 
     def switched(self, at: Sequence[float], levels: Sequence[float], initial: float = 0.0) -> Switched:
-        """Return the current that changes to `levels`, A, at the times `at`, s."""
+        """Return the current waveform that changes to `levels`, A, at the times `at`, s."""
         return Switched(at=tuple(at), levels=tuple(levels), edge=self.edge, initial=initial)
 
     def push(self, width: float) -> Switched:
-        """Return a rectangular pulse of the given width, s, at the maximum current."""
+        """Return a rectangular current pulse of a width, s, at the driver's current limit."""
         return self.switched((0.0, width), (self.current, 0.0))
 
     def drive(self, pulses: Sequence[Switched], at: Sequence[float] = (0.0,)) -> BoundedSequence:
@@ -109,7 +109,7 @@ class BoundedSequence(PulseSequence):
 
     @property
     def largest_pulse(self) -> float:
-        """The current limit, A."""
+        """Current limit of the driver, A."""
         return self._bound
 
 

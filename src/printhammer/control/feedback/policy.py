@@ -1,16 +1,16 @@
 """The control policy: the action of least present and future cost, by dynamic programming.
 
 The cost of a dot is a² (1 + k a⁴) + b² (1 + k b⁴), with a and b its deviations of force and arrival as
-fractions of the limits, so that deviations near a limit cost much more than small ones. Return current has a
-small cost, and so has an action whose next touch depends strongly on the speed of this one, which is
-uncertain. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number of
-dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). It is
-computed by backward induction from the last dot before a rest.
+fractions of the limits, so that deviations near a limit cost much more than small ones. The return current
+has a small cost. So has an action whose next touch depends strongly on the speed of the present touch, which
+is uncertain. The discounted cost-to-go is a function of the touch (kind, lateness, speed) and of the number
+of dots before the next rest, and satisfies Bellman's equation (R. Bellman, *Dynamic Programming*, 1957). It
+is computed by backward induction from the last dot before a rest.
 
 The maps are computed for packs at several distances and interpolated to the estimated distance, which is gain
 scheduling with the distance as scheduling variable. The contact itself depends only on the distance from the
-front, but magnet and spring forces depend on the displacement, and so does the time of a flight that ends at
-the backstop.
+front; but magnet and spring forces, and the time of a flight that ends at the backstop, depend on the
+displacement.
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ class Fronts:
 
     @property
     def table(self) -> ImpactMap:
-        """The impact map of the nominal hammer."""
+        """Impact map of the nominal hammer."""
         return self.maps[MIDDLE]
 
     @property
     def landing(self) -> Landing:
-        """The landings of the nominal hammer."""
+        """Landings of the nominal hammer."""
         return self.landings[MIDDLE]
 
 
@@ -166,7 +166,7 @@ class Policy:
         return np.asarray(a**2 * (1.0 + _STEEP * a**4) + b**2 * (1.0 + _STEEP * b**4))
 
     def effort(self, release: FloatArray) -> FloatArray:
-        """Return the cost of the return current, which wears the backstop by a harder landing."""
+        """Return the cost of the return current, which makes the armature strike the backstop harder."""
         table = self.table
         cost = _EFFORT * np.square(table.back / table.driver.current) * (table.fire - release)
         return np.asarray(cost / self.period)
@@ -234,7 +234,7 @@ class Policy:
         return way, np.take_along_axis(cost, way[:, np.newaxis], axis=1)[:, 0], choice
 
     def _doubts(self) -> FloatArray:
-        """Return the cost of the uncertainty of a touch's speed, for all actions, (T, A).
+        """Return the cost due to the uncertain speed of a touch, for all actions, (touches, actions).
 
         The steepest slope in the neighbourhood counts: near a discontinuity, where the number of bounces
         changes, the table between two speeds is meaningless.
@@ -253,7 +253,7 @@ class Policy:
         return doubts
 
     def _front_doubt(self, choice: Choice, rows: IntArray, error: FloatArray) -> FloatArray:
-        """Return the cost of the uncertainty of the pack's front, (M, A)."""
+        """Return the cost due to the uncertain position of the pack's front, (touches, actions)."""
         weaker = error[:, np.newaxis] * choice.by_speed(self.fronts.front_force)[rows]
         force = choice.force[rows]
         zero = np.zeros(1)
@@ -264,7 +264,7 @@ class Policy:
         return both - self.dot_cost(force, zero) + np.square(late)
 
     def costs(self, number: int) -> FloatArray:
-        """Return the cost-to-go, (T, lateness), with `number` dots before a rest."""
+        """Compute the cost-to-go, (touches, lateness), with `number` dots before a rest."""
         while len(self._costs) <= min(number, _ROUNDS):
             self._costs.append(self._one_more(self._costs[-1]))
         return self._costs[min(number, _ROUNDS)]

@@ -77,7 +77,7 @@ def soft_landing(plant: Plant, forces: ForceMap) -> Landing:
 def _left(
     plant: Plant, forces: ForceMap, release: FloatArray, rows: IntArray, tried: FloatArray
 ) -> FloatArray:
-    """Simulate brake pulses (rows, pulses, start and width); return the residual speeds, m/s."""
+    """Simulate brake pulses, shape (rows, pulses, 2) of start and width, s; return residual speeds, m/s."""
     driver, scale = plant.driver, plant.single.flight_time
     drives, states = [], []
     for row, pulses in zip(rows.tolist(), tried, strict=True):
@@ -106,7 +106,7 @@ _WEAKER: Final = 0.03  # Change of the current scale for the finite difference
 
 @dataclass(frozen=True)
 class Launch:
-    """A launch from rest."""
+    """Launch from rest: width of the push, time and speed of the touch, and their sensitivities."""
 
     width: float  # Width of the push, s
     flight: float  # Time from firing to touch, s
@@ -120,7 +120,8 @@ class Launch:
 def launch(plant: Plant, forces: ForceMap) -> Launch:
     """Find the launch whose touch, without a push, prints `_ALMOST` of the single-pulse force.
 
-    A short push into the pack adds the rest of the force; its length is decided when the speed is known.
+    A short push into the pack adds the rest of the force; the length of the push is chosen when the impact
+    speed is known.
     """
     driver, scale = plant.driver, plant.single.flight_time
     widths = _WIDTHS_LAUNCH * scale

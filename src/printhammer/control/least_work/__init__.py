@@ -1,1 +1,1 @@
-"""Bursts of least work: the current that prints a burst with least energy, by optimal control."""
+"""Bursts of least work: optimal control of the current that prints a burst with least coil work."""

@@ -2,14 +2,15 @@
 
 The positive work of a dot is at least the energy that lifts the armature from its turning point to the
 largest indentation and indents the pack: L + U(x_max) - U(x_turn), with L the loading work of the pack, and U
-the energy stored in magnet (at zero current), spring and backstop. The history before the turning point does
+the energy stored in magnet (at zero current), spring and backstop. The motion before the turning point does
 not matter. The first dot starts from rest. A later dot can turn no nearer to the paper than the front of the
 pack, since the preceding contact has to end, and no nearer than the point from which a current within its
 limit can still make the dot.
 
 Alternatively the armature bounces off the backstop, which returns energy without coil work. The returned
-energy is at most that of an undriven armature that falls with all the energy left after the preceding dot;
-whatever the coil adds to the fall counts as positive work, and the backstop returns less than that.
+energy is at most the rebound energy of an undriven armature that falls with all the energy left after the
+preceding dot; energy that the coil adds to the fall counts as positive work, of which the backstop returns
+only a fraction.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _STROBES: Final = 4001  # Samples of each undriven rebound; arbitrary
 
 
 class Bound(Declared):
-    """Lower bounds on the positive coil work of dots."""
+    """Lower bounds on the positive coil work of the first and of each later dot of a burst."""
 
     first: float = scalar("J", "for a dot from rest")
     later: float = scalar("J", "for each later dot, from a turning point in front of the pack")
@@ -51,7 +52,7 @@ class Bound(Declared):
 
 
 def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Bound:
-    """Compute lower bounds for dots with `force` times the force of the single pulse.
+    """Compute the lower bounds for dots with `force` times the force of the single pulse.
 
     The hammer needs magnet, pack and backstop; `largest` is the current limit of either sign, A.
     """

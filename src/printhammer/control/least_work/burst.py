@@ -5,7 +5,7 @@ actuator moving as in a parametric oscillator (swing). In the limit, the only en
 the energy absorbed by the ribbon/paper pack."
 
 The burst is planned slot by slot, each from the final state of the preceding slot (a greedy optimisation, not
-a joint one over all slots): the coil brakes the armature on its return from the paper, holds it off the
+a joint one over all slots): the coil brakes the armature on its return from the paper, keeps it away from the
 backstop, and throws it again, so that the dot has the requested force at the requested time. After the last
 dot the coil lands the armature on the backstop.
 """
@@ -82,11 +82,11 @@ _SETTLED: Final = 1e-2
 
 
 class NoBurstError(PrinthammerError):
-    """No current within the limits was found that prints the burst."""
+    """Raised when no current within the limits is found that prints the burst."""
 
 
 class SupplyCheck(Declared):
-    """A burst at other supply levels than it was planned for: arrays of shape (n,)."""
+    """Outcome of a burst at other supply levels than the planned one: arrays of shape (n,)."""
 
     changes: FloatArray = part("relative change of every current: 0.03 for 3 % more")
     adequate: IntArray = part(
@@ -181,32 +181,32 @@ class LeastWork(Result, rows="node"):
 
     @property
     def ledger(self) -> Ledger:
-        """The energy ledger of the burst."""
+        """Energy ledger of the burst."""
         return self.motion.energy
 
     @property
     def work(self) -> CoilWork:
-        """The work of the coil over the burst."""
+        """Work of the coil over the burst."""
         return self.motion.coil_work
 
     @property
     def net_ratio(self) -> float:
-        """Net coil work over the energy absorbed by the pack, 1 in the ideal limit; NaN without a dot."""
+        """Ratio of the net coil work to the energy absorbed by the pack, ideally 1; NaN without a dot."""
         return self._over(self.work.net)
 
     @property
     def positive_ratio(self) -> float:
-        """Positive coil work over the energy absorbed by the pack."""
+        """Ratio of the positive coil work to the energy absorbed by the pack."""
         return self._over(self.work.positive)
 
     @property
     def bound_ratio(self) -> float:
-        """Lower bound on the positive coil work over the energy absorbed by the pack."""
+        """Ratio of the lower bound on the positive coil work to the energy absorbed by the pack."""
         return self._over(self.bound.burst(self.count))
 
     @property
     def single_ratio(self) -> float:
-        """Net coil work of one single pulse, from rest to rest, over the pack loss of its dot."""
+        """Ratio of the net coil work to the pack loss for one single pulse, from rest to rest."""
         return self.single_work.net / self.single.pack_loss
 
     def _over(self, work: float) -> float:
@@ -251,7 +251,7 @@ class LeastWork(Result, rows="node"):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the hammer."""
         return f"burst of least work of {self.hammer.name}"
 
     def summary(self) -> Summary:
@@ -295,7 +295,7 @@ class LeastWork(Result, rows="node"):
         )
 
     def notes(self) -> dict[str, Any]:
-        """Return works and ledger."""
+        """Return coil works and energy ledger, as attributes of the Dataset."""
         work, ledger = self.work, self.ledger
         return {
             "interpolation": "linear between nodes; a current held from node to node prints fewer dots",
@@ -324,7 +324,7 @@ class LeastWork(Result, rows="node"):
             ("power", "time", "W", "power of the coil", power),
             ("touch", "dot", "s", "touch of the pack", [dot.t_in for dot in dots]),
             ("force", "dot", "N", "largest pack force", forces),
-            ("pack_loss", "dot", "J", "energy that the pack absorbed", [dot.loss for dot in dots]),
+            ("pack_loss", "dot", "J", "energy absorbed by the pack", [dot.loss for dot in dots]),
             ("time", "time", "s", "time", motion.t),
             ("dot", "dot", "1", "number of the dot", np.arange(1, len(dots) + 1, dtype=np.int32)),
         ]
@@ -337,7 +337,7 @@ class LeastWork(Result, rows="node"):
         }
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the nodes of the current."""
+        """Return the nodes of the current, times and currents, as a data frame."""
         times, values = self.nodes
         micros = [from_si(time, "s", "us") for time in times]
         columns = {"time [us]": (("node",), micros), "current [A]": (("node",), values)}

@@ -1,4 +1,4 @@
-"""Local optimisation of simulated currents by sequential quadratic programming.
+"""Local optimisation of coil currents, evaluated by simulation, with sequential quadratic programming.
 
 The method is SLSQP (D. Kraft, DFVLR-FB 88-28 (1988)) as implemented in SciPy. The derivatives are finite
 differences, all of whose simulations form one ensemble.
@@ -84,7 +84,7 @@ def deviations(late: FloatArray, force: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def met(missed: float, spare: float) -> bool:
-    """Whether a dot with these normalised deviations is acceptable."""
+    """Whether a dot is acceptable, from its normalised deviations of arrival and force."""
     return abs(missed) < _MISSED and spare > -_SLACK
 
 
@@ -94,7 +94,7 @@ def best_of(
     tries: int,
     most: int | None = None,
 ) -> FloatArray | None:
-    """Run a multi-start search: return the best outcome of the most promising starts.
+    """Run a multi-start search; return the outcome of least cost among the most promising starts.
 
     Starts are ordered by `badness`. `attempt` maps the index of a start to cost and outcome, or to None if it
     fails. The first `tries` starts are always run; further starts, up to `most` (by default `tries`), only

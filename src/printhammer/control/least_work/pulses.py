@@ -37,8 +37,8 @@ class PulsePlan:
     """Plan of a burst of pulses: the firings so far, and the state of the armature after them.
 
     The widths of `waveform` are optimised; the slope limit of the task is ignored. `period`, `past` (from a
-    touch to the end of its slot), `lead` (the first slot) and `landing` are times, s. The plan begins at rest
-    at the displacement `rest`, m.
+    touch to the end of its slot), `lead` (length of the first slot) and `landing` (length of the landing) are
+    times, s. The plan begins at rest at the displacement `rest`, m.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class PulsePlan:
         self.touches: list[float] = []
 
     def add_dot(self) -> bool:
-        """Plan one more dot; return False if no pulses were found."""
+        """Plan the next dot of the burst; return False if no pulses were found that print it."""
         duration = self._period if self.touches else self._lead
         arrival = duration - self._past
 

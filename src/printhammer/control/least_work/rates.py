@@ -40,11 +40,11 @@ class LeastWorkRates(Result):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the hammer."""
         return f"bursts of least work of {self.hammer.name}"
 
     def summary(self) -> Summary:
-        """Tabulate the cost of a burst, one row per rate."""
+        """Tabulate dots, coil work and lower bound of a burst, one row per rate."""
         columns = [
             self.cells("rates", "rate", ".6g"),
             Cells("adequate dots", [f"{adequate} of {self.count}" for adequate in self.adequate]),

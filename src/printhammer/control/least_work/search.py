@@ -4,10 +4,10 @@ The currents at the nodes are optimised by sequential quadratic programming (SLS
 current of the preceding slot, or from the best profiles of a few levels: brake, wait and throw for a dot;
 hold back and let down for the landing.
 
-Profiles are parameterised by a few shares in [0, 1]. A Sobol sequence of profiles is evaluated, and each of
-the best is refined by a deterministic local search over a shrinking cloud of points. Without the refinement
-SLSQP would stop in one of many local minima, and rounding errors that differ between processors would decide
-in which.
+Profiles are parameterised by a few numbers in [0, 1], called shares. A Sobol sequence of profiles is
+evaluated, and each of the best is refined by a deterministic local search over a shrinking cloud of points.
+Without the refinement SLSQP would stop in one of many local minima, and rounding errors that differ between
+processors would decide in which.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def refined(
 
 
 def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int) -> FloatArray:
-    """Average piecewise constant levels (n, k) with edges (n, k - 1), s, over the steps between nodes."""
+    """Average piecewise constant currents (n, k), with edges (n, k - 1), s, over the steps between nodes."""
     ends = np.pad(edges, ((0, 0), (1, 1)), constant_values=((0.0, 0.0), (0.0, duration)))
     times = node_times(duration, nodes)
     past = np.clip(times, ends[:, :-1, np.newaxis], ends[:, 1:, np.newaxis]) - ends[:, :-1, np.newaxis]
@@ -125,7 +125,7 @@ class NodePlan:
         self.touches: list[float] = []
 
     def add_dot(self) -> bool:
-        """Plan one more dot; return False if no current was found."""
+        """Plan the next dot of the burst; return False if no current was found that prints it."""
         nodes = self._nodes if self._currents else self._lead
         duration = nodes * self._step
         before = self._currents[-1] if len(self._currents) > 1 else None
@@ -214,7 +214,7 @@ def printing_current(
 
 
 def landing_current(task: Task, begin: SlotState, duration: float, nodes: int) -> FloatArray:
-    """Find the nodal currents, A, after the last dot that minimise the landing cost."""
+    """Find the nodal currents, A, after the last dot of a burst that minimise the landing cost."""
 
     def rated(currents: FloatArray, tolerance: float) -> FloatArray:
         outcomes = task.run(begin, np.pad(currents, ((0, 0), (0, 1))), duration, tolerance)
@@ -271,7 +271,7 @@ def _descend(
 
 
 def _within(task: Task, wanted: FloatArray, begin: float, reach: float, to_zero: bool) -> FloatArray:
-    """Clip currents so that they satisfy the limits on value and slope exactly."""
+    """Clip nodal currents so that they satisfy the limits on value and slope exactly."""
     result = np.empty(wanted.size)
     current = begin
     for node, value in enumerate(wanted.tolist()):

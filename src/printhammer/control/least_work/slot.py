@@ -43,7 +43,7 @@ RELOADING: Final = 1e-6  # Lag in the pack that costs as much as the loading wor
 
 @dataclass(frozen=True)
 class SlotState:
-    """State at the beginning of a slot."""
+    """State of the hammer at the beginning of a slot."""
 
     # Displacement, m, and velocity, m/s
     x: float
@@ -82,20 +82,20 @@ class NodeCurrent(Waveform):
 
 
 class _NodeDrive(Drive):
-    """A `NodeCurrent` fired once."""
+    """Drive that fires one `NodeCurrent` at the start of a slot."""
 
     bounded = True
 
     @property
     def largest_pulse(self) -> float:
-        """Current limit; one for all currents of a search, so that all simulations have the same scales."""
+        """Current limit, A, common to all currents of a search, so that all simulations scale alike."""
         assert isinstance(self.waveform, NodeCurrent)
         return self.waveform.largest
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Outcomes of many currents in a slot: arrays of shape (M,)."""
+    """Outcomes of many trial currents in a slot: arrays of shape (M,)."""
 
     # Coil work, J, accurate to about 1e-4 relative
     positive: FloatArray
@@ -117,7 +117,7 @@ def node_times(duration: float, nodes: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Task:
-    """Settings that the slots of a burst have in common."""
+    """Settings common to all slots of a burst: hammer, limits, required force, objective."""
 
     hammer: Hammer  # Driven hammer
     coil: CoilForce  # Force of its coil
@@ -165,7 +165,7 @@ class Task:
         return end_of(ensemble, duration, float(currents[-1]))
 
     def cost(self, outcomes: Outcomes, duration: float) -> FloatArray:
-        """Return the objective, in units of the loading work.
+        """Compute the objective of currents, normalised by the loading work of a dot.
 
         The net work is included since it grows with the backstop loss. Lag in the pack is penalised: if the
         armature goes back into the pack, the law as printed jumps to the loading branch, and the pack returns

@@ -1,1 +1,1 @@
-"""Compensation tables: feedforward of pulse width and firing time by the history of a dot."""
+"""Compensation tables: feedforward of pulse width and firing time as a function of a dot's history."""

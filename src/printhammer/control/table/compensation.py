@@ -84,18 +84,24 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
     gaps: int = scalar("1", "number of gaps in a history")
     reach: int = scalar("1", "longest gap that counts, slots", more="a longer gap counts as rest")
     advance: FloatArray = column(
-        "s", "time from the firing to the slot of the dot", _CELLS, more="negative: fired after the slot"
+        "s",
+        "time from the firing to the slot of the dot",
+        _CELLS,
+        more="negative if the dot is fired after its slot",
     )
     width: FloatArray = column("s", "width of the print pulse", _CELLS)
     brake_delay: FloatArray = column(
-        "s", "time from the slot of the preceding dot to the brake pulse", _CELLS, more="0 without one"
+        "s",
+        "time from the slot of the preceding dot to the brake pulse",
+        _CELLS,
+        more="0 without a brake pulse",
     )
     brake_width: FloatArray = column("s", "width of the brake pulse, 0 for none", _CELLS)
     deviation: FloatArray = column(
         "1",
-        "worst deviation in tuning, as a fraction of the limits",
+        "largest deviation of force or arrival in tuning, as a fraction of the limits",
         _CELLS,
-        more="of force or arrival; NaN if unknown; 1 is exactly on the limit",
+        more="NaN if unknown; 1 is exactly on the limit",
     )
     largest_current: float = scalar("A", "current limit of the tuning")
     driver: str = scalar("", "driver of the coil, see `printhammer.control.table.drive`", default="own")
@@ -121,7 +127,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
                 self._check(row, rate, history)
 
     def _check(self, row: int, rate: float, history: Sequence[int]) -> None:
-        """Raise `InputError` unless an entry can be fired."""
+        """Check that an entry can be fired: values in range, and no firing during an earlier pulse."""
         number = number_of(history, self.reach)
         values = {name: float(getattr(self, name)[row, number]) for name in COLUMNS}
         where = f"rate {rate:g} Hz, history {'-'.join(map(str, history))}"
@@ -194,7 +200,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return mixed(low_row, high_row, share)
 
     def fired_by(self, driver: str, hammer: Hammer) -> CompensationTable:
-        """Convert this table, tuned on a hammer with a driver's pulse, to one for the hammer itself.
+        """Convert a table that was tuned on a hammer with a driver's pulse to a table for the hammer itself.
 
         The flight time from rest depends on the driver; all pulses are shifted by the difference.
         """
@@ -246,7 +252,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return TableStrategy(self, hammer)
 
     def check_hammer(self, hammer: Hammer) -> None:
-        """Raise `InputError` unless the table is made for `hammer`."""
+        """Check that the table is made for `hammer`; raise `InputError` otherwise."""
         if hammer.fingerprint != self.fingerprint:
             raise InputError(
                 f"{hammer.path}: the table is made for another hammer, {self.hammer!r} of fingerprint"
@@ -270,7 +276,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the hammer that the table is made for."""
         return f"compensation table for {self.hammer}"
 
     def summary(self) -> Summary:
@@ -302,7 +308,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """The hammer that the table is made for, and the software versions."""
+        """Provenance of the table: name and fingerprint of its hammer, and the software versions."""
         return {"hammer": self.hammer, "hammer_fingerprint": self.fingerprint, **versions()}
 
     def entries(self) -> Entries:
@@ -365,7 +371,7 @@ class CompensationTable(Result, rows=_CELLS, endings=(".csv", ".json", ".h", ".n
         return size_of(self.rates.size, entries_of(self.gaps, self.reach), bits)
 
     def quantised(self, tick: float | str) -> CompensationTable:
-        """Return the table rounded to a timer tick, s or text; its deviations are unknown."""
+        """Return a copy with times rounded to a timer tick, s or text; its deviations are unknown (NaN)."""
         unit = checked_tick(tick)
         times: dict[str, Any] = {name: np.rint(values / unit) * unit for name, values in self._times.items()}
         return replace(self, **times, deviation=np.full_like(self.deviation, np.nan))

@@ -1,4 +1,4 @@
-"""Draft of a compensation table: evaluate and improve the entries of all histories.
+"""Draft of a compensation table, whose entries are evaluated and improved history by history.
 
 Entries of short histories are solved first, since the dots they describe precede the others in a pattern.
 """
@@ -72,7 +72,7 @@ class Draft:
         return np.asarray(self.deviation.max(axis=1))
 
     def rows(self, which: IntArray) -> Draft:
-        """Return a copy with the rows `which`."""
+        """Return a copy with the rates selected by `which`."""
         return Draft(self.task, self.rates[which], self.values[:, which])
 
     def table(self) -> CompensationTable:
@@ -90,7 +90,7 @@ class Draft:
         )
 
     def places(self, cells: Cells) -> tuple[IntArray, IntArray]:
-        """Return the row and column indices of entries."""
+        """Return the row and column indices of the entries of some histories at all rates."""
         columns = [number_of(history, self.task.reach) for _row, history in cells]
         return np.array([row for row, _history in cells], np.int64), np.array(columns, np.int64)
 
@@ -189,7 +189,7 @@ class Draft:
 
 
 def blank(task: Task, rates: FloatArray) -> Draft:
-    """Return a draft of zeros for the given rates."""
+    """Return a draft with all entries zero, for rates in Hz."""
     return Draft(task, rates, np.zeros((len(VALUES), rates.size, entries_of(task.gaps, task.reach))))
 
 

@@ -47,18 +47,18 @@ def checked_size(gaps: int, reach: int) -> tuple[int, int]:
 
 
 def entries_of(gaps: int, reach: int) -> int:
-    """Return the number of history numbers, aliases included."""
+    """Return the number of possible history numbers, aliases included."""
     return int((reach + 1) ** gaps)
 
 
 def plain(history: Sequence[int]) -> History:
-    """Return a history with every gap after a rest replaced by rest."""
+    """Normalise a history: every gap after a rest is replaced by rest."""
     known = list(itertools.takewhile(lambda gap: gap != REST, history))
     return (*known, *[REST] * (len(history) - len(known)))
 
 
 def number_of(history: Sequence[int], reach: int) -> int:
-    """Return the number of a history."""
+    """Return the number of a history, the index of its entry in a table."""
     number = 0
     for gap in plain(history):
         number = number * (reach + 1) + gap
@@ -72,7 +72,7 @@ def histories(gaps: int, reach: int) -> list[History]:
 
 
 def shared_numbers(gaps: int, reach: int) -> IntArray:
-    """Map every history number to the number it is an alias of, shape (entries,)."""
+    """Map every history number to the number whose history it stands for, shape (entries,)."""
     every = itertools.product(range(reach + 1), repeat=gaps)
     return np.array([number_of(row, reach) for row in every], np.int64)
 
@@ -124,7 +124,7 @@ JUMP: Final = 8e-6
 
 
 class Settings(NamedTuple):
-    """Entries of a `CompensationTable` at one rate: arrays of shape (entries,), indexed by history number.
+    """Entries of a compensation table at one rate: arrays of shape (entries,), by history number.
 
     Meanings and units are those of the table's columns.
     """
@@ -143,7 +143,8 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
     Raises
     ------
-    The hammer has no waveform, a waveform without a width or in newtons, or one that exceeds the limit.
+    InputError
+        The hammer has no waveform, or a waveform that has no width, is a force, or exceeds the limit.
     """
     pulse = pulse_of(hammer)
     width = getattr(pulse, "width", None)
@@ -179,7 +180,7 @@ def print_pulse(hammer: Hammer, largest: float) -> tuple[Waveform, float]:
 
 
 def fading(hammer: Hammer, pulse: Waveform, share: float) -> float:
-    """Return the time, s, from the end of a pulse until it stays below the fraction `share` of its peak.
+    """Return the time, s, from the end of a pulse until its value stays below `share` times its peak.
 
     For a driver this is the first time at which the current has decayed; later induced currents are ignored.
     """
@@ -309,7 +310,7 @@ def driven_by(hammer: Hammer, driver: str, largest: float) -> Hammer:
 
 
 def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: float) -> Hammer:
-    """Set the pulse to the width between `low` and `high`, s, with print force `force`, N; nested grids."""
+    """Return the hammer with the pulse width, `low` to `high`, s, that prints with `force`, N."""
     for _ in range(_ROUNDS):
         widths = np.linspace(low, high, _GRID).tolist()
         pulses = [of_width(pulse, width) for width in widths]
@@ -328,6 +329,6 @@ def of_force(hammer: Hammer, pulse: Waveform, force: float, low: float, high: fl
 
 
 def with_pulse(hammer: Hammer, pulse: Waveform) -> Hammer:
-    """Return a copy of the hammer with another pulse."""
+    """Return a copy of the hammer with another waveform."""
     constants = {key: value for key, value in dict(pulse).items() if key != "quantity"}
     return hammer.replace("waveform", {"shape": pulse.shape, **constants}, source="of the driver")

@@ -193,7 +193,7 @@ def _check_keys(entry: Mapping[str, Any], wanted: Sequence[str], where: str) -> 
 
 
 def _built(head: Head, rows: Rows) -> dict[str, Any]:
-    """Assemble the arrays from rows; check that each history occurs exactly once at each rate."""
+    """Assemble the arrays of a table from rows; check that each history occurs once at each rate."""
     gaps, reach = head["gaps"], head["reach"]
     for number, row in enumerate(rows, 1):
         if not (np.isfinite(row["rate"]) and row["rate"] > 0.0):

@@ -20,13 +20,13 @@ NANOSECOND: Final = 1e-9
 """Default unit of the times in a header, s."""
 
 _PLACE_BYTES: Final = 4
-"""Size of a rate or of an axis value, bytes."""
+"""Size of a rate or an axis value in a header, bytes."""
 
 _ADVANCE, _, _DELAY, _BRAKE = range(len(COLUMNS))
 
 
 def bits_of(times: Mapping[str, FloatArray], tick: float) -> int:
-    """Return the size of a time in bits: 32 for nanoseconds, else 16 if all times fit."""
+    """Return the integer size of a header's times in bits: 32 for nanoseconds, else 16 if all times fit."""
     largest = max(float(np.abs(np.rint(values / tick)).max()) for values in times.values())
     return 32 if tick == NANOSECOND or largest > np.iinfo(np.int16).max else 16
 
@@ -188,7 +188,7 @@ def _quoted(text: str) -> str:
 
 
 def _most(prefix: str, values: int, entries: int) -> str:
-    """Return the C loops that compute the largest look-ahead at one rate."""
+    """Return the C code of the loops that compute the largest look-ahead at one rate."""
     place = f"{prefix}_look_ahead{'[value]' if values else ''}[rate][history]"
     loops = f"  for (unsigned history = 0; history < {entries}u; history++)\n"
     if values:
@@ -201,7 +201,7 @@ class _Between(NamedTuple):
 
     said: str
     call: str
-    """Name and first arguments of the function."""
+    """Name and first arguments of the generated C function."""
 
     share: str
     """C statements that set `below`, `above`, and the weight `part` / `whole`."""

@@ -51,11 +51,11 @@ _AXES: Final = "strategy driven rate patterns"
 
 
 class TableReport(Result, rows=_AXES):
-    """Comparison of a table with open loop, by hammer, rate and set of patterns."""
+    """Comparison of a compensation table with open loop, by hammer, rate and set of patterns."""
 
     table: CompensationTable = part("the table", repr=False)
     hammer: Hammer = part(
-        "the hammer that the table is made for", more="its single-pulse dot judges every dot"
+        "hammer that the table is made for", more="every dot is compared with its single-pulse dot"
     )
     hammers: tuple[str, ...] = coordinate(
         "", "deviation of the driven hammer from the design, in words", "driven", name="driven"
@@ -67,9 +67,11 @@ class TableReport(Result, rows=_AXES):
         "1",
         "largest deviation of the force, relative to that of the single pulse",
         _AXES,
-        more="of printed dots",
+        more="of the printed dots only",
     )
-    arrival: FloatArray = column("s", "largest deviation of the arrival", _AXES, more="of printed dots")
+    arrival: FloatArray = column(
+        "s", "largest deviation of the arrival", _AXES, more="of the printed dots only"
+    )
     lost: FloatArray = column("1", "lost dots", _AXES)
     extra: FloatArray = column("1", "extra contacts", _AXES)
     multiplier: FloatArray = column(
@@ -98,7 +100,7 @@ class TableReport(Result, rows=_AXES):
 
     @property
     def title(self) -> str:
-        """Title in one line."""
+        """One-line title with the name of the table's hammer."""
         return f"compensation table for {self.hammer.name} beside open loop"
 
     def summary(self) -> Summary:
@@ -121,7 +123,7 @@ class TableReport(Result, rows=_AXES):
         return Summary([Grid(columns, said)])
 
     def notes(self) -> dict[str, Any]:
-        """Return the limits."""
+        """Return the limits on the dots, as attributes of the Dataset."""
         return {"force_limit": self.limits.force, "arrival_limit": self.limits.arrival}
 
 

@@ -71,7 +71,7 @@ _ROUNDING: Final = 1e-12  # Tolerance that includes the end of a range of delays
 
 
 def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
-    """Choose a candidate for each of the ascending periods, s, between a dot and the next.
+    """Choose a candidate for each of the ascending periods, s, from one dot to the next.
 
     Returns the periods at which a candidate exists, and the chosen candidate of each.
     """
@@ -100,7 +100,7 @@ def chosen(task: Task, periods: FloatArray) -> tuple[FloatArray, Ways]:
 
 
 def _is_barred(task: Task, ways: Ways) -> BoolArray:
-    """Mask of the candidates that failed in a table tuned before."""
+    """Mask of the candidates that failed in a previously tuned table."""
     mask = np.zeros(ways.size, np.bool_)
     for period, delay, brake in task.barred:
         mask |= np.isclose(ways.period, period, 1e-9) & (ways.delay == delay) & (ways.brake == brake)
@@ -117,7 +117,7 @@ def spaced(periods: FloatArray, spacing: float) -> list[float]:
 
 
 def _valued(task: Task, tried: Sequence[Ways]) -> list[Ways]:
-    """Solve several groups of candidates together; return those of each group with a finite cost."""
+    """Solve several groups of candidates together; return each group's candidates with a finite cost."""
     every = solved(task, joined(tried))
     every = every._replace(cost=costs(task, every))
     ends = np.cumsum([group.size for group in tried])
@@ -189,7 +189,7 @@ def _grid(task: Task, period: float, brakes: Sequence[tuple[float, float]], fine
 
 
 def _best(task: Task, cells: Ways, more: int = 1) -> Ways:
-    """Solve from the best cells of a grid; return the best solutions."""
+    """Solve for pulses from the best cells of a grid; return the solutions of least cost."""
     if not cells.size:
         return cells
     off, apart = largest_of(seconds(task, cells)), _APART * task.scale

@@ -77,7 +77,7 @@ def search_scale(hammer: Hammer, pulse: Waveform) -> float:
 
 @dataclass(frozen=True)
 class Task:
-    """Settings of the tuning of a table.
+    """Settings for tuning a compensation table: hammers, limits, pulse shapes and bounds.
 
     The table is tuned on `hammers`, its design first; the hammers of `spread` differ a little from the
     design. No pulse is wider than `widest`, s, and none begins earlier than `wait`, s, after the end of a
@@ -100,7 +100,7 @@ class Task:
     barred: tuple[tuple[float, float, float], ...] = ()
     """Period, delay and width of brake pulses, s, of candidates that failed in a tuned table."""
     located: bool = False
-    """Whether the fixed points of all rows are located, also of those that look good after two dots."""
+    """Whether the fixed points of all rows are located, even of rows that look good after two dots."""
     mean_square: bool = False
     """Whether the cost of a candidate is the RMS over all hammers instead of the worst case."""
 

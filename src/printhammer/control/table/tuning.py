@@ -41,10 +41,10 @@ BETWEEN: Final = 0.5
 
 
 def refined(draft: Draft) -> Draft:
-    """Insert rates into a draft where it is poor halfway between two of its rates.
+    """Insert rates into a draft where interpolation halfway between two of its rates is poor.
 
-    Such places are where the solution branch changes. A new entry follows the branch of the rate below or
-    above, whichever costs less; if both are poor, a new search is run.
+    Interpolation is poor where the solution branch changes. A new entry follows the branch of the rate below
+    or above, whichever costs less; if both are poor, a new search is run.
     """
     # At lower rates every dot is printed from rest.
     lower = np.flatnonzero(1.0 / draft.rates[1:] <= draft.task.single.settled)
@@ -69,7 +69,7 @@ def refined(draft: Draft) -> Draft:
 
 
 def _halfway(draft: Draft, lower: IntArray) -> Draft:
-    """Interpolate the table halfway between some rates and the next higher ones, and judge the result."""
+    """Interpolate a draft halfway between some rates and the next higher ones, and evaluate the result."""
     table = draft.table()
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     settings = np.array([table.at(float(rate)) for rate in rates])
@@ -80,7 +80,7 @@ def _halfway(draft: Draft, lower: IntArray) -> Draft:
 
 
 def _tuned_between(draft: Draft, lower: IntArray) -> Draft:
-    """Tune rows halfway between some rates and the next higher ones."""
+    """Tune table rows at rates halfway between some rates and the next higher ones."""
     task = draft.task
     rates = 0.5 * (draft.rates[lower] + draft.rates[lower + 1])
     halfway = Draft(task, rates, draft.values[:, lower])
@@ -120,7 +120,7 @@ SPREAD: Final = (
 # Deviation, as a fraction of the limits, up to which a rate is kept in an automatic grid
 _USABLE: Final = 0.9
 _GAP: Final = 6
-"""Most rates of the grid that a gap may have to be searched again; arbitrary: each takes some seconds."""
+"""Largest gap of unusable rates that is tuned again, in rates; arbitrary: each rate takes some seconds."""
 _TRIES: Final = 4  # Most times that a rate is searched again, without the candidates that failed
 _POOR: Final = 0.5  # Deviation, as a fraction of the limits, above which a requested rate is tuned again
 # Offsets of additional periods at which candidates are then searched, s
@@ -265,7 +265,7 @@ def _spread(hammer: Hammer) -> list[Hammer]:
 
 
 def _counter(effort: Effort, total: int) -> Callable[[], None]:
-    """Return a function that reports one more step of the work on each call."""
+    """Return a function that reports the completion of one more step on each call."""
     steps = iter(range(1, total + 1))
 
     def count() -> None:
@@ -276,7 +276,7 @@ def _counter(effort: Effort, total: int) -> Callable[[], None]:
 
 
 def _all_rates(single: Single, scale: float) -> FloatArray:
-    """Return rates from where every dot is from rest up to where the armature has not yet left the pack."""
+    """Return the rates from where dots do not interact up to where the armature is still in the pack."""
     first, step = FIRST / scale, STEP / scale
     lowest = step * np.floor(1.0 / (single.settled * step))
     rates = np.arange(lowest, 1.0 / single.left, step)
@@ -293,9 +293,10 @@ def _given_rates(asked: Sequence[float | str]) -> FloatArray:
 
 
 def _bridge(draft: Draft) -> None:
-    """Retune short gaps of unusable rates in place, from the lowest on, until a gap stays unusable.
+    """Tune short gaps of unusable rates again, in place, from the lowest on, until a gap stays unusable.
 
-    The table ends below the first rate that stays poor, so that a gap of a few rates would cost all above.
+    The table ends below the first rate that stays poor, so a gap of a few rates would cost all rates above
+    the gap.
     """
     while (bad := np.flatnonzero(~(draft.worst <= _USABLE))).size:
         first = bad[: _GAP + 1]
@@ -308,7 +309,7 @@ def _bridge(draft: Draft) -> None:
 
 
 def _tune_again(draft: Draft, poor: IntArray) -> None:
-    """Retune rates that are not good enough, with candidates from neighbouring periods too; in place."""
+    """Tune poor rates again, in place, with additional candidates from neighbouring periods."""
     if not poor.size:
         return
     task = draft.task

@@ -1,4 +1,4 @@
-"""Candidate pulses for a dot that follows another dot: solve for them, and rate rows of such dots.
+"""Candidate pulses for a dot that follows another dot: their solution, and the cost of rows of such dots.
 
 The solver is a damped Gauss-Newton iteration (Levenberg-Marquardt) for firing time and width, vectorised over
 dots.
@@ -122,7 +122,7 @@ _STEPS: Final = (1e-6, 0.5e-6)  # Finite-difference steps of firing time and wid
 _RIGHT: Final = 0.02
 _WRONG: Final = 1.0  # Additional cost of a candidate that is not a solution, so that solutions rank first
 STABLE: Final = 0.97
-"""Largest absolute multiplier of an admissible row, from dot to dot: inside the unit circle, with a margin
+"""Largest absolute multiplier, from dot to dot, of an admissible row: inside the unit circle, with a margin
 for interpolation and timer ticks."""
 
 _FAR_OFF: Final = 5.0  # Deviation, as a fraction of the limits, at which an RMS term is cut off
@@ -158,13 +158,13 @@ class Ways(NamedTuple):
         return Ways(*(values[which] for values in self))
 
     def at(self, period: float) -> Ways:
-        """Return the candidates moved to another period, with the same firing time relative to the slot."""
+        """Return the candidates for another period, s, with the same firing time relative to the slot."""
         moved = self.fired + (period - self.period)
         return self._replace(period=np.full(self.size, period), fired=moved)
 
 
 def joined(parts: Iterable[Ways]) -> Ways:
-    """Concatenate sets of candidates; the result may be empty."""
+    """Concatenate several sets of candidates into one, which may be empty."""
     return Ways(*map(np.concatenate, zip(ways_of([]), *parts, strict=True)))
 
 
@@ -245,9 +245,10 @@ def costs(task: Task, ways: Ways) -> FloatArray:
 def growths(task: Task, ways: Ways) -> FloatArray:
     """Compute the factor by which an error in a long row of each candidate grows from dot to dot, (ways,).
 
-    NaN if it is unknown. The state after two dots is the fixed point of the row if these are right; where the
-    cost says that they are not, and the row looks stable, the fixed point is located. So it is for all rows
-    if the task says so: beside a grazing there is none, however good the first dots are.
+    NaN if the factor is unknown. If the first two dots are right, the state after them is the fixed point of
+    the row. If the cost says that they are not, and the row looks stable, the fixed point is located by
+    iteration; so are the fixed points of all rows if the task requires it, since beside a grazing none
+    exists, however good the first dots are.
     """
     rows = rows_of(task, ways, _SECOND + MORE)
     hammers = [task.hammers[0]] * ways.size
@@ -264,7 +265,7 @@ def seconds(task: Task, ways: Ways) -> FloatArray:
 
 
 def rows_of(task: Task, ways: Ways, dots: int) -> list[Drive]:
-    """Return the drives of rows of `dots` dots, one per candidate; the first dot is from rest."""
+    """Return the drives of rows of `dots` dots, one drive per candidate; the first dot is from rest."""
     known: dict[tuple[float, float, float], Waveform] = {}
     drives: list[Drive] = []
     for period, delay, brake, fired, width, _cost in zip(*(column.tolist() for column in ways), strict=True):

@@ -1,1 +1,1 @@
-"""The estimator, an observer and a Kalman filter: what noisy, late samples show of the hammer."""
+"""The estimator: an observer and a Kalman filter for noisy and delayed position samples."""

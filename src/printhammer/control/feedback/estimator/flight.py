@@ -1,4 +1,4 @@
-"""The observer: state of the flying armature and its coming touch, from samples and a force model.
+"""The observer: estimates of the flying armature's state and next touch, from samples and a force model.
 
 In flight the acceleration is that of magnet and spring, a known function of displacement and current. Three
 numbers are unknown: displacement X and speed V at a reference time, and the relative deviation s of all
@@ -77,7 +77,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Flight:
-    """Flights estimated from samples."""
+    """Flights estimated from samples: states, covariances, and the coming touches."""
 
     # Time, s, and speed, m/s, of the coming touch, (M,)
     touch: FloatArray

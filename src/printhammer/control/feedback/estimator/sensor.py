@@ -1,7 +1,8 @@
 """A position sensor with noise, quantisation and delay.
 
 Samples are taken at integer multiples of the interval. The noise of a sample depends only on the seed, the
-run and the index of the sample, so a closed loop is the same to the bit whatever runs are simulated with it.
+run and the index of the sample, so the results of a closed loop do not depend, to the last bit, on the other
+runs of the ensemble.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class Samples(NamedTuple):
     error: float
 
     def take(self, which: Any) -> Samples:
-        """Return the selected rows or columns."""
+        """Return the samples of selected rows or columns."""
         return Samples(self.times[which], self.shown[which], self.used[which], self.error)
 
 
@@ -76,7 +77,7 @@ class PositionSensor(Declared):
         return max(1, round(time / self.interval))
 
     def numbers(self, since: FloatArray, until: FloatArray, most: int) -> IntArray:
-        """Return the indices of the latest samples in time spans (M,), s, shape (M, most).
+        """Return the indices of the latest samples in time spans (M,), s, as an array (M, most).
 
         `until` is the time at which the samples are needed, so the latest was taken one delay earlier. The
         indices ascend, padded with -1 at the front.
@@ -115,7 +116,7 @@ def normal(seed: int, runs: Words, numbers: IntArray) -> FloatArray:
 
 
 def run_key(slots: tuple[int, ...], rate: float) -> int:
-    """Return the noise key of a pattern at a rate, a hash of both."""
+    """Return the noise key of a dot pattern at a slot rate: a hash of both."""
     import hashlib
 
     text = f"{rate!r} {slots!r}".encode()
