@@ -26,20 +26,20 @@ __all__ = ["FIGURES", "FORMATS", "PaperFigure", "save"]
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """Figure of the paper."""
+    """Figure of the paper: number, title, caption, and the function that draws it."""
 
     number: int
-    """Number in the paper."""
+    """Number of the figure in the paper."""
     place: str
-    """Module in `printhammer.figures.paper` and name of the function, separated by a dot."""
+    """Module in `printhammer.figures.paper` and function that draws the figure, separated by a dot."""
     title: str
-    """Title in a few words."""
+    """Title of the figure in a few words."""
     caption: str
-    """Description of the picture in one or two sentences."""
+    """Caption that describes the figure in one or two sentences."""
 
     @property
     def function(self) -> Callable[..., Figure]:
-        """Function that draws the figure, from a hammer and options."""
+        """Function that draws the figure, given a hammer and options."""
         module, _, name = self.place.partition(".")
         function: Callable[..., Figure] = getattr(import_module(f"{__name__}.paper.{module}"), name)
         return function

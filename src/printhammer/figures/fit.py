@@ -1,4 +1,4 @@
-"""Fits: data and law, residuals, their distribution, and correlation of the constants."""
+"""Figure of a fit: data and law, residuals, their distribution, and correlation of the constants."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ _KINDS: Final = {
     "impact speed": "velocity",
     "rebound speed": "velocity",
 }
-"""Scale of each quantity of a table; other quantities are pure numbers."""
+"""Scale of each measured quantity, by name; other quantities are drawn as pure numbers."""
 
 _MANY: Final = 400
-"""Number of data from which points are drawn small; arbitrary."""
+"""Number of data from which the points are drawn small; arbitrary."""
 
 _LEGEND: Final = 8  # Largest number of entries in a legend; arbitrary
 _NAMED: Final = 6
-"""Largest number of outliers whose lines are named."""
+"""Largest number of outliers whose line numbers are written; arbitrary."""
 
 
 @styled
 def plot(fit: Fit) -> Figure:
-    """Draw a fit.
+    """Draw a fit: data with the law, residuals, correlation and quantiles.
 
     Left: data with the law, residuals below; right: correlation of the constants, and residuals against
     normal quantiles. Rejected outliers are ringed.
@@ -99,7 +99,7 @@ def _data(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
 
 
 def _is_curve(values: FloatArray) -> bool:
-    """Whether values in the order of the abscissa form one curve, not several interleaved ones."""
+    """Whether fitted values, in the order of the abscissa, form one curve rather than several."""
     return float(np.abs(np.diff(values)).sum()) <= 4.0 * float(np.ptp(values)) if len(values) > 1 else False
 
 
@@ -131,7 +131,7 @@ def _residuals(ax: Axes, fit: Fit, across: Scale, up: Scale) -> None:
 
 
 def _spread(fit: Fit) -> FloatArray:
-    """Return the standard deviation of each datum relative to the residual scale."""
+    """Compute the standard deviation of each datum relative to the residual scale."""
     used = ~fit.outliers
     spread = 1.0 / np.sqrt(fit.weights)
     return np.asarray(spread / np.sqrt(np.mean(spread[used] ** 2)))
@@ -165,7 +165,7 @@ def _correlation(ax: Axes, fit: Fit) -> None:
 
 
 def _short(key: str) -> str:
-    """Abbreviate a key to fit beside a matrix."""
+    """Shorten the key of a constant to fit beside the correlation matrix."""
     plain = key if " " in key else key.rpartition(".")[2]
     for section in ("magnet.", "spring.", "backstop."):
         plain = plain.replace(section, "")
@@ -173,7 +173,7 @@ def _short(key: str) -> str:
 
 
 def _quantiles(ax: Axes, fit: Fit) -> None:
-    """Draw sorted residuals, relative to their standard deviations, against normal quantiles."""
+    """Draw sorted residuals, in standard deviations, against normal quantiles."""
     from scipy.stats import norm
 
     used = ~fit.outliers

@@ -1,6 +1,6 @@
-"""Printed page: the dots on paper, the requested dots, placement errors, and the region of largest error.
+"""Figure of a printed page: dots on paper, request, placement errors, and the region of largest error.
 
-Ink on paper is rendered into an array: round dots of given optical densities.
+Ink on paper is rendered into an array, as round dots of given optical densities.
 
 Densities of overlapping dots add. The rim of a dot is soft over a tenth of its diameter, or 1.5 pixels if
 that is more.
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 PAPER: Final = (252, 250, 243)
 INK: Final = (24, 24, 38)
-"""RGB colours of paper and of fully opaque ink."""
+"""RGB colours of the paper (`PAPER`) and of fully opaque ink."""
 
 MOST_PIXELS: Final = 24_000_000
 """Number of pixels above which a sheet is rendered more coarsely; arbitrary."""
@@ -42,22 +42,22 @@ _TOGETHER: Final = 1_000_000  # Pixels computed at once, which bounds the memory
 
 @dataclass(frozen=True)
 class Sheet:
-    """Rectangle of the paper."""
+    """Rectangle of the paper that is drawn, by its edges."""
 
     left: float
     right: float
     top: float
     bottom: float
-    """Edges, m: across, and downward."""
+    """Edges of the rectangle, m: left and right across the paper, top and bottom downward."""
 
     @property
     def width(self) -> float:
-        """Width, m."""
+        """Width of the rectangle, m."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """Height, m."""
+        """Height of the rectangle, m."""
         return self.bottom - self.top
 
     def pixels(self, finest: float) -> tuple[float, int, int]:
@@ -69,10 +69,10 @@ class Sheet:
 def inked(
     sheet: Sheet, across: FloatArray, down: FloatArray, density: FloatArray, diameter: float, finest: float
 ) -> FloatArray:
-    """Return the optical density on a sheet from the top left, shape (rows, columns).
+    """Render dots; return the optical density on a sheet from the top left, shape (rows, columns).
 
-    Dots have centres, m, densities and one common diameter, m; they are clipped at the edges of the sheet.
-    Pixels are at least `finest`, m.
+    The dots are given by centres, m, densities and a common diameter, m, and are clipped at the edges of the
+    sheet. The pixel size is at least `finest`, m.
     """
     size, rows, columns = sheet.pixels(finest)
     radius = 0.5 * diameter / size
@@ -100,7 +100,7 @@ def inked(
 
 
 def coloured(density: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-    """Return the RGB picture of paper with ink of the given densities, shape (rows, columns, 3)."""
+    """Convert optical densities to the RGB image of ink on paper, shape (rows, columns, 3)."""
     back = np.exp(-math.log(10.0) * np.asarray(density, np.float32))[..., np.newaxis]
     ink, paper = np.array(INK, np.float32), np.array(PAPER, np.float32)
     return np.asarray(ink + back * (paper - ink) + np.float32(0.5), np.uint8)
@@ -108,10 +108,10 @@ def coloured(density: npt.ArrayLike) -> npt.NDArray[np.uint8]:
 
 View = Literal["page", "zoom", "sheet"]
 VIEWS: Final = get_args(View)
-"""Views: the full page, the region of largest error, or the sheet of paper at true size."""
+"""Views of a page: the full page, the region of largest error, or the paper alone at true size."""
 
 ZOOM_SHAPE: Final = 3.5
-"""Width of the region of largest error in units of the height of the wires."""
+"""Width of the region of largest error, in units of the height of the column of wires."""
 
 _WIDTH: Final = 7.6  # Width of the figure, in
 _SIDE: Final = 0.2  # Margin at either side, in
@@ -135,16 +135,16 @@ _MICRONS: Final = Scale("Placement error", "m", "um")
 
 @styled
 def plot(page: Page, view: View = "page") -> Figure:
-    """Draw a page.
+    """Draw a printed page: the print, the request, their difference, and the region of largest error.
 
-    In the difference a dot has the colour of its placement error, and crosses mark lost dots. In the worst
-    place rings mark requested dots, and crosses lost dots.
+    In the difference, the colour of a dot shows its placement error, and crosses mark lost dots. In the
+    region of largest error, rings mark requested dots, and crosses lost dots.
 
     Parameters
     ----------
     view : str, optional
-        "page": from the top, the print, the request, the difference, and the worst place; "zoom": the worst
-        place alone; "sheet": the paper alone, at true size.
+        "page": from the top, the print, the request, the difference, and the region of largest error; "zoom":
+        the region of largest error alone; "sheet": the paper alone, at true size.
     """
     if view == "sheet":
         return _sheet_alone(page)
@@ -188,7 +188,7 @@ def plot(page: Page, view: View = "page") -> Figure:
 
 
 def whole_sheet(page: Page) -> Sheet:
-    """Return the paper of a page: all its print lines, with a margin."""
+    """Return the rectangle of paper that contains all print lines of a page, with a margin."""
     head, pattern = page.head, page.pattern
     margin = 2.0 * head.wire_diameter
     across = (pattern.slots - 1) * head.pitch
@@ -197,12 +197,12 @@ def whole_sheet(page: Page) -> Sheet:
 
 
 def zoom_slots(page: Page) -> int:
-    """Return the number of slots shown of the region of largest error."""
+    """Return the width of the region of largest error, in slots."""
     return max(1, round(ZOOM_SHAPE * page.head.wires * page.head.wire_pitch / page.head.pitch))
 
 
 def zoomed_sheet(page: Page) -> Sheet:
-    """Return the paper around the region of largest error of a page."""
+    """Return the rectangle of paper around the region of largest error of a page."""
     head, slots = page.head, zoom_slots(page)
     line, first = page.worst_place(slots)
     top = line * head.line_pitch
@@ -217,7 +217,7 @@ def zoomed_sheet(page: Page) -> Sheet:
 
 
 def _panel(figure: Figure, sheet: Sheet, top: float, height: float, title: str, left: float = _SIDE) -> Axes:
-    """Return axes for a sheet, placed by height, top (above the bottom of the figure) and left, in."""
+    """Add axes for a sheet to a figure, with a title; height, top and left edge are in inches."""
     width, whole = figure.get_size_inches()
     wide = height * sheet.width / sheet.height
     ax = figure.add_axes((left / width, (top - height) / whole, wide / width, height / whole))
@@ -242,7 +242,7 @@ def _zoom_title(page: Page) -> str:
 
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return positions and densities of all dots on the paper, including extra contacts."""
+    """Return positions across and down, m, and densities of all dots on the paper, with extra contacts."""
     printed, extra = (*page.places, page.density), (*page.extra_places, page.extra_density)
     across, down, density = (
         np.concatenate([values[page.printed], more]) for values, more in zip(printed, extra, strict=True)
@@ -251,7 +251,7 @@ def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _paper(ax: Axes, sheet: Sheet, page: Page, dots: tuple[FloatArray, ...], finest: float) -> None:
-    """Draw a sheet with dots: positions across and down, m, densities; pixels at least `finest`, m."""
+    """Draw a sheet of paper with dots; pixels are at least `finest`, m."""
     across, down, density = dots
     picture = coloured(inked(sheet, across, down, density, page.head.wire_diameter, finest))
     extent = (sheet.left, sheet.right, sheet.bottom, sheet.top)
@@ -271,7 +271,7 @@ def _discs(
 
 
 def _in_points(ax: Axes, length: float) -> float:
-    """Convert a length on the paper, m, to points of the drawing."""
+    """Convert a length on the paper, m, to points in the figure."""
     figure = ax.get_figure(root=True)
     assert figure is not None
     width, _height = figure.get_size_inches()
@@ -280,7 +280,7 @@ def _in_points(ax: Axes, length: float) -> float:
 
 
 def _differences(figure: Figure, ax: Axes, page: Page, above: float) -> None:
-    """Draw the placement errors, and a scale above the panel."""
+    """Draw the placement errors of a page in colours, lost dots as crosses, and a colour bar above."""
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
     on, head, (across, down) = page.printed, page.head, page.places
@@ -326,7 +326,7 @@ def _zoom(ax: Axes, sheet: Sheet, page: Page) -> None:
 
 
 def _sign(figure: Figure, page: Page) -> None:
-    """Write the quality of the page below the figure."""
+    """Write hammer and print quality below the figure of a page."""
     sign(figure, page.hammer)
     _width, whole = figure.get_size_inches()
     left = _SIDE / _WIDTH
@@ -334,7 +334,7 @@ def _sign(figure: Figure, page: Page) -> None:
 
 
 def summary(page: Page) -> str:
-    """Return the quality of a page in one line."""
+    """Return the print quality of a page as one line of text."""
     lost, extra = int(page.lost.sum()), int(page.extra_contacts.sum())
     said = [f"{page.line.size} dots requested", f"{int(page.printed.sum())} printed", f"{lost} lost"]
     if not page.run.all():

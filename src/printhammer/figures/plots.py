@@ -49,16 +49,16 @@ PLOTS: Final = {
     "ToleranceYield": "quality.plot_tolerance",
     "ZeroOne": "chaos.exponents.plot_zero_one",
 }
-"""Module and function, by the class name of the result; an additional picture has a name after a dot."""
+"""Module and function that draw a result, by its class name; further figures have a name after a dot."""
 
 
 def plot(result: object, picture: str = "", **options: Any) -> Figure:
-    """Draw a result; `picture` selects an additional picture, such as "run" for the entry "Feedback.run".
+    """Draw a result; `picture` selects a further figure, such as "run" for the entry "Feedback.run".
 
     Raises
     ------
     AttributeError
-        The class of the result has no such picture.
+        The class of the result has no such figure.
     """
     name = ".".join(filter(None, (type(result).__name__, picture)))
     if name not in PLOTS:
@@ -72,7 +72,7 @@ def plot(result: object, picture: str = "", **options: Any) -> Figure:
 def _attach(figure: Figure) -> None:
     """Register a figure with pyplot if pyplot is loaded and its backend opens windows.
 
-    Elsewhere nothing global keeps the figure: pyplot would hold it until it is closed.
+    Otherwise the figure is not registered, since pyplot would keep it in memory until it is closed.
     """
     pyplot = sys.modules.get("matplotlib.pyplot")
     if pyplot is None:

@@ -1,8 +1,8 @@
-"""Print quality: force and arrival of every dot, and their deviations against the rate.
+"""Print quality: force and arrival time of every dot, and their deviations against the rate.
 
-Damping study: safe rate, settle-out time and wear of every material, in rows.
+`plot_damping` draws safe rate, settle-out time and wear of every material of a damping study.
 
-Tolerance yield: distribution of the safe rates of a production, and the constants that decide.
+`plot_tolerance` draws the safe rates of hammers within tolerances, and the most influential constants.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ _ROOM: Final = 1.25  # Half-width of the axes in units of the limits or of the d
 
 @styled
 def plot(quality: Quality) -> Figure:
-    """Draw the dots of a pattern in the plane of force and arrival, and in sequence.
+    """Draw the dots of a pattern in the plane of force and arrival deviation, and in sequence.
 
-    Left: force of every dot relative to the single pulse, against its delay, with the limits as a box. Right:
-    both against the slot, at most 64 slots that include the worst dot.
+    Left: force of every dot relative to the single pulse, against its arrival deviation, with the limits as a
+    box. Right: both quantities against the slot, for at most 64 slots that include the worst dot.
     """
     figure = new_figure(3.6, 7.6)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.0, 1.35))
@@ -84,10 +84,10 @@ def plot(quality: Quality) -> Figure:
 
 @styled
 def plot_safe_rate(*safe_rates: SafeRate) -> Figure:
-    """Draw the deviations of force and arrival against the rate, and the safe rate.
+    """Draw the deviations of force and arrival time against the rate, and the safe rate.
 
     Bands extend from the smallest to the largest deviation of any dot of any pattern; grey: within limits.
-    Several safe rates, such as of different strategies, are overlaid.
+    Several safe rates, e.g. of different strategies, are overlaid.
     """
     figure = new_figure(4.6)
     axes = figure.subplots(2, 1, sharex=True)
@@ -139,7 +139,7 @@ def _reach(values: FloatArray, bound: float) -> float:
 
 
 def _window(quality: Quality) -> int:
-    """Return the first slot shown, with the worst dot in the middle."""
+    """Return the first slot shown, so that the worst dot is in the middle of the slots shown."""
     if len(quality.wanted) <= _MOST_SLOTS:
         return 0
     bounds = np.maximum([quality.limits.force, quality.limits.arrival], 1e-300)
@@ -154,7 +154,7 @@ def _window(quality: Quality) -> int:
 
 
 COLOURS: Final = {"as it is": style.INK, "hard": style.BLUE, "elastomer": style.GREEN, "pack": style.ORANGE}
-"""Colour of each kind of material."""
+"""Colour of the bars and labels, by kind of material."""
 
 _ROW: Final = 0.2  # Height of a row, in
 _BAR: Final = 0.66  # Height of a bar, as a fraction of the spacing; arbitrary
@@ -162,11 +162,10 @@ _BAR: Final = 0.66  # Height of a bar, as a fraction of the spacing; arbitrary
 
 @styled
 def plot_damping(study: DampingStudy) -> Figure:
-    """Draw a damping study.
+    """Draw a damping study: safe rate, settle-out time and impulse, one row per material.
 
-    One row per material. Bars: safe rate, settle-out time, and impulse at the backstop, all at the same print
-    force. Hollow: the current exceeds the limit. Dashed: the hammer without change. A text replaces a missing
-    bar.
+    All bars, including the impulse at the backstop, are for the same print force. Hollow bars: the current
+    exceeds the limit. Dashed lines: the unchanged hammer. A text replaces a missing bar.
     """
     count = len(study.materials)
     figure = new_figure(1.3 + _ROW * count, 7.6)
@@ -224,11 +223,11 @@ def _panel(ax: Axes, study: DampingStudy, values: FloatArray, otherwise: list[st
 
 @styled
 def plot_tolerance(batch: ToleranceYield, *, bars: int = 8) -> Figure:
-    """Draw a tolerance yield, with the constants of largest influence.
+    """Draw a tolerance yield, and the constants with the largest influence on it.
 
     Left: fraction of hammers that print every pattern within limits, against the rate; or, for a single rate,
     the single-pulse dots of passing and failing hammers. Right: rank correlation of each constant with the
-    safe rate, or with passing; grey: range of chance.
+    safe rate, or with passing; grey: range expected by chance.
     """
     figure = new_figure(3.6, 7.4)
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))

@@ -1,1 +1,1 @@
-"""Pictures of strobes, exponents, orbits, branches and basins."""
+"""Figures of strobe points, exponents, orbits, branches, basins and sensitivities."""

@@ -1,8 +1,8 @@
-"""Basins in the plane of the initial states, with the attractors.
+"""Figures of basins of attraction in the plane of the initial states, with the attractors.
 
 `plot_manifolds` draws stable and unstable manifolds of saddles.
 
-`plot_quench` draws the quench map: second peak of lost dots, print force of the others.
+`plot_quench` draws the quench map: the second peak of lost dots, the print force of printed dots.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 COLOURS: Final = {"stable": BLUE, "unstable": ORANGE}
 _LIGHT: Final = {"stable": "white", "unstable": INK}
-"""Colours of manifolds over basins."""
+"""Colours of stable and unstable manifolds that are drawn over basins."""
 
 
 @styled
 def plot_manifolds(manifolds: Manifolds) -> Figure:
-    """Draw the manifolds of a saddle, and the saddle itself."""
+    """Draw the manifolds of a saddle, and the saddle itself, in the plane of displacement and velocity."""
     figure, ax = new_panel(5.0)
     largest = np.nanmax(np.abs(manifolds.x)) if len(manifolds.x) else 1.0
     way, speed = scale("displacement", float(largest)), scale("velocity")
@@ -52,7 +52,7 @@ def plot_manifolds(manifolds: Manifolds) -> Figure:
 def draw(
     ax: Axes, manifolds: Manifolds, way: Scale, speed: Scale, colours: dict[str, str] = _LIGHT
 ) -> list[Line2D]:
-    """Draw manifolds and their saddle into existing axes; return one legend handle for each kind."""
+    """Draw manifolds and their saddle into given axes; return one legend handle per kind of mark."""
     from matplotlib.patheffects import withStroke
 
     from printhammer.chaos.orbits.manifolds import KINDS
@@ -82,10 +82,10 @@ def draw(
 
 
 SHADES: Final = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00", "#999933")
-"""Colours of the basins, by M. Okabe and K. Ito (2008); further basins repeat them, lighter."""
+"""Colours of the basins, by M. Okabe and K. Ito (2008); further basins get lighter shades of them."""
 
 OTHERS: Final = {0: ("undecided", "#ffffff"), -1: ("run ended early", "#1a1a1a"), -2: ("no state", "#d9d9d9")}
-"""Names and colours of the cells that reach no known attractor, by label."""
+"""Names and colours of the cells that lead to no known attractor, by cell label."""
 
 _MARKS: Final = "os^Dvph*"
 _LIGHTER: Final = 0.5  # Factor of the distance from white of repeated colours; arbitrary
@@ -94,7 +94,7 @@ _FEW: Final = 4  # Entries beyond which the legend has two columns; arbitrary
 
 
 def shade(number: int) -> str:
-    """Return the colour of the basin of an attractor, counted from 1."""
+    """Return the colour of an attractor's basin, by the number of the attractor, from 1."""
     turn, place = divmod(number - 1, len(SHADES))
     parts = [int(SHADES[place][k : k + 2], 16) for k in (1, 3, 5)]
     for _ in range(min(turn, 2)):
@@ -104,9 +104,10 @@ def shade(number: int) -> str:
 
 @styled
 def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifolds] = ()) -> Figure:
-    """Draw basins, and the attractors that lie in their plane, at the firings.
+    """Draw basins of attraction, and the attractors in their plane.
 
-    `manifolds` of saddles are drawn on top: stable ones, which bound basins, in white, unstable ones dark.
+    `manifolds` of saddles are drawn on top: stable manifolds, which bound the basins, in white, unstable
+    manifolds in black.
     """
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
@@ -173,7 +174,7 @@ def plot(basins: Basins, *, attractors: bool = True, manifolds: Sequence[Manifol
 
 PRINTED: Final = "viridis"
 LOST: Final = "bone"
-"""Colour maps of the force of printed dots, and of the second peak of lost dots; both monotonic."""
+"""Colour maps of a quench map: force of printed dots, and second peak of lost dots; both monotonic."""
 
 _FAILED: Final = "#d55e00"
 _FEW_QUENCH: Final = 0.01  # Fraction of forces beyond either end of the colour scale; arbitrary
@@ -181,9 +182,9 @@ _FEW_QUENCH: Final = 0.01  # Fraction of forces beyond either end of the colour 
 
 @styled
 def plot_quench(quenches: QuenchMap) -> Figure:
-    """Draw a quench map.
+    """Draw a quench map, time between firings horizontal, width of the second pulse vertical.
 
-    Crosses mark the two cases of Fig. 6 of the paper, if they lie in the plane.
+    Crosses mark the two cases of Fig. 6 of the paper if they lie within the axes.
     """
     figure, ax = new_panel(4.6)
     across = Scale("Second firing after the first", "s", "ms")

@@ -31,16 +31,16 @@ SHADES: Final = {
     "undecided": "#c4c4c4",
     "run ended early": "#7a1f1f",
 }
-"""Colour of the band of a classification."""
+"""Colour of the bands, by the classification of the motion."""
 
 WAYS: Final = {"from rest": style.INK, "up": style.ORANGE, "down": "#7b3fa0"}
-"""Colours of points reached from one direction only; distinct from the band colours."""
+"""Colours of points reached in one direction only, by direction; distinct from the band colours."""
 
 _POINT: Final = 0.7  # Size of a point, points
 _MOST: Final = 3_000_000
-"""Number of points above which they are drawn smaller; arbitrary."""
+"""Number of points above which the points are drawn smaller; arbitrary."""
 _SPARSE: Final = 150
-"""Number of values up to which points are drawn larger; arbitrary."""
+"""Number of parameter values up to which the points are drawn larger; arbitrary."""
 _FEW: Final = 1e-3  # Fraction of the states outside the limits at either end; arbitrary
 
 
@@ -52,15 +52,15 @@ def plot(
     orbits: Iterable[Any] = (),
     limits: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw a bifurcation diagram.
+    """Draw a bifurcation diagram with bands that classify the motion.
 
-    Black points are reached from all directions, orange and violet ones by rising or falling values only. The
-    bands below show the classifications.
+    Black points are reached in all directions, orange points only with rising values, violet points only with
+    falling values. The bands below show the classification of the motion.
 
     Parameters
     ----------
     show : str, optional
-        "x": displacements at the firings; "v": velocities.
+        Quantity on the vertical axis: "x" for displacements at the firings, "v" for velocities.
     orbits : iterable, optional
         Orbits to draw on top in green: periodic orbits of `printhammer.orbits` (filled circles if stable,
         else open ones), branches of `printhammer.continuation` (solid if stable, else dotted), and
@@ -72,7 +72,7 @@ def plot(
     Raises
     ------
     InputError
-        There is nothing to draw, or an orbit belongs to another parameter or phase.
+        The diagram has no states, or an orbit belongs to another parameter or phase.
     """
     if show not in ("x", "v"):
         raise InputError.of("show", show, "'x' or 'v'")
@@ -116,7 +116,7 @@ def plot(
 
 
 def parameter_scale(diagram: Bifurcation) -> Scale:
-    """Return the scale of the parameter axis."""
+    """Return the scale of the parameter axis of a diagram: name and units."""
     note = diagram.regime.quantity(diagram.parameter)
     unit, meaning = note.si, note.meaning
     if diagram.parameter == PERIOD:
@@ -127,7 +127,7 @@ def parameter_scale(diagram: Bifurcation) -> Scale:
 
 
 def _most(states: FloatArray) -> tuple[float, float]:
-    """Return limits that include all but a few of the states."""
+    """Return axis limits that include all states but one in a thousand at each end."""
     known = states[np.isfinite(states)]
     low, high = (float(end) for end in np.quantile(known, [_FEW, 1.0 - _FEW]))
     room = 0.06 * (high - low) or 0.01 * abs(high) or 1.0
@@ -152,7 +152,7 @@ def _points(ax: Axes, diagram: Bifurcation, states: FloatArray, across: Scale, u
 
 
 def _each(orbits: Iterable[Any]) -> Iterable[Any]:
-    """Iterate over orbits and branches in nested collections."""
+    """Iterate over the orbits and branches in nested collections."""
     for entry in [orbits] if hasattr(orbits, "multipliers") else orbits:
         if hasattr(entry, "multipliers"):
             yield entry
@@ -161,7 +161,7 @@ def _each(orbits: Iterable[Any]) -> Iterable[Any]:
 
 
 def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale, up: Scale) -> None:
-    """Draw a periodic orbit as circles, or a branch as curves."""
+    """Draw a periodic orbit as circles, or a branch as curves, over a diagram."""
     states = up.shown(getattr(orbit, show))
     if states.ndim == 2:
         if orbit.parameter != diagram.parameter or orbit.phase != diagram.phase:
@@ -191,7 +191,7 @@ def _orbit(ax: Axes, diagram: Bifurcation, orbit: Any, show: str, across: Scale,
 def _crossed(
     values: FloatArray, states: FloatArray, size: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Insert points on a branch where the linearly interpolated multiplier crosses the unit circle."""
+    """Insert points on a branch where the interpolated multiplier crosses the unit circle."""
     at = np.flatnonzero((size[1:] < 1.0) != (size[:-1] < 1.0))
     share = (1.0 - size[at]) / (size[at + 1] - size[at])
     middle = values[at] + share * (values[at + 1] - values[at])
@@ -204,7 +204,7 @@ def _crossed(
 
 
 def _bands(strip: Axes, diagram: Bifurcation, across: Scale) -> None:
-    """Draw a band with the classification of the motion for each direction."""
+    """Draw one band per direction, coloured by the classification of the motion."""
     starts = np.concatenate([[0.0], np.cumsum(cells(diagram.values))]) + diagram.values[0]
     for way, name in enumerate(diagram.directions):
         place = 0
@@ -227,7 +227,7 @@ def _kind(verdict: str, stopped: bool) -> str:
 
 
 def _key(strip: Axes, diagram: Bifurcation) -> None:
-    """Draw the legend of the bands present, and of the points reached from one direction."""
+    """Draw the legend of the bands that occur, and of the points reached in one direction only."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

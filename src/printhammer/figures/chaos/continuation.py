@@ -53,18 +53,18 @@ def plot(
     grazings: bool = True,
     limits: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw branches against their parameter.
+    """Draw branches of periodic orbits against their parameter.
 
-    The colour shows the orbit period in firings.
+    The colour shows the orbit period, in firings.
 
     Parameters
     ----------
     branches : Branch or Branches
-        From `printhammer.continuation` or `printhammer.regimes`.
+        Results of `printhammer.continuation` or `printhammer.regimes`.
     show : str, optional
         Quantity of the vertical axis: "x", "v", "flight_time", "impact_speed" or "peak_force".
     grazings : bool, optional
-        Whether grazings are marked beside folds, period doublings and the like.
+        Whether grazings are marked in addition to bifurcations.
     limits : tuple of float, optional
         Limits of the vertical axis, SI.
     """
@@ -99,7 +99,7 @@ def axis_of(name: str, si: str) -> tuple[str, float]:
 
 
 def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> None:
-    """Draw the lines of a branch; `factors` convert parameter and quantity."""
+    """Draw the lines of a branch, solid where it is stable; `factors` scale parameter and quantity."""
     values, table, stable = _with_points(branch, show)
     colour = colour_of(branch.firings)
     begin = 0
@@ -117,7 +117,7 @@ def draw(ax: Axes, branch: Branch, show: str, factors: tuple[float, float]) -> N
 
 
 def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, list[bool]]:
-    """Return parameter and quantity with branch points inserted, and the stability of each line segment."""
+    """Return parameter and quantity with branch points inserted, and the stability of each segment."""
     table = getattr(branch, show)
     values, rows, stable = [branch.values[0]], [table[0]], []
     inside: dict[int, list[Any]] = {}
@@ -141,7 +141,7 @@ def _with_points(branch: Branch, show: str) -> tuple[FloatArray, FloatArray, lis
 
 
 def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
-    """Return a quantity at an event of a branch, interpolated in the arc length."""
+    """Return a quantity at an event of a branch, interpolated along the arc length."""
     i, nodes = event.after, branch.curve.nodes
     span = nodes[i + 1].arc - nodes[i].arc
     share = min(max((event.point.node.arc - nodes[i].arc) / span, 0.0), 1.0) if span > 0.0 else 0.5
@@ -151,7 +151,7 @@ def _at_event(branch: Branch, event: Any, table: FloatArray) -> FloatArray:
 def _mark(
     ax: Axes, branches: Sequence[Branch], show: str, factors: tuple[float, float], grazings: bool
 ) -> list[str]:
-    """Mark the events of branches; return the kinds present."""
+    """Mark the events of branches with symbols; return the kinds of events that occur."""
     kinds: list[str] = []
     for branch in branches:
         table = getattr(branch, show)
@@ -169,7 +169,7 @@ def _mark(
 
 
 def colour_of(firings: int) -> str:
-    """Return the colour of orbits of a given period in firings."""
+    """Return the line colour of orbits with a given period in firings."""
     return _COLOURS.get(firings, style.INK)
 
 
@@ -189,7 +189,7 @@ def _legend(ax: Axes, branches: Sequence[Branch], kinds: Sequence[str]) -> None:
 
 
 def _remarks(branches: Sequence[Branch]) -> list[str]:
-    """Return remarks on branches that end before the bounds."""
+    """Return remarks that count the branches ending before the bounds, by reason."""
     reasons = {
         "length": "at the maximum number of steps",
         "lost": "where Newton's method does not converge",

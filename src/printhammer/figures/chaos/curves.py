@@ -1,6 +1,7 @@
 """Bifurcation curves in the plane of two parameters, over the attractors of trains from rest.
 
-`plot_chart` is the designer's chart: stability limits of an orbit, and attractors of trains from rest.
+`plot_chart` draws a stability chart: the limits of an orbit, and the trains from rest that settle to its
+period.
 """
 
 from __future__ import annotations
@@ -29,16 +30,15 @@ CURVES: Final = {
     "Neimark-Sacker": (style.GREEN, (0, (1, 1))),
     "grazing": (style.INK, "-"),
 }
-"""Colour and dashes of the curves of a kind."""
+"""Colour and dash pattern of the curves, by kind of bifurcation."""
 _REGION: Final = "#cfe3f1"
 
 
 @styled
 def plot_chart(chart: StabilityChart) -> Figure:
-    """Draw a stability chart.
+    """Draw a stability chart, the first parameter horizontal, the second vertical.
 
-    Horizontal: first parameter; vertical: second. Shaded: the train from rest settles to the orbit's period;
-    grey: its run stopped early.
+    Shaded: the train from rest settles to the period of the orbit; grey: its run stopped early.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -84,7 +84,7 @@ def plot_chart(chart: StabilityChart) -> Figure:
 
 
 def edges(axis: np.ndarray) -> np.ndarray:
-    """Return the cell edges around evenly spaced values."""
+    """Compute the cell edges around evenly spaced values, one more than there are values."""
     half = 0.5 * (axis[1] - axis[0]) if len(axis) > 1 else 0.5 * abs(axis[0])
     return np.append(axis - half, axis[-1] + half)
 
@@ -104,7 +104,7 @@ def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
     Parameters
     ----------
     curve : BifurcationCurve
-        From `printhammer.bifurcation_curve`.
+        Result of `printhammer.bifurcation_curve`.
     attractors : bool, optional
         Whether to colour the plane by the attractors of trains from rest, if computed: see `grid` of
         `printhammer.bifurcation_curve`.
@@ -144,7 +144,7 @@ def plot(curve: BifurcationCurve, *, attractors: bool = True) -> Figure:
 
 
 def _shade(ax: Axes, curve: BifurcationCurve, factors: tuple[float, ...]) -> list[Patch]:
-    """Colour the plane by the period of trains from rest; return the legend entries."""
+    """Colour the plane by the period to which trains from rest settle; return the legend entries."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 

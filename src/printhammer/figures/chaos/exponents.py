@@ -1,10 +1,10 @@
-"""Lyapunov exponents: running estimates of one train, many trains side by side, and the 0-1 test.
+"""Lyapunov exponents: running estimates for one train, charts of many trains, and the 0-1 test.
 
-`plot_correlation`: correlation sums and their local slopes against the distance, with the plateau.
+`plot_correlation` draws correlation sums and their local slopes against the distance, with the plateau.
 
-`plot_finite_time`: histograms of finite-time exponents over stretches of several lengths.
+`plot_finite_time` draws histograms of finite-time exponents over stretches of several lengths.
 
-`plot_recurrence`: recurrence plot with its quantities.
+`plot_recurrence` draws a recurrence plot and lists its quantities.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ if TYPE_CHECKING:
 
 _COLOURS: Final = (style.BLUE, style.ORANGE)
 _SIGMAS: Final = 3.0
-"""Half-width of bands and bars in standard errors, the same as for the sign of an exponent."""
+"""Half-width of bands and error bars, in standard errors, as in the test of an exponent's sign."""
 
 
 @styled
 def plot(spectrum: Lyapunov) -> Figure:
-    """Draw the running estimates of both exponents against the number of firings.
+    """Draw the running estimates of both exponents of a train against the number of firings.
 
     Bands are three standard errors wide on either side.
     """
@@ -107,10 +107,10 @@ def _running(ax: Axes, counts: Any, means: FloatArray, errors: FloatArray, colou
 
 @styled
 def plot_chart(chart: LyapunovChart) -> Figure:
-    """Draw both exponents and the K of the 0-1 test against the time between firings.
+    """Draw both exponents and K of the 0-1 test of many trains against the time between firings.
 
-    Bars are three standard errors on either side; open marks are trains for which the exponent and the 0-1
-    test disagree or one is undecided.
+    Error bars extend three standard errors on either side. Open marks are trains for which the exponent and
+    the 0-1 test disagree, or either is undecided.
     """
     figure = new_figure(6.0)
     grid = figure.add_gridspec(3, 1, height_ratios=(3.0, 2.0, 2.0), hspace=0.04)
@@ -173,9 +173,9 @@ def _remarks(chart: LyapunovChart, agree: Any) -> list[str]:
 
 @styled
 def plot_zero_one(test: ZeroOne) -> Figure:
-    """Draw the data of the 0-1 test: path, mean square displacement, and correlations.
+    """Draw the data of a 0-1 test: path in the plane, mean square displacement, and correlations.
 
-    Path and displacement are those of the angle with the median correlation, ringed at the right.
+    Path and displacement belong to the angle with the median correlation, which is ringed in the right panel.
     """
     figure = new_figure(2.9)
     path, growth, angles = figure.subplots(1, 3)
@@ -203,7 +203,7 @@ def plot_zero_one(test: ZeroOne) -> Figure:
 
 @styled
 def plot_correlation(correlation: CorrelationDimension) -> Figure:
-    """Draw the correlation sums, their local slopes below, and the dimension if there is a plateau."""
+    """Draw correlation sums, their local slopes below, and the dimension if there is a plateau."""
     figure = new_figure(5.0)
     above, below = figure.subplots(2, 1, sharex=True)
     some = correlation.sums > 0.0
@@ -225,7 +225,7 @@ _BINS: Final = 60  # Bins of a histogram; arbitrary
 
 @styled
 def plot_finite_time(finite: FiniteTime) -> Figure:
-    """Draw the densities of finite-time exponents for each length, and the exponent of the whole train."""
+    """Draw the density of finite-time exponents for each length, and the exponent of the whole train."""
     figure, ax = new_panel(4.2)
     ends = min(row.min() for row in finite.values), max(row.max() for row in finite.values)
     bins = np.linspace(*ends, _BINS + 1).tolist() if ends[0] < ends[1] else _BINS
@@ -255,7 +255,7 @@ _NAMES: Final = {
 def plot_recurrence(recurrence: Recurrence) -> Figure:
     """Draw a recurrence plot: a point for each pair of states closer than the threshold.
 
-    The quantities are listed beside the plot.
+    The quantities of the recurrence quantification analysis are listed beside the plot.
     """
     from matplotlib.colors import ListedColormap
 

@@ -1,4 +1,4 @@
-"""Periodic orbits: over strobe points in the plane of displacement and velocity, and against time."""
+"""Periodic orbits in the plane of displacement and velocity, over strobe points, and against time."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS: Final = 600
-"""Number of strobe points below the orbits; a third as many firings are discarded first."""
+"""Number of strobe points drawn below the orbits, after discarding a third as many firings."""
 
 _MARKS: Final = (("o", style.BLUE), ("s", style.ORANGE), ("^", style.GREEN), ("D", style.YELLOW))
 """Marker and colour of orbits of 1, 2, 3 and 4 firings."""
@@ -46,10 +46,10 @@ _LINES: Final = ("-", "--", "-.", ":")
 
 @styled
 def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) -> Figure:
-    """Draw orbits at their firings over the strobe points of the train from rest, and some against time.
+    """Draw orbits at their firings, over strobe points of the train from rest, and a few against time.
 
-    Stable orbits are filled marks, all others open; the first few are drawn against time below. Orbits with a
-    period above `longest` firings are omitted.
+    Stable orbits are filled marks, all other orbits open marks; the first four are drawn against time below.
+    Orbits with a period above `longest` firings are omitted.
     """
     shown = [orbit for orbit in orbits if longest is None or orbit.firings <= longest]
     traced = shown[:_TRACES]
@@ -68,9 +68,9 @@ def plot(orbits: Orbits, *, points: int = POINTS, longest: int | None = None) ->
 
 @styled
 def plot_orbit(orbit: Orbit) -> Figure:
-    """Draw an orbit in the plane of displacement and velocity, and against time.
+    """Draw one orbit in the plane of displacement and velocity, and against time.
 
-    Marks are the states at the firings.
+    Marks show the states at the firings.
     """
     if not orbit.ok:
         raise InputError(f"orbit: expected one that there is, not {orbit.name}: {orbit.status}", key="orbit")
@@ -94,7 +94,7 @@ def plot_orbit(orbit: Orbit) -> Figure:
 
 
 def _strobe_points(regime: Regime, points: int) -> FloatArray:
-    """Return strobe points of the train from rest, shape (n, 2); empty without a rest state."""
+    """Compute strobe points of the train from rest, shape (n, 2); empty without a rest state."""
     if points < 1:
         return np.zeros((0, 2))
     own: dict[str, Any] = (
@@ -141,7 +141,7 @@ def _plane(ax: Axes, regime: Regime, orbits: list[Orbit], under: FloatArray) -> 
 
 
 def _mark(ax: Axes, orbit: Orbit, way: Scale, speed: Scale, name: str | None = None) -> None:
-    """Draw the states of an orbit at its firings: filled if it is stable, open if not."""
+    """Mark the states of an orbit at its firings: filled if the orbit is stable, else open."""
     marker, colour = _style(orbit)
     longer = marker == _LONGER[0]
     ax.plot(
@@ -164,7 +164,7 @@ def _style(orbit: Orbit) -> tuple[str, str]:
 
 
 def _traces(ax: Axes, orbits: list[Orbit]) -> None:
-    """Draw displacement against time, from the first firing of each orbit."""
+    """Draw the displacement of orbits against the time from their first firing."""
     motions = [orbit.motion() for orbit in orbits]
     hammer = orbits[0].regime.hammer
     way = scale("displacement", max(float(np.abs(motion.x).max()) for motion in motions))
@@ -196,7 +196,7 @@ def _traces(ax: Axes, orbits: list[Orbit]) -> None:
 
 
 def _from_firing(orbit: Orbit, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Return times since the first firing, s, and displacements, m, over one period."""
+    """Return times since the first firing, s, and displacements, m, over one period of an orbit."""
     since = motion.t - motion.start + orbit.phase * orbit.regime.period
     if orbit.phase == 0.0:
         return since, motion.x
@@ -207,7 +207,7 @@ def _from_firing(orbit: Orbit, motion: Motion) -> tuple[FloatArray, FloatArray]:
 
 
 def _room(ax: Axes, x: FloatArray, v: FloatArray) -> None:
-    """Set the axes limits with a small margin around all points."""
+    """Set axes limits that include all points, with a small margin."""
     for values, put in ((x, ax.set_xlim), (v, ax.set_ylim)):
         low, high = float(values.min()), float(values.max())
         room = _ROOM * (high - low) or 1e-2 * abs(high) or 1e-9
@@ -215,6 +215,6 @@ def _room(ax: Axes, x: FloatArray, v: FloatArray) -> None:
 
 
 def _number(multiplier: complex) -> str:
-    """Format a Floquet multiplier, without an imaginary part if it is real."""
+    """Format a Floquet multiplier; a real multiplier without an imaginary part."""
     real = f"{multiplier.real:.4g}"
     return real if multiplier.imag == 0.0 else f"{real} {multiplier.imag:+.4g} i"

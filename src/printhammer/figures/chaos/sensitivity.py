@@ -1,4 +1,4 @@
-"""Sensitivities as bars, the longest on top: one panel for each quantity."""
+"""Bar charts of sensitivities, sorted by magnitude, one panel per quantity."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN: Final = ("flight_time", "impact_speed", "peak_force", "net_loss")
-"""Default quantities."""
+"""Quantities drawn by default: flight time, impact speed, peak force and net loss."""
 
 _COLUMNS: Final = 2  # Panels in a row
 _BAR: Final = 0.62  # Height of a bar, as a fraction of the spacing; arbitrary
@@ -30,17 +30,18 @@ _BAR: Final = 0.62  # Height of a bar, as a fraction of the spacing; arbitrary
 def plot(
     table: Sensitivities, *, dot: int | None = None, quantities: Sequence[str] = SHOWN, bars: int = 8
 ) -> Figure:
-    """Draw the largest sensitivities of one dot, or of the whole run.
+    """Draw the largest sensitivities of one dot, or of the whole run, as bars.
 
-    A bar is the relative change of the quantity per relative change of the constant: a bar of 2 means that 1
-    % of the constant changes the quantity by 2 %. Constants that are zero have no bar.
+    The length of a bar is the relative change of the quantity per relative change of the constant: a bar of 2
+    means that a change of the constant by 1 % changes the quantity by 2 %. Constants that are zero have no
+    bar.
 
     Parameters
     ----------
     dot : int, optional
         Index of the firing, from 0; by default the first printed dot.
     quantities : sequence of str, optional
-        Quantities of a dot or of the run, one panel each.
+        Names of quantities of a dot or of the run; one panel per quantity.
     bars : int, optional
         Largest number of constants in a panel.
     """
@@ -67,7 +68,7 @@ def plot(
 
 
 def _dot(table: Sensitivities, dot: int | None, quantities: Sequence[str]) -> int:
-    """Return the index of the dot to draw."""
+    """Return the index of the dot to draw, by default the first printed dot; InputError if it is lost."""
     struck = [k for k in range(len(table.dots)) if k not in table.lost]
     if all(name in table.run_quantities for name in quantities):
         return 0
@@ -94,7 +95,7 @@ def _sensitivities(table: Sensitivities, name: str, dot: int) -> FloatArray:
 
 
 def _panel(ax: Axes, table: Sensitivities, values: FloatArray, bars: int) -> None:
-    """Draw one quantity, without the bars that round to zero."""
+    """Draw the bars of one quantity, without constants whose sensitivity rounds to zero."""
     sizes = np.where(np.isfinite(values), np.abs(values), 0.0)
     order = [int(k) for k in np.argsort(-sizes, kind="stable")[:bars] if sizes[k] >= 5e-4]
     if not order:

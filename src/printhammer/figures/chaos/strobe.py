@@ -1,8 +1,8 @@
-"""Strobe points in the plane of displacement and velocity: one train, or a panel of several.
+"""Strobe points in the plane of displacement and velocity: for one train, or as a panel of Fig. 11.
 
-`plot_section`: impact maps, velocity at touch against the time since the last firing.
+`plot_section` draws an impact map: velocity at touch against the time since the last firing.
 
-`plot_train`: histogram, return map and autocorrelation of the intervals between impacts.
+`plot_train` draws histogram, return map and autocorrelation of the intervals between impacts.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ if TYPE_CHECKING:
     from printhammer.chaos import ImpactTrain, Section, Strobe
 
 _FEW: Final = 20
-"""Smallest number of points for an inset; arbitrary."""
+"""Smallest number of points for which an inset is drawn; arbitrary."""
 _CYCLE: Final = 8
-"""Largest period whose points are ringed."""
+"""Largest period, in firings, whose points are marked by rings."""
 
 _SMALL: Final = 0.04
-"""Fraction of the window below which an attractor without a period is enlarged in an inset; arbitrary."""
+"""Area of an aperiodic attractor, relative to the window, below which an inset enlarges it; arbitrary."""
 # Lower left corners of an inset, fractions of the axes, best first
 _PLACES: Final = ((0.55, 0.36), (0.06, 0.36), (0.06, 0.06), (0.55, 0.06))
 _INSET: Final = (0.38, 0.42)
-"""Lower left corners and size of insets, fractions of the axes."""
+"""Width and height of an inset, as fractions of the axes."""
 
 RING: Final[dict[str, Any]] = {
     "ls": "none",
@@ -56,12 +56,12 @@ RING: Final[dict[str, Any]] = {
     "mfc": "none",
     "mec": style.ORANGE,
 }
-"""Style of the rings around the last points of a periodic train."""
+"""Line style of the rings around the last points of a periodic train."""
 
 
 @styled
 def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
-    """Draw strobe points: velocity against displacement, the backstop, and the classification.
+    """Draw strobe points: velocity against displacement, with the backstop and the classification.
 
     Rings mark the last points of a periodic train. With `fit`, the axes limits follow the points instead of
     the window of Fig. 11.
@@ -82,7 +82,7 @@ def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
 
 
 def _close(strobe: Strobe) -> Window:
-    """Return a window that fits the points; that of the hammer if there are none."""
+    """Return a window that fits the points, or the window of the hammer without points."""
     known = np.isfinite(strobe.x)
     if not known.any():
         return strobe.window
@@ -110,10 +110,10 @@ def panel(
     named: bool = True,
     printed: str = "",
 ) -> None:
-    """Draw the points of a train into axes limited by a window; a corner states the number outside.
+    """Draw the strobe points of a train into axes limited by a window, with the count of points outside.
 
-    `size` is the diameter of a point, points; `named` writes strobe time and classification inside;
-    `printed`, the classification of the paper, is added if it differs.
+    `size` is the diameter of a mark, points. `named` writes strobe time and classification into the panel;
+    `printed`, the classification in the paper, is added if it differs.
     """
     ax.set_xlim(*(float(way.shown(end)) for end in window.x))
     ax.set_ylim(*(float(speed.shown(end)) for end in window.v))
@@ -140,7 +140,7 @@ def panel(
 
 
 def _enlarged(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale, size: float) -> None:
-    """Draw an inset that enlarges the attractor of a train without a period, if it is small.
+    """Draw an inset that enlarges the attractor of an aperiodic train if the attractor is small.
 
     The first half of the points is ignored, since it may be a transient.
     """
@@ -170,7 +170,7 @@ def _enlarged(ax: Axes, strobe: Strobe, window: Window, way: Scale, speed: Scale
 
 
 def shown_period(period: float) -> str:
-    """Format a strobe time, s, with two decimals if that is exact."""
+    """Format a strobe time, s, in ms with two decimals if that is exact, else with more digits."""
     number = from_si(period, "s", "ms")
     short = f"{number:.2f}"
     return f"{short if math.isclose(float(short), number, rel_tol=1e-9) else f'{number:.6g}'} ms"
@@ -178,7 +178,7 @@ def shown_period(period: float) -> str:
 
 @styled
 def plot_section(section: Section) -> Figure:
-    """Draw the touches of a surface: velocity against the time since the last firing.
+    """Draw an impact map: velocity at the touches of a surface against the time since the last firing.
 
     The time axis covers the whole period.
     """
@@ -201,10 +201,10 @@ def plot_section(section: Section) -> Figure:
 
 @styled
 def plot_train(train: ImpactTrain) -> Figure:
-    """Draw the statistics of an impact train.
+    """Draw the statistics of the intervals between the impacts of a train.
 
-    Histogram of the intervals, each interval against the one before, and their autocorrelation; the broken
-    lines enclose 19 of 20 lags of independent intervals.
+    The panels show the histogram of the intervals, each interval against the preceding interval, and the
+    autocorrelation; the dashed lines enclose 19 of 20 lags of independent intervals.
     """
     figure = new_figure(2.9)
     bars, returns, lags = figure.subplots(1, 3)

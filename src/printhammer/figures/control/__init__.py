@@ -1,1 +1,1 @@
-"""Pictures of compensation tables, feedback and bursts of least work."""
+"""Figures of compensation tables, feedback, bursts of least work, and coil studies."""

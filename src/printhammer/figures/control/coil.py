@@ -1,8 +1,8 @@
 """Dead time, and pulses of equal impact speed, against rail voltage and temperature.
 
-`plot_duty`: highest rate of a coil against the ambient temperature.
+`plot_duty` draws the highest continuous rate of a coil against the ambient temperature.
 
-`plot_impact_time`: errors of impact times estimated from the coil.
+`plot_impact_time` draws the errors of impact times estimated from the coil signal.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 @styled
 def plot_dead_time(table: DeadTime) -> Figure:
-    """Draw dead time and pulse width against the rail voltage, a line for each temperature.
+    """Draw dead time and pulse width against the rail voltage, one line per temperature.
 
-    Thin and dashed: nominal pulse. Bold: pulses of equal impact speed.
+    Thin dashed lines: nominal pulse. Bold lines: pulses of equal impact speed.
     """
     figure = new_figure(5.2)
     grid = figure.add_gridspec(2, 1)
@@ -62,7 +62,7 @@ _COLOURS: Final = (style.BLUE, style.ORANGE, style.GREEN, style.YELLOW)
 
 @styled
 def plot_duty(duty: ThermalDuty) -> Figure:
-    """Draw the highest continuous rate of a coil, which falls to zero at its temperature limit."""
+    """Draw the highest continuous rate of a coil against the ambient temperature, down to zero."""
     figure, ax = new_panel(3.4)
     ax.plot(duty.ambient, duty.rate, "o", color=style.BLUE, ms=4.5)
     reach = np.array([min(float(duty.ambient.min()), 0.0), duty.limit])
@@ -76,7 +76,7 @@ def plot_duty(duty: ThermalDuty) -> Figure:
 
 @styled
 def plot_limit(limit: ThermalLimit) -> Figure:
-    """Draw stated rates, and the lines to their common temperature limit."""
+    """Draw stated rates against the ambient temperature, and the lines to the common temperature limit."""
     figure, ax = new_panel(3.4)
     for number, rail in enumerate(np.unique(limit.voltage).tolist()):
         rows = limit.voltage == rail
@@ -106,9 +106,9 @@ _MICRO: Final = 1e6  # Microseconds in a second
 
 @styled
 def plot_impact_time(study: ImpactTime) -> Figure:
-    """Draw standard deviation and magnitude of the bias against the noise, for each rate and converter.
+    """Draw standard deviation and bias magnitude of estimated impact times against the sensor noise.
 
-    Orange: nominal hammer. Blue: units, whose differences do not average out.
+    Orange: nominal hammer. Blue: individual units, whose differences do not average out.
     """
     figure = new_figure(5.2)
     grid = figure.add_gridspec(2, 1)

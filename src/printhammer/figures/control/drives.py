@@ -1,6 +1,7 @@
-"""Feedback compared with other drives: deviations of dots, the second of two dots, and one run.
+"""Feedback compared with other drives: deviations of dots, and a single run; bursts of least work.
 
-Bursts of least work: motion, current and energies, and their cost against the rate.
+`plot_burst` draws motion, current and energies of a burst of least work, `plot_rates` the work against the
+rate.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ _REACH: Final = 4.0  # Half-width of the axis in units of the limit; arbitrary
 
 @styled
 def plot(feedback: Feedback) -> Figure:
-    """Draw a comparison of feedback with other drives.
+    """Draw the deviations of dots printed with feedback and with other drives.
 
-    Above: histogram of deviations of all patterns, without lost dots; deviations beyond the axis are counted
-    at its ends. Below: the second of two dots, against the time between their slots. Dots between the dashed
-    lines are within limits.
+    Above: histograms of the deviations over all patterns, without lost dots; the end bins contain the
+    deviations beyond the axis. Below: deviation of the second of two dots against the time between their
+    slots. Dots between the dashed lines are within limits.
     """
     figure = new_figure(5.6)
     grid = figure.add_gridspec(2, 2)
@@ -76,14 +77,14 @@ def plot(feedback: Feedback) -> Figure:
 
 
 def _look(feedback: Feedback, number: int) -> tuple[str, str]:
-    """Return colour and marker of a strategy; feedback is the last."""
+    """Return colour and marker of a strategy by its number; the last strategy is feedback."""
     if number == len(feedback.strategies) - 1:
         return style.BLUE, "o"
     return _COLOURS[number % len(_COLOURS)], _MARKS[number % len(_MARKS)]
 
 
 def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
-    """Draw a histogram of the deviations of dots."""
+    """Draw one histogram of deviations per strategy."""
     reach = _REACH * limit
     edges = np.linspace(-reach, reach, _BINS + 1)
     for number, name in enumerate(feedback.strategies):
@@ -106,7 +107,7 @@ def _histogram(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -
 
 
 def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> None:
-    """Draw the deviation of the second of two dots against the gap."""
+    """Draw the deviation of the second of two dots against the gap, one line per strategy."""
     gaps = from_si(1.0, "s", "ms") * feedback.gaps
     reach = _REACH * limit
     for number, name in enumerate(feedback.strategies):
@@ -121,10 +122,10 @@ def _by_gap(ax: Axes, feedback: Feedback, values: FloatArray, limit: float) -> N
 
 @styled
 def plot_run(feedback: Feedback) -> Figure:
-    """Draw the run of a comparison.
+    """Draw one run with feedback: displacement and current against time.
 
-    Above: displacement, the samples used by the controller, and the target times of touches (short lines at
-    the front of the pack); below: the current and its limits.
+    Above: displacement, the samples used by the controller, and the target touch times (short lines at the
+    pack front). Below: the current and its limits.
     """
     figure = new_figure(4.6)
     panel, strip = with_strip(figure, 2.6)
@@ -154,10 +155,10 @@ _AFTER: Final = 0.08  # Time shown after the rest, as a fraction of the time to 
 
 @styled
 def plot_burst(burst: LeastWork) -> Figure:
-    """Draw a burst of least work.
+    """Draw a burst of least work: motion, current, power and energies.
 
-    Above: displacement, current, and the power of the coil, filled with different colours for power supplied
-    and recovered. Below: the work of the coil and the losses, relative to the energy absorbed by the pack.
+    Above: displacement, current, and coil power, filled in different colours for supplied and recovered
+    power. Below: work of the coil and losses, relative to the energy absorbed by the pack.
     """
     figure = new_figure(6.6)
     grid = figure.add_gridspec(4, 1, height_ratios=(2.6, 1.2, 1.4, 1.3))
@@ -229,7 +230,7 @@ def _ledger(ax: Axes, burst: LeastWork) -> None:
 
 @styled
 def plot_rates(bursts: LeastWorkRates) -> Figure:
-    """Draw net and positive work, and the lower bound of the positive work, against the rate.
+    """Draw net work, positive work, and the lower bound of the positive work against the rate.
 
     Crosses at the bottom mark rates at which no current was found.
     """

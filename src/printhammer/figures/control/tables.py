@@ -1,6 +1,6 @@
 """Compensation tables, and their gains and losses relative to open loop.
 
-`plot_learning`: dots before, during and after learning.
+`plot_learning` draws the dots before, during and after learning.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _BINS: Final = 41  # Bins of a histogram, odd so that one is centred at zero; ar
 
 @styled
 def plot(table: CompensationTable) -> Figure:
-    """Draw a table: maps over histories at one or few rates, else curves against the rate."""
+    """Draw a compensation table: maps over histories for up to three rates, else curves against the rate."""
     figure = _few_rates(table) if table.rates.size < _FEW else _many_rates(table)
     foot(figure, f"{table.hammer} · {table.fingerprint[:8]} · at most {table.largest_current:g} A")
     return figure
 
 
 def _few_rates(table: CompensationTable) -> Figure:
-    """Draw advance and width with a cell for each history, the last gap vertical."""
+    """Draw advance and width as maps with one cell per history, the last gap on the vertical axis."""
     figure = new_figure(1.2 + 2.1 * table.rates.size)
     axes = figure.subplots(table.rates.size, 2, squeeze=False)
     side, across = table.reach + 1, (table.reach + 1) ** (table.gaps - 1)
@@ -73,7 +73,7 @@ def _few_rates(table: CompensationTable) -> Figure:
 
 
 def _many_rates(table: CompensationTable) -> Figure:
-    """Draw advance and width against the rate, a line for each gap after a rest."""
+    """Draw advance and width of the second dot after a rest against the rate, one line per gap."""
     figure = new_figure(5.0)
     upper, lower = figure.subplots(2, 1, sharex=True)
     lowest = int(np.argmax((table.advance != 0.0).any(axis=1)))
@@ -101,10 +101,10 @@ def _many_rates(table: CompensationTable) -> Figure:
 
 @styled
 def plot_report(report: TableReport) -> Figure:
-    """Draw the gains and losses of a table: fractions of good dots for each hammer, force and arrival.
+    """Draw a report on a compensation table: fractions of good dots, and histograms of deviations.
 
-    Bars: dots within limits, over all rates and patterns. Histograms: dots of the de Bruijn cycle at the
-    first rate; grey bands are the limits.
+    Bars: fraction of dots within limits for each hammer, over all rates and patterns. Histograms: force and
+    arrival deviations of the dots of the de Bruijn cycle at the first rate; grey bands are the limits.
     """
     figure = new_figure(5.6)
     grid = figure.add_gridspec(2, 2, height_ratios=(1.2, 1.0))
@@ -135,7 +135,7 @@ def plot_report(report: TableReport) -> Figure:
 
 
 def _histogram(ax: Axes, values: FloatArray, limit: float, name: str) -> None:
-    """Draw a histogram of deviations; the outermost bins hold those beyond three limits."""
+    """Draw histograms of deviations of both strategies; the end bins hold deviations beyond 3 limits."""
     edges = np.linspace(-3.0 * limit, 3.0 * limit, _BINS + 1)
     ax.axvspan(-limit, limit, color=style.FAINT, lw=0.0, zorder=0)
     for row, colour, look in zip(values, (style.ORANGE, style.BLUE), ("--", "-"), strict=True):
@@ -157,9 +157,10 @@ _SMALLEST: Final = 0.1  # Smallest area, as a fraction of that of nominal force
 
 @styled
 def plot_learning(learning: Learning) -> Figure:
-    """Draw a line for each stage: each dot at its position, with its force deviation exaggerated in its area.
+    """Draw the printed dots of each learning stage as a line of dots on the paper.
 
-    Dots beyond the limits are orange; a lost dot is a cross at its slot.
+    Each dot is drawn at its position, with its force deviation exaggerated in its area. Dots beyond the
+    limits are orange; a lost dot is a cross at its slot.
     """
     stages = learning.dots.size
     figure = new_figure(1.1 + _HEIGHT * stages)

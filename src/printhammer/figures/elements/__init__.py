@@ -1,1 +1,1 @@
-"""Elements shared by the figures: style, scales, marks, files."""
+"""Elements shared by the figures: style, scales, marks, output files."""

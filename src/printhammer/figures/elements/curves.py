@@ -1,4 +1,4 @@
-"""Data of the curves: drives, ranges and points."""
+"""Data for the curves of figures: motions, times, ranges and forces."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from printhammer.run.motion import Motion
 
 SETTLED: Final = 0.01
-"""Fraction of the stroke within which the armature counts as settled in a figure; arbitrary."""
+"""Distance from the final position, relative to the range of motion, that counts as settled; arbitrary."""
 
 _POINTS: Final = 2400  # Uniform points of a curve: more than a picture resolves
 _PER_PIECE: Final = 60  # Points of a smooth segment; arbitrary
 
 
 def waveform_of(hammer: Hammer) -> Waveform:
-    """Return the standard waveform of a hammer."""
+    """Return the standard waveform of a hammer; InputError if it has none."""
     if hammer.waveform is None:
         raise InputError(
             f"the hammer {hammer.name!r} has no waveform to fire", key="waveform", expected="a [waveform]"
@@ -33,7 +33,7 @@ def waveform_of(hammer: Hammer) -> Waveform:
 
 
 def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str | None = None) -> Motion:
-    """Simulate a hammer whose waveform is fired at given times, s.
+    """Simulate a hammer whose standard waveform is fired at given times, s.
 
     The run ends at `duration`, s, or text with a unit; the default is that of `printhammer.simulate`.
     """
@@ -44,13 +44,13 @@ def fired(hammer: Hammer, times: Iterable[float] = (0.0,), duration: float | str
 
 
 def places(hammer: Hammer) -> dict[str, float]:
-    """Return the positions of "backstop", "pack" and "platen" of a hammer, m, as far as it has them."""
+    """Return the positions of backstop, pack and platen of a hammer, m, by name; absent ones omitted."""
     own = {"backstop": hammer.position, "pack": hammer.front, "platen": hammer.platen}
     return {name: place for name, place in own.items() if place is not None}
 
 
 def times_of(motion: Motion, start: float | None = None, end: float | None = None) -> FloatArray:
-    """Return the plot times of a motion, s: uniform times, all steps and all extrema."""
+    """Return the plot times of a motion, s: uniform times, integration steps, contacts and extrema."""
     start = motion.start if start is None else max(start, motion.start)
     end = motion.end if end is None else min(end, motion.end)
     steps = motion.step_times
@@ -65,7 +65,7 @@ def times_of(motion: Motion, start: float | None = None, end: float | None = Non
 
 
 def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return displacement, m, and velocity, m/s, along a motion, with both sides of every jump."""
+    """Return displacement, m, and velocity, m/s, along a motion, before and after each rigid impact."""
     x, v = motion.at(times)
     jumps = [
         (contact.t_in, contact.v_in)
@@ -81,7 +81,7 @@ def orbit(motion: Motion, times: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def settled_at(motion: Motion) -> float:
-    """Return the time, s, from which the armature stays within `SETTLED` of the stroke of its end."""
+    """Return the time, s, after which the armature stays within `SETTLED` of its final position."""
     times = times_of(motion)
     x, _v = motion.at(times)
     room = SETTLED * float(np.ptp(x))
@@ -90,18 +90,18 @@ def settled_at(motion: Motion) -> float:
 
 
 def shown_until(motion: Motion) -> float:
-    """Return a rounded end time, s, for the picture of a motion that settles."""
+    """Return the end of the time axis, s, for a motion that settles: rounded up, with a margin."""
     step = 10.0 ** math.floor(math.log10(motion.end)) / 4.0
     return float(min(motion.end, step * math.ceil(1.1 * settled_at(motion) / step)))
 
 
 def reach(hammer: Hammer) -> tuple[float, float]:
-    """Return the range of displacements, m, over which static forces are drawn.
+    """Return the range of displacement, m, over which static forces are drawn.
 
     Raises
     ------
     InputError
-        The hammer has neither platen nor pack nor a range of its magnet's law to set the scale.
+        The hammer has no platen, no pack and no range of the magnet's law that sets the scale, or no stroke.
     """
     from printhammer.hammer.static_force import StaticForce
 
@@ -127,9 +127,9 @@ def reach(hammer: Hammer) -> tuple[float, float]:
 
 
 def total_force(motion: Motion, times: FloatArray) -> FloatArray:
-    """Return the sum of all forces on the armature, N, at times, s.
+    """Return the sum of all forces on the armature, N, at given times, s.
 
-    Where a rigid backstop holds the armature, its reaction balances all others, and the sum is 0.
+    While a rigid backstop holds the armature, its reaction balances all other forces, and the sum is 0.
     """
     total = motion.forces_at(times)["total"].copy()
     for contact in motion.contacts:

@@ -1,4 +1,4 @@
-"""Elements of pictures of frequency-time maps: scales, firings, lost dots, the colour bar."""
+"""Elements of the figures of frequency-time maps: scales, firings, lost dots, colour bar."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS: Final = "viridis"
-"""Colour map: perceptually uniform and suited to the colour-blind (N. Smith and S. van der Walt, 2015)."""
+"""Name of the colour map: perceptually uniform and suited to the colour-blind (Smith, van der Walt, 2015)."""
 
 LINES: Final = "white"
-"""Colour of the firing lines."""
+"""Colour of the lines that mark firings."""
 
 LOST: Final = "lost dots"
-"""SVG id (gid) of the marks of lost dots."""
+"""SVG id of the marks of lost dots."""
 
 FEW: Final = 50
-"""Number of rates below which firings and lost dots are marked row by row."""
+"""Number of rates below which firings and lost dots are marked separately in the row of each rate."""
 
 UNKNOWN: Final = "#e4e4e4"
-"""Colour of cells without a displacement."""
+"""Colour of map cells without a displacement."""
 
 LOWEST, HIGHEST, RATES, TIMES = 500.0, 2500.0, 640, 1024
-"""Range of rates in the paper's figures as drawn here, Hz, and the numbers of rates and times."""
+"""Defaults of Figs. 8 and 9: lowest and highest rate, Hz, and the numbers of rates and of times."""
 
 _KILO: Final = 1e3  # Rate from which the axis is in kHz, Hz
 _LOST: Final = 2.0  # Width of the lines of lost dots, points
@@ -48,7 +48,7 @@ _LOST: Final = 2.0  # Width of the lines of lost dots, points
 def chart_of(
     hammer: Hammer, rates: npt.ArrayLike | None = None, times: npt.ArrayLike | None = TIMES
 ) -> xr.Dataset:
-    """Return the map of a hammer for a figure.
+    """Compute the frequency-time map of a hammer for a figure.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def chart_of(
 
 
 def drawable(chart: xr.Dataset) -> xr.Dataset:
-    """Return a map if it has at least two times; raise InputError otherwise."""
+    """Return a map if it can be drawn; raise InputError if it has fewer than two times."""
     if chart["time"].size < 2:
         raise InputError(
             f"the map has {chart['time'].size} times", key="times", expected="at least 2 to draw it"
@@ -70,7 +70,7 @@ def drawable(chart: xr.Dataset) -> xr.Dataset:
 
 
 def edges(centres: FloatArray) -> FloatArray:
-    """Return the borders of cells around ascending centres, one more than there are centres."""
+    """Compute the cell borders around ascending centres, one more than there are centres."""
     if len(centres) == 1:
         return np.asarray([0.98 * centres[0], 1.02 * centres[0]], dtype=np.float64)
     middle = 0.5 * (centres[1:] + centres[:-1])
@@ -80,7 +80,7 @@ def edges(centres: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Scales:
-    """Scales and colours of displacement, time and rate in maps."""
+    """Axis scales of displacement, time and rate of a map, and its colour scale."""
 
     way: Scale
     time: Scale
@@ -89,7 +89,7 @@ class Scales:
 
 
 def scales_of(*charts: xr.Dataset) -> Scales:
-    """Return common scales for several maps; the colour scale covers all of them."""
+    """Return scales common to several maps; the colour scale covers all displacements."""
     from matplotlib.colors import Normalize
 
     low, high = limits_of(*charts)
@@ -102,7 +102,7 @@ def scales_of(*charts: xr.Dataset) -> Scales:
 
 
 def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
-    """Return the smallest and the largest displacement of maps, m."""
+    """Return the smallest and the largest displacement in several maps, m."""
     every = np.concatenate([chart["displacement"].values.ravel() for chart in charts])
     known = every[np.isfinite(every)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
@@ -110,7 +110,7 @@ def limits_of(*charts: xr.Dataset) -> tuple[float, float]:
 
 
 def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
-    """Draw the displacement of a map in colours, time horizontal and rate vertical.
+    """Draw the displacement of a map in colours, time horizontal, rate vertical; return the mesh.
 
     Firings and lost dots are drawn on top, see `firing_lines`.
     """
@@ -136,9 +136,9 @@ def picture(ax: Axes, chart: xr.Dataset, scales: Scales) -> QuadMesh:
 
 
 def firing_lines(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw a thin line along each firing, and a strong line along its lost dots.
+    """Draw a thin line along each firing, and a bold line along its lost dots.
 
-    For maps with fewer than 50 rates the lines are vertical marks in the row of each rate.
+    For maps with fewer than 50 rates, the lines are replaced by vertical marks in the row of each rate.
     """
     if "fired_at" not in chart:
         return
@@ -171,7 +171,7 @@ def _strokes(
     borders: FloatArray,
     rows: npt.NDArray[np.intp] | slice = slice(None),
 ) -> tuple[FloatArray, FloatArray]:
-    """Return strokes through the cells of rows, from lower to upper border, separated by NaN."""
+    """Return line segments through the cells of rows, from lower to upper border, separated by NaN."""
     centre, place, slope = rates[rows], at[rows], slopes[rows]
     ends = np.column_stack([borders[:-1][rows], borders[1:][rows], np.full_like(centre, np.nan)])
     across = place[:, np.newaxis] + slope[:, np.newaxis] * (ends - centre[:, np.newaxis])
@@ -179,7 +179,7 @@ def _strokes(
 
 
 def key(ax: Axes, chart: xr.Dataset) -> None:
-    """Draw the legend of the marker lines, above the map."""
+    """Draw the legend of firing lines and lost dots above the map."""
     from matplotlib.lines import Line2D
     from matplotlib.patheffects import Stroke
 
@@ -196,7 +196,7 @@ def key(ax: Axes, chart: xr.Dataset) -> None:
 
 
 def colour_bar(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
-    """Draw the colour bar from the lowest to the highest position; white marks values not reached."""
+    """Draw the colour bar, with backstop, pack and platen marked; displacements not reached are white."""
     from matplotlib import colormaps
 
     way = scales.way
@@ -226,7 +226,7 @@ def colour_bar(ax: Axes, chart: xr.Dataset, scales: Scales) -> None:
 
 
 def failures(chart: xr.Dataset) -> str:
-    """Describe the number of runs of a map that stopped early, and why; empty if all completed."""
+    """Describe how many runs of a map stopped early, and why; empty if all runs are complete."""
     failed = {name: len(rates) for name, rates in failed_rates(chart).items()}
     if not failed:
         return ""
@@ -235,7 +235,7 @@ def failures(chart: xr.Dataset) -> str:
 
 
 def sign_map(figure: Figure, chart: xr.Dataset, *remarks: str) -> None:
-    """Write the origin of the map below a figure, and remarks above it."""
+    """Write the origin of a map below the figure, and remarks above it."""
     origin = [str(chart.attrs.get("hammer", chart.attrs.get("source", "")))]
     origin.append(str(chart.attrs.get("hammer_fingerprint", ""))[:8])
     constants = str(chart.attrs.get("hammer_constants", ""))

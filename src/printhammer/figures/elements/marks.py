@@ -1,6 +1,6 @@
-"""Marks on figures: positions of backstop, pack and platen, direction of time, firings.
+"""Marks on figures: positions of backstop, pack and platen, arrows, firings, notes, legends.
 
-`freest` finds free space for a label or an insert on a panel.
+`freest` finds free space for a label or an inset on a panel.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
 
 CURVE: Final = "curve:"
-"""Prefix of the label of every line that counts as a curve."""
+"""Prefix of the label of every line that labels and insets must not cover."""
 
 _SPACING: Final = 0.004  # Distance between points on a curve, fraction of the axes: less than a label
 
 
 def occupied(ax: Axes) -> FloatArray:
-    """Return points on the curves of a panel, in fractions of the axes, shape (n, 2).
+    """Return points along the curves of a panel, as fractions of the axes, shape (n, 2).
 
     The points are dense enough that no label fits between two of them.
     """
@@ -63,10 +63,10 @@ def occupied(ax: Axes) -> FloatArray:
 def freest(
     points: FloatArray, size: tuple[float, float], corners: Iterable[tuple[float, float]]
 ) -> tuple[tuple[float, float], int]:
-    """Return the first position of a box that covers no points, or the position that covers the fewest.
+    """Find the first box that covers no points, or else the box that covers the fewest.
 
-    `points`, shape (n, 2), `size` (width and height) and `corners` (lower left, best first) are fractions of
-    the axes. The number of covered points is returned with the corner.
+    `points`, shape (n, 2), `size` (width and height of the box) and `corners` (lower left, best first) are
+    fractions of the axes. The corner and the number of covered points are returned.
     """
     width, height = size
     best: tuple[float, float] = (0.0, 0.0)
@@ -83,23 +83,23 @@ def freest(
 
 
 HALO: Final[dict[str, Any]] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
-"""Background of text that may overlap a line."""
+"""Background of text that may overlap a line: a semi-transparent white box."""
 
 ALONG_X: Final = ("data", "axes fraction")
 ALONG_Y: Final = ("axes fraction", "data")
-"""Coordinates: fraction of the axes along x, data units along y."""
+"""Coordinates of annotations: x as a fraction of the axes, y in data units; `ALONG_X` is the reverse."""
 
 _LINE_NAME: Final = (0.095, 0.06)
-"""Width and height of a name on a horizontal line, fractions of the axes."""
+"""Width and height of a name on a horizontal line, as fractions of the axes."""
 
 _BELOW: Final = 30.0
-"""Distance from a panel to a legend below its tick labels and axis label, points."""
+"""Distance from a panel to a legend below its tick labels and axis label, in points."""
 
 
 def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] = "y") -> None:
-    """Draw lines at backstop, pack and platen, with names on vertical lines.
+    """Draw lines at the positions of backstop, pack and platen; vertical lines are labelled.
 
-    Displacement is along `side` of the axes, whose limits must be set already.
+    `side` is the axis of the displacement; the limits of the axes must be set already.
     """
     low, high = ax.get_ylim() if side == "y" else ax.get_xlim()
     for name, place in places(hammer).items():
@@ -113,7 +113,7 @@ def place_lines(ax: Axes, hammer: Hammer, shown: Scale, side: Literal["x", "y"] 
 
 
 def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
-    """Write the names on horizontal position lines, at the right or away from curves."""
+    """Label the horizontal position lines by name, near the right edge and away from curves."""
     low, high = ax.get_ylim()
     points = occupied(ax)
     for name, place in places(hammer).items():
@@ -140,13 +140,13 @@ def name_lines(ax: Axes, hammer: Hammer, shown: Scale) -> None:
 
 
 def note(ax: Axes, text: str, at: tuple[float, float], **options: Any) -> Text:
-    """Write a small remark at a position in fractions of the axes."""
+    """Write a small remark at a position given as fractions of the axes."""
     style = {"fontsize": SMALL, "color": MUTED, "va": "top", "ha": "left", "zorder": 5.0, **options}
     return ax.text(*at, text, transform=ax.transAxes, **style)
 
 
 def inside(ax: Axes, text: str, x: float, y: float, color: str) -> None:
-    """Write tiny text in the middle of a cell, in data units."""
+    """Write tiny text, centred at a position in data units."""
     ax.text(x, y, text, ha="center", va="center", fontsize=TINY, color=color)
 
 
@@ -158,7 +158,7 @@ def beside(
     side: str = "left baseline",
     **options: Any,
 ) -> None:
-    """Write small text next to a point, shifted by some points; `side` is its alignment."""
+    """Write small text next to a point, at an offset in points; `side` is its alignment."""
     ha, va = side.split()
     how = {"fontsize": TINY, "color": MUTED, "textcoords": "offset points", "ha": ha, "va": va, **options}
     ax.annotate(text, at, shift, **how)
@@ -170,12 +170,12 @@ def heading(ax: Axes, text: str, **options: Any) -> None:
 
 
 def dots(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, size: float, color: str, **options: Any) -> None:
-    """Draw points without an edge, as dots or another `marker`; `size` in points."""
+    """Draw points without an edge, as dots or with another `marker`; `size` is in points."""
     ax.plot(x, y, **{"ls": "none", "marker": "o", "ms": size, "mew": 0.0, "color": color, **options})
 
 
 def dashed(line: Callable[..., Any], *levels: float, **options: Any) -> None:
-    """Draw thin dashed lines at levels with `axhline` or `axvline` (`line`)."""
+    """Draw thin dashed lines at levels with the method `axhline` or `axvline` of the axes (`line`)."""
     for level in levels:
         line(level, **{"color": MUTED, "lw": HAIR, "ls": (0, (4, 3)), **options})
 
@@ -187,13 +187,13 @@ def legend_above(ax: Axes, handles: Sequence[Artist], **options: Any) -> None:
 
 
 def legend_in_columns(ax: Axes, handles: Sequence[Artist], columns: int, size: float = SMALL) -> None:
-    """Draw a legend in columns centred above the axes, with font size in points."""
+    """Draw a legend in columns, centred above the axes; `size` is the font size in points."""
     where: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     ax.legend(handles=handles, ncols=columns, fontsize=size, frameon=False, **where)
 
 
 def legend_below(ax: Axes, *entries: Any, **options: Any) -> None:
-    """Draw a legend below a panel with an axis label; options are those of `Axes.legend`.
+    """Draw a legend below a panel and its axis label; options are those of `Axes.legend`.
 
     Unlike a legend of the figure, it leaves room for the text at the foot of the figure.
     """
@@ -207,7 +207,7 @@ def legend_below(ax: Axes, *entries: Any, **options: Any) -> None:
 
 
 def contact_spans(ax: Axes, motion: Motion, until: float, shown: Scale) -> None:
-    """Tint the times, s, at which the armature touches pack or backstop."""
+    """Tint the time intervals in which the armature touches pack or backstop, up to `until`, s."""
     for contact in motion.contacts:
         end = until if contact.t_out is None else min(contact.t_out, until)
         if contact.t_in >= end:
@@ -228,8 +228,8 @@ def arrows(
 ) -> None:
     """Draw evenly spaced arrow heads along a curve in data units.
 
-    The limits of the axes must be set already; `size` is in points, `first` the position of the first head in
-    units of their spacing.
+    The limits of the axes must be set already; `size` is in points; `first` is the position of the first head
+    in units of the spacing of the heads.
     """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     root = ax.get_figure(root=True)
@@ -273,9 +273,9 @@ def firings(ax: Axes, times: Iterable[float], shown: Scale, color: str = BLUE, f
 def drive_strip(
     ax: Axes, motions: Sequence[Motion], times: Sequence[FloatArray], until: float, colours: Sequence[str]
 ) -> None:
-    """Draw the currents, or forces, of the drives of motions in the slim strip below a panel.
+    """Draw the drive currents, or forces, of motions in the slim strip below a panel.
 
-    Each drive has its times, s, and its colour; the quantity is that of the first drive.
+    `times`, s, and `colours` are given per motion; drives of another quantity than the first are skipped.
     """
     quantity = motions[0].driven
     time, value = scale("time", until), scale(quantity)
@@ -295,6 +295,6 @@ def drive_strip(
 
 
 def curve(ax: Axes, x: FloatArray, y: FloatArray, gid: str, color: str = BLUE, **options: Any) -> None:
-    """Draw a curve with an SVG id (gid)."""
+    """Draw a curve with an SVG id, labelled as a curve that texts must not cover."""
     (line,) = ax.plot(x, y, color=color, label=CURVE + gid, **{"lw": LINE, **options})
     line.set_gid(gid)

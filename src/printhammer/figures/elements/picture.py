@@ -1,4 +1,4 @@
-"""Class of all figures: a matplotlib figure that notebooks display without pyplot."""
+"""Figure class of all figures: a matplotlib figure that notebooks display without pyplot."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 
 
 class Picture(Figure):
-    """Figure that displays itself as the last value of a notebook cell.
+    """Matplotlib figure that displays itself as the last value of a notebook cell.
 
-    The PNG repr is used by notebooks; with the inline backend of matplotlib active, that backend takes
-    precedence, and the picture appears once.
+    Notebooks use the PNG repr; if the inline backend of matplotlib is active, the backend takes precedence,
+    and the figure appears only once.
     """
 
     settings: Mapping[str, Any] = {}
-    """Matplotlib settings for rendering."""
+    """Matplotlib settings used when the figure is rendered."""
 
     def _repr_png_(self) -> bytes:
-        """Return the PNG for notebooks."""
+        """Return the figure as PNG bytes, for notebooks."""
         buffer = BytesIO()
         settings: Any = dict(self.settings)  # The type stub of matplotlib lists every setting by name.
         with rc_context(settings):

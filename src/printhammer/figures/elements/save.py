@@ -1,4 +1,4 @@
-"""Figures as files: SVG and PDF for print, PNG for the screen; equal figures yield equal bytes."""
+"""Output of figures: SVG and PDF for print, PNG for the screen; equal figures give equal bytes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _METADATA: Final[dict[str, dict[str, Any]]] = {
 
 
 def picture(figure: Figure, kind: str, *, dpi: float = DOTS_PER_INCH) -> bytes:
-    """Return the bytes of a figure in one of `FORMATS`."""
+    """Return a figure as bytes in one of the `FORMATS`; `dpi` applies to PNG."""
     buffer = BytesIO()
     with in_style():
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
@@ -42,9 +42,9 @@ def save(
     formats: Sequence[str] = FORMATS,
     dpi: float = DOTS_PER_INCH,
 ) -> list[Path]:
-    """Write a figure into a folder, created if missing; return the files in the order of the formats.
+    """Write a figure into a folder, created if missing; return the paths in the order of the formats.
 
-    `name` has no suffix; `dpi` applies to the PNG.
+    `name` is the file name without suffix; `dpi` applies to PNG.
 
     Raises
     ------

@@ -18,7 +18,7 @@ Name = Literal["displacement", "velocity", "force", "time", "current"]
 
 
 class Scale(Declared):
-    """Scale of a quantity on an axis."""
+    """Scale of an axis: name, SI unit, unit drawn, and unit of the opposite axis."""
 
     label: str = part("name on the axis")
     si: str = part("SI unit of the numbers inside")
@@ -27,17 +27,17 @@ class Scale(Declared):
 
     @property
     def factor(self) -> float:
-        """Number drawn per SI unit."""
+        """Factor from SI to the unit drawn."""
         return _factor(self.si, self.unit)
 
     @property
     def ratio(self) -> float:
-        """Number on the opposite axis per number drawn."""
+        """Factor from the unit drawn to the unit of the opposite axis."""
         return _factor(self.si, self.other) / self.factor
 
     @property
     def sign(self) -> str:
-        """Symbol of the unit drawn."""
+        """Symbol of the unit drawn, such as "µm"."""
         return _SIGNS.get(self.unit, self.unit)
 
     def shown(self, values: npt.ArrayLike) -> FloatArray:
@@ -62,12 +62,12 @@ _SCALES: Final[dict[str, tuple[tuple[float, Scale], ...]]] = {
 
 
 def scale(name: Name, largest: float = 0.0) -> Scale:
-    """Return the scale of a quantity with a given largest magnitude, SI: large hammers get larger units."""
+    """Return the scale of a quantity for values up to a largest magnitude, SI, with a suitable unit."""
     return next(shown for limit, shown in _SCALES[name] if largest <= limit)
 
 
 def label(ax: Axes, side: Literal["x", "y"], shown: Scale, name: str = "") -> SecondaryAxis | None:
-    """Label an axis with its unit; return the opposite axis in the other unit system, if any.
+    """Label an axis with its unit; return the opposite axis in the other unit system, or None.
 
     The data of the axes are in `shown.unit`; `name` overrides the name of the scale.
     """

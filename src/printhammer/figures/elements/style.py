@@ -1,4 +1,4 @@
-"""Style of all figures: colours, widths, sizes.
+"""Style of all figures: colours, line widths and font sizes.
 
 Figures are built with matplotlib's objects, never with pyplot, which would leave global state. Colours are
 those of M. Okabe and K. Ito (2008), suited to the colour-blind; important distinctions also use dashes or
@@ -32,10 +32,10 @@ ORANGE: Final = "#d55e00"
 GREEN: Final = "#009e73"
 YELLOW: Final = "#e69f00"
 FAMILY: Final = ("#7db7dc", "#4f9bcb", "#2f7fb9", "#1a619f", "#08417a")
-"""Light to dark, for a family of curves with one parameter."""
+"""Colours from light to dark, for a family of curves with one parameter."""
 
 SURFACES: Final = {"backstop": "#8a8a8a", "pack": YELLOW}
-"""Tints of the surfaces that the armature touches."""
+"""Colours of backstop and pack, used as tints."""
 
 WIDTH: Final = 6.4
 """Width of a figure, in."""
@@ -84,11 +84,11 @@ RC: Final[dict[str, Any]] = {
     "ytick.major.size": 3.5,
     "ytick.major.width": HAIR,
 }
-"""Settings for building and saving figures, independent of the user's settings."""
+"""Matplotlib settings for building and saving figures, which replace those of the user."""
 
 
 def in_style() -> AbstractContextManager[None]:
-    """Return a context with the matplotlib settings of the style."""
+    """Return a context in which matplotlib uses the settings of the style."""
     from matplotlib import rc_context
 
     settings: Any = RC  # The type stub of matplotlib lists every setting by name.
@@ -96,7 +96,7 @@ def in_style() -> AbstractContextManager[None]:
 
 
 def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Decorate a function to build its figure in the style, with the noun of the hammer for a dot.
+    """Decorate a drawing function so that its figure is built in the style.
 
     The noun is the attribute `strike` of an argument: a hammer, a result or a frequency-time map.
     """
@@ -124,7 +124,7 @@ def _name_strikes(figure: Figure, strike: str) -> None:
 
 
 def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrained") -> Figure:
-    """Return an empty figure, sizes in inches; the layout avoids overlaps, or is manual."""
+    """Return an empty figure, sizes in inches; by default the layout avoids overlaps."""
     from printhammer.figures.elements.picture import Picture
 
     figure = Picture(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
@@ -133,13 +133,13 @@ def new_figure(height: float, width: float = WIDTH, layout: _Layout = "constrain
 
 
 def new_panel(height: float, width: float = WIDTH) -> tuple[Figure, Axes]:
-    """Return a figure with one panel; see `new_figure`."""
+    """Return a figure with a single panel, and the panel; sizes in inches."""
     figure = new_figure(height, width)
     return figure, figure.add_subplot()
 
 
 def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
-    """Divide a figure into a panel and a slim strip below it with a common time axis."""
+    """Divide a figure into a panel and a slim strip below it that share the time axis."""
     grid = figure.add_gridspec(2, 1, height_ratios=(ratio, 1.0), hspace=0.03)
     panel = figure.add_subplot(grid[0])
     strip = figure.add_subplot(grid[1], sharex=panel)
@@ -149,7 +149,7 @@ def with_strip(figure: Figure, ratio: float = 5.5) -> tuple[Axes, Axes]:
 
 
 def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
-    """Write hammer, status of its constants, and remarks on the run below a figure."""
+    """Write name and fingerprint of the hammer and status of its constants below a figure, remarks above."""
     statuses = {constant.status for constant in hammer.constants.values()}
     known = [status for status in ("reconstructed", "assumed") if status in statuses]
     origin = [hammer.name, hammer.fingerprint[:8]]
@@ -160,7 +160,7 @@ def sign(figure: Figure, hammer: Hammer, *remarks: str) -> None:
 
 
 def foot(figure: Figure, origin: str, remark: str = "") -> None:
-    """Write the origin of a figure below it, and a remark above that."""
+    """Write the origin of a figure below it, and a remark above it."""
     text = figure.supxlabel(origin, x=0.99, ha="right", fontsize=TINY, color=MUTED)
     text.set_in_layout(True)
     if remark:

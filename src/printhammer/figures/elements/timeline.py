@@ -31,10 +31,10 @@ def timeline(
     remarks: Sequence[str] = (),
     height: float = 4.2,
 ) -> Figure:
-    """Draw motions of one hammer against time, with the drive below.
+    """Draw motions of one hammer against time, with the drive in a strip below.
 
-    Lines have the SVG ids "displacement" and "current" (or "force"), followed by " 1", " 2" for several
-    motions.
+    The lines have the SVG ids "displacement" and "current" (or "force"), with " 1", " 2" appended if there
+    are several motions.
 
     Parameters
     ----------
@@ -43,13 +43,13 @@ def timeline(
     until : float
         End of the time axis, s.
     labels : sequence of str, optional
-        Name of each motion.
+        Name of each motion, for the legend.
     heading : str, optional
         Heading above the panel, if there are no labels.
     show_firings : bool, optional
         Whether to mark the firings by triangles.
     remarks : sequence of str, optional
-        Sentences shown above the figure; those of runs that stopped early are added.
+        Sentences shown above the figure; messages of runs that stopped early are added.
     height : float, optional
         Height of the figure, in.
     """
@@ -93,9 +93,9 @@ def timeline(
 
 
 def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> float:
-    """Draw displacement, µm, against time, ms, between the tinted pack and backstop.
+    """Draw displacement, µm, against time, ms, between tinted pack and backstop; return the margin, µm.
 
-    `above` is the room over the motion, as a multiple of the room below, 8 % of its range; returned in µm.
+    The margin below the motion is 8 % of its range; `above` is the margin above, as a multiple of that.
     """
     ms, um = scale("time").factor, scale("displacement").factor
     assert hammer.front is not None
@@ -111,7 +111,7 @@ def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> 
 
 
 def current_between(ax: Axes, motion: Motion, largest: float) -> None:
-    """Draw the current of a motion, A, against time, ms, and its limits as dashed lines."""
+    """Draw the current of a motion, A, against time, ms, with its limits as dashed lines."""
     ax.plot(scale("time").factor * motion.t, motion.current, color=style.BLUE, lw=style.THIN, gid="current")
     ax.axhline(0.0, color=style.FAINT, lw=style.HAIR, zorder=0)
     marks.dashed(ax.axhline, -largest, largest)

@@ -1,1 +1,1 @@
-"""The figures of the paper, one function each."""
+"""Figures 2 to 11 of the paper, one function per figure."""

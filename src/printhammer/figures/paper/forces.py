@@ -1,7 +1,7 @@
 """Figures 2, 4, 5 and 10: static forces, total force, force loops, phase plane.
 
 Figure 4: total force on the armature against time. Figure 5: total force against displacement over one cycle,
-with the loops of settle-out in an insert.
+with the loops of settle-out in an inset.
 
 Figure 10: phase plane of the armature after a single pulse.
 
@@ -59,7 +59,7 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     """Draw Fig. 4: the sum of all forces on the armature, equation (2), after a single pulse.
 
     Impacts on a rigid backstop have no finite force and are not drawn. By default the time axis ends when the
-    armature has settled, at most after 4 ms.
+    armature has settled.
     """
     from matplotlib.patches import Patch
 
@@ -92,13 +92,13 @@ def total_force(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 
 
 def rigid_remark(motion: Motion) -> str:
-    """Return a remark on impulses that a force diagram cannot show; empty without any."""
+    """Return a remark that rigid impacts are not drawn in a force diagram; empty without such impacts."""
     impacts = any(c.surface == "backstop" and c.peak_force is None and not c.initial for c in motion.contacts)
     return "The rigid backstop changes the velocity at once; its impulses are not drawn." if impacts else ""
 
 
 _INSERTS: Final = ((0.52, 0.46), (0.44, 0.4), (0.36, 0.32), (0.3, 0.26))
-"""Possible widths and heights of the insert, fractions of the axes."""
+"""Widths and heights tried for the inset, largest first, as fractions of the axes."""
 
 _NOTE: Final = (0.4, 0.09)  # Width and height of the note on loops, fractions of the axes
 
@@ -107,9 +107,9 @@ _NOTE: Final = (0.4, 0.09)  # Width and height of the note on loops, fractions o
 def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
     """Draw Fig. 5: the sum of all forces, equation (2), against displacement after a single pulse.
 
-    A clockwise loop is energy given to the armature, a counter-clockwise loop energy lost; arrow heads show
-    the direction. The insert shows the motion after the second touch of the backstop, if any. The motion
-    lasts 4 ms by default; `duration` is in s, or text with a unit.
+    The area of a clockwise loop is energy given to the armature, that of a counter-clockwise loop energy lost
+    by the armature; arrow heads show the direction. The inset shows the motion after the second touch of the
+    backstop, if any. The motion lasts 4 ms by default; `duration` is in s, or text with a unit.
     """
     motion = fired(hammer, duration=duration)
     times = times_of(motion)
@@ -147,7 +147,7 @@ def _annotate(
     way: Scale,
     force: Scale,
 ) -> None:
-    """Add the insert, if there is a settle-out, and the meaning of the loops, if there is room."""
+    """Add the inset, if there is a settle-out, and a note on the meaning of the loops."""
     points = occupied(ax)
     if late.any():
         left, bottom, width, height = box = _place(points)
@@ -166,7 +166,7 @@ def _annotate(
 
 
 def _place(points: FloatArray) -> tuple[float, float, float, float]:
-    """Return left, bottom, width and height of the insert: as large as possible, preferably upper right."""
+    """Return left, bottom, width and height of the inset: as large as possible, preferably upper right."""
     boxes = []
     for width, height in _INSERTS:
         corners = [
@@ -233,12 +233,11 @@ def phase_plane(hammer: Hammer, *, duration: float | str | None = None) -> Figur
 
 
 CURRENTS: Final = (0.0, 0.5, 1.0, 1.5, 2.0)
-"""Currents of the paper's Fig. 2, A."""
+"""Coil currents drawn in the paper's Fig. 2, A."""
 
 _POINTS: Final = 400  # Points of a static curve: more than a picture resolves
 _HALF_WIDTH, _ENOUGH, _PREFERRED = 0.04, 0.055, 0.3
-"""Half the width of a label, sufficient distance from other curves, and preferred position; fractions of the
-axes."""
+"""Placement of labels, as fractions of the axes: half-width, sufficient clearance, preferred position."""
 
 
 @styled
@@ -248,7 +247,7 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
     Parameters
     ----------
     currents : sequence of float, optional
-        Coil currents, A; currents outside the range of the magnet's law are omitted.
+        Coil currents, A; currents outside the range of the magnet's law are skipped.
 
     Raises
     ------
@@ -311,7 +310,7 @@ def statics(hammer: Hammer, *, currents: Sequence[float] = CURRENTS) -> Figure:
 def _limits(
     hammer: Hammer, x: FloatArray, family: list[FloatArray], spring: FloatArray | None
 ) -> tuple[float, float]:
-    """Return axis limits that include every curve within the stroke; beyond it, a fit may be singular."""
+    """Return force limits of the axes that include every curve within the stroke."""
     ends = list(places(hammer).values())
     stroke = (x >= min(ends)) & (x <= max(ends)) if len(ends) > 1 else np.full(x.shape, True)
     curves = [*family, *([] if spring is None else [spring, -spring])]
@@ -332,7 +331,7 @@ def _colours(count: int) -> list[str]:
 def _label_curves(
     ax: Axes, x: FloatArray, lines: FloatArray, curves: dict[str, FloatArray], further: list[FloatArray]
 ) -> None:
-    """Label each curve at a position far from the other curves and position lines."""
+    """Label each curve at a point far from other curves and from position lines."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     across = (x - left) / (right - left)
     up = {name: (values - bottom) / (top - bottom) for name, values in curves.items()}

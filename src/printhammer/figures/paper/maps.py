@@ -3,7 +3,7 @@
 Figure 8: displacement curves at gradually rising rates, stacked into a surface with hidden lines removed.
 Figure 9: displacement in colours, against time and firing rate, in bursts of nine pulses.
 
-`compare_maps`: a computed and a measured map side by side on the same scales, and their difference.
+`compare_maps` draws a computed and a measured map side by side on the same scales, and their difference.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ def frequency_map(
 ) -> Figure:
     """Draw Fig. 9: the frequency-time map in colours.
 
-    Thin lines are firings, strong lines lost dots, or marks in each row for fewer than 50 rates; the SVG ids
-    are "firing 1" and so on, and "lost dots".
+    Thin lines mark firings, bold lines lost dots; with fewer than 50 rates, marks in each row replace the
+    lines. The SVG ids are "firing 1" and so on, and "lost dots".
 
     Parameters
     ----------
     hammer : Hammer
         Hammer with a waveform; ignored if a map is passed.
     chart : xarray.Dataset, optional
-        A map from `printhammer.frequency_map`; by default the one of the hammer.
+        A map from `printhammer.frequency_map`; by default the map of the hammer is computed.
     rates : array, optional
         Rates of the map that is computed, Hz.
 
     Raises
     ------
     InputError
-        The hammer has no waveform or no rest state, or the map fewer than two times.
+        The hammer has no waveform or no rest state, or the map has fewer than two times.
     """
     chart = map_marks.drawable(map_marks.chart_of(hammer, rates) if chart is None else chart)
     scales = map_marks.scales_of(chart)
@@ -66,34 +66,34 @@ def frequency_map(
 
 
 CURVES: Final = 81
-"""Number of curves."""
+"""Number of curves of Fig. 8."""
 
 _TIMES: Final = 1361  # Times of a curve: more than a picture resolves
 _LEAN: Final = (0.19, 0.66)
-"""Offset from the first curve to the last, to the right and upward, in units of the picture width."""
+"""Offset from the first curve to the last, right and up, in units of the picture width."""
 
 _ACROSS: Final = 0.80
-"""Width of a curve."""
+"""Width of a curve, in units of the picture width."""
 
 _TALL: Final = 0.22
-"""Height of the displacements, from the lowest to the highest position."""
+"""Height of a curve from the lowest to the highest position, in units of the picture width."""
 
 _TICK: Final = 0.008  # Length of a tick, in units of the picture width
 
 _SHEETS: Final = 2.0
-"""Common z-order of curves and sheets, so that they are drawn in the order of creation."""
+"""Common z-order of curves and the sheets below them, so that they are drawn in order of creation."""
 
 _FLAT: Final = 4e-4
-"""Tolerance of thinned curves, in units of the picture: 0.15 points."""
+"""Tolerance of thinned curves, in units of the picture width; corresponds to 0.15 points."""
 
 _NAME: Final[dict[str, Any]] = {"fontsize": "medium"}
 _POST: Final = 0.13
-"""Distance from the displacement axis to the curves."""
+"""Distance from the displacement axis to the curves, in units of the picture width."""
 
 
 @dataclass(frozen=True)
 class _View:
-    """Oblique projection of time, s, displacement, m, and rate, Hz, onto the picture."""
+    """Oblique projection of time, s, displacement, m, and rate, Hz, onto the plane of the figure."""
 
     times: tuple[float, float]
     heights: tuple[float, float]
@@ -116,24 +116,25 @@ class _View:
 
 @styled
 def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.ArrayLike | None = None) -> Figure:
-    """Draw Fig. 8: displacement against time, one curve per rate, each hiding those behind it.
+    """Draw Fig. 8: displacement against time, one curve per rate, each hiding the curves behind it.
 
-    The portions of a curve inside the pack are blue; the SVG ids of the curves are "rate" and their numbers.
+    The portions of a curve inside the pack are blue. The SVG id of a curve is "rate" followed by its rate in
+    Hz.
 
     Parameters
     ----------
     hammer : Hammer
         Hammer with a waveform; ignored if a map is passed.
     chart : xarray.Dataset, optional
-        A map from `printhammer.frequency_map`, of which evenly chosen rates are drawn; by default the one of
-        the hammer.
+        A map from `printhammer.frequency_map`, of which evenly chosen rates are drawn; by default the map of
+        the hammer is computed.
     rates : array, optional
         Rates of the map that is computed, Hz.
 
     Raises
     ------
     InputError
-        The hammer has no waveform or no rest state, or the map fewer than two times.
+        The hammer has no waveform or no rest state, or the map has fewer than two times.
     """
     if chart is None:
         wanted = np.linspace(map_marks.LOWEST, map_marks.HIGHEST, CURVES) if rates is None else rates
@@ -164,7 +165,7 @@ def surface(hammer: Hammer, *, chart: xr.Dataset | None = None, rates: npt.Array
 
 
 def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, front: float | None) -> None:
-    """Draw a curve over a white sheet that hides the curves behind it."""
+    """Draw one curve over a white sheet that hides the curves behind it."""
     known = np.isfinite(x)
     if not known.any():
         return
@@ -179,9 +180,9 @@ def _sheet(ax: Axes, view: _View, time: FloatArray, x: FloatArray, rate: float, 
 
 
 def thinned(x: FloatArray, y: FloatArray, room: float) -> tuple[FloatArray, FloatArray]:
-    """Thin a curve to the points that keep it within `room` of itself, measured along y.
+    """Thin a curve to fewer points whose polygon stays within `room` of the curve, measured along y.
 
-    After D. Douglas and T. Peucker, Cartographica 10 (1973) 112.
+    Algorithm of D. Douglas and T. Peucker, Cartographica 10 (1973) 112.
     """
     keep = np.zeros(len(x), dtype=np.bool_)
     keep[[0, -1]] = True
@@ -268,7 +269,7 @@ def _mark(
     color: str = INK,
     **options: Any,
 ) -> None:
-    """Draw a tick from a position on an axis, and its text beside the end."""
+    """Draw a tick at a position on an axis, and a text at its end."""
     end = at[0] + way[0], at[1] + way[1]
     ax.plot([at[0], end[0]], [at[1], end[1]], color=color, lw=HAIR, **options)
     _text(ax, text, end, shift, side, color=color)
@@ -286,8 +287,8 @@ def _text(
 def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
     """Draw a computed and a measured map side by side, with the RMS of their difference.
 
-    Maps are those of `printhammer.frequency_map` and `printhammer.maps.measured.load_measured_map`. In the
-    third panel, "difference" is the SVG id of the RMS over time, for every common rate; grey areas have no
+    The maps are from `printhammer.frequency_map` and `printhammer.maps.measured.load_measured_map`. The third
+    panel shows the RMS difference over time for every common rate (SVG id "difference"). Grey areas have no
     displacement.
     """
     for chart in (computed, measured):
@@ -318,7 +319,7 @@ def compare_maps(computed: xr.Dataset, measured: xr.Dataset) -> Figure:
 
 
 def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measured: xr.Dataset) -> str:
-    """Draw the RMS of the difference against rate, or a remark if there is none."""
+    """Draw the RMS difference against the rate; return a remark if the maps share no rate."""
     way = scales.way
     rates, difference = rms_difference(computed, measured)
     heading(ax, "difference")

@@ -2,7 +2,7 @@
 
 Figure 3: displacement after a single pulse, the current below.
 
-Figure 6: the response to two pulses, at two delays of the second. Figure 7: buzz printing, a train that
+Figure 6: the response to two pulses, at two delays of the second pulse. Figure 7: buzz printing, a train that
 prints while the armature stays clear of the backstop.
 
 `plot` draws any motion against time: displacement, positions of the hammer, firings, and the drive.
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def single_pulse(hammer: Hammer, *, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 3: the motion after a single pulse, by default until it has settled, or 4 ms."""
+    """Draw Fig. 3: displacement and current after a single pulse, by default until the motion settles."""
     motion = fired(hammer, duration=duration)
     return timeline([motion], motion.end if duration is not None else shown_until(motion))
 
@@ -41,7 +41,7 @@ DELAYS: Final = (660e-6, 700e-6)
 def two_pulses(
     hammer: Hammer, *, delays: Sequence[float] = DELAYS, duration: float | str | None = None
 ) -> Figure:
-    """Draw Fig. 6: the motion under two pulses, for each delay of the second.
+    """Draw Fig. 6: the motions after two pulses, one for each delay of the second pulse.
 
     Parameters
     ----------
@@ -71,9 +71,9 @@ def _text(delay: float) -> str:
 
 
 def buzz(hammer: Hammer, *, search: BuzzSearch | None = None, duration: float | str | None = None) -> Figure:
-    """Draw Fig. 7: the train found by `find_buzz_train`, or its best attempt, with a remark.
+    """Draw Fig. 7: the buzz-printing train found by `find_buzz_train`, or its best attempt with a remark.
 
-    Numbers at the dots that count are peak forces in units of that of a single pulse.
+    Numbers at the dots that count are peak forces relative to the single-pulse force.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def _heading(train: BuzzTrain) -> str:
 
 
 def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> None:
-    """Write the relative peak force at each dot that counts."""
+    """Write the peak force, relative to the single pulse, at each dot that counts."""
     panel = figure.axes[0]
     time, way = scale("time", until), scale("displacement", float(max(motion.maxima[1], default=0.0)))
     forces = dict(enumerate(train.forces, train.first))
@@ -133,7 +133,7 @@ def plot(motion: Motion, *, until: float | str | None = None, heading: str = "")
     Parameters
     ----------
     motion : Motion
-        Motion; the message of one that stopped early is shown.
+        Motion to draw; if it stopped early, its message is shown.
     until : float or str, optional
         End of the time axis, s, or text with a unit; by default the end of the motion.
     heading : str, optional

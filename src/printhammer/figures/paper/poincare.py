@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from printhammer.chaos import Strobe
 
 PERIODS: Final = tuple(hundredths / 1e5 for hundredths in range(135, 75, -5))
-"""Strobe times of the panels, s: from 1.35 ms down to 0.80 ms, as in the paper."""
+"""Strobe times of the panels of Fig. 11, s: from 1.35 ms down to 0.80 ms."""
 
 POINTS: Final = 200
-"""Points in each panel, as in the paper."""
+"""Number of strobe points in each panel of Fig. 11."""
 
 _COLUMNS: Final = 3  # Panels in a row
 
@@ -56,13 +56,14 @@ def poincare(
     points : int, optional
         Points in each panel, from the first firing on.
     printed : mapping, optional
-        Verdicts printed in the paper, such as "period-2", by strobe time, s; each is written in its panel if
-        it differs from the computed classification.
+        Classifications printed in the paper, such as "period-2", by strobe time, s; a panel shows its printed
+        classification if the computed one differs.
     scheme : str, optional
-        "runge-kutta-4" or "trapezoid": the points as that scheme computes them on the schedule of the paper,
-        see `printhammer.chaos.strobe.points`.
+        Integration scheme of 1983, "runge-kutta-4" or "trapezoid", used with the step sizes of the paper, see
+        `printhammer.chaos.strobe.points`; by default the accurate integrator.
     reading : str, optional
-        Rule for the short step of that schedule.
+        Rule that decides where the integrators of 1983 take short steps, one of
+        `printhammer.run.scheme_runs.READINGS`.
     """
     from matplotlib.lines import Line2D
 
@@ -110,7 +111,7 @@ def _strobed(
     scheme: Scheme | None,
     reading: Reading,
 ) -> list[Strobe]:
-    """Return the strobe points of the panels, exact or as a scheme of 1983 computes them."""
+    """Compute the strobe points of the panels, accurately or with a scheme of 1983."""
     if scheme is None:
         from printhammer.chaos import strobes
 
@@ -121,7 +122,7 @@ def _strobed(
 
 
 def _edge(ax: Axes, side: Literal["x", "y"], shown: Scale, here: bool, opposite: bool) -> None:
-    """Label the axis of a panel at the edge of the figure, and the other unit system opposite."""
+    """Label the axis of a panel at the figure's edge, and the axis in the other unit system opposite."""
     other = label(ax, side, shown)
     if not here:
         ax.set(**{f"{side}label": ""})
