@@ -46,7 +46,8 @@ class Wasmtime:
         self._exports = wasmtime.Instance(self._store, compiled, []).exports(self._store)
         self._memory = self._exports["memory"]
 
-    def call(self, name: str, *arguments: Any) -> Any:
+    def call(self, name: str, *arguments: Any, results: int | None = None) -> Any:
+        count = RESULTS[name] if results is None else results
         top, store = self._exports["__heap_base"].value(self._store), self._store
         values = list(leaves(arguments))
         places: dict[int, int] = {}
@@ -73,8 +74,9 @@ class Wasmtime:
             content = self._memory.read(store, place, place + values[i].nbytes)
             values[i][...] = np.frombuffer(bytes(content), values[i].dtype).reshape(values[i].shape)
         end = block + len(slots)
-        results = bytes(self._memory.read(store, end, end + 8 * RESULTS[name]))
-        return answer(list(struct.unpack(f"<{RESULTS[name]}q", results)))
+        return answer(
+            list(struct.unpack(f"<{count}q", bytes(self._memory.read(store, end, end + 8 * count))))
+        )
 
 
 NODE = """
@@ -96,13 +98,17 @@ for await (const line of createInterface({ input: process.stdin })) {
     arrays.push(kernel.copy(value.letter, new types[value.letter](buffer), ...value.shape));
     return arrays.at(-1);
   };
-  const reply = kernel.temporarily(() => {
+  const answer = () => kernel.temporarily(() => {
     const begun = performance.now(), results = kernel.call(name, ...values.map(unpacked));
     const milliseconds = performance.now() - begun, { buffer } = kernel.memory;
     return { results, milliseconds, arrays: arrays.map(({ at, values }) =>
       Buffer.from(buffer, at, values.byteLength).toString("base64")) };
   });
-  console.log(JSON.stringify(reply));
+  try {
+    console.log(JSON.stringify(answer()));
+  } catch ({ message }) {
+    console.log(JSON.stringify({ error: message }));
+  }
 }
 """
 
@@ -134,7 +140,8 @@ class Node:
         assert self._process.stdout is not None
         return json.loads(self._process.stdout.readline())
 
-    def call(self, name: str, *arguments: Any) -> Any:
+    def call(self, name: str, *arguments: Any, results: int | None = None) -> Any:
+        """Call an entry point; the module itself says how many results it has."""
         arrays: list[np.ndarray] = []
 
         def packed(value: Any) -> Any:
@@ -152,6 +159,8 @@ class Node:
         request = {"name": name, "values": [packed(value) for value in arguments]}
         print(json.dumps(request), file=self._process.stdin, flush=True)
         reply = self._reply()
+        if "error" in reply:
+            raise RuntimeError(reply["error"])
         for array, content in zip(arrays, reply["arrays"], strict=True):
             array[...] = np.frombuffer(base64.b64decode(content), array.dtype).reshape(array.shape)
         self.milliseconds = reply["milliseconds"]

@@ -1,14 +1,26 @@
 """Kernels in WebAssembly: what a module holds, and that it computes what machine code computes."""
 
 import importlib.util
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 import llvmlite.binding as llvm
+import numpy as np
 import pytest
 from tests.errors import refused
+from tests.webassembly import Node, Wasmtime
 
+import printhammer as ph
+from printhammer.hammer.hammer import shipped
 from printhammer.kernel.compile import calls, link
 from printhammer.kernel.compile.signatures import signature_of
+from printhammer.kernel.compile.specialise import ENTRIES, Kernel
 from printhammer.kernel.compile.web import build
+from printhammer.kernel.model.layout import INVERSE_MASS
+from printhammer.run.problem import Problem, Record
+from printhammer.support.arrays import FloatArray
 
 SCALED = """
 @table = internal constant [2 x double] [double 2.0, double 3.0]
@@ -61,3 +73,122 @@ def test_a_description_names_the_elements_of_named_tuples() -> None:
 )
 def test_lengths_are_encoded_as_the_binary_format_says(number: int, encoded: bytes) -> None:
     assert build._unsigned(number) == encoded
+
+
+def small_module() -> bytes:
+    description = {"entries": {"run": {"arguments": build.description_of(SIGNATURE), "results": 2}}}
+    return build.join({"run": made_object()}, description)
+
+
+@pytest.mark.slow
+def test_arguments_and_results_of_a_small_module(tmp_path: Path) -> None:
+    path = tmp_path / "small.wasm"
+    path.write_bytes(small_module())
+    host = Wasmtime(path.read_bytes())
+    assert host.imports == []
+    with Node(path) as node:
+        for call in (host.call, node.call):
+            array = np.arange(6.0).reshape(2, 3)
+            assert call("run", True, (array, 2.0), results=2) == (6, 1)
+            assert array.tolist() == [[0.0, 1.0, 2.0], [9.0, 4.0, 5.0]]
+            # More than the memory that a module begins with.
+            large = np.zeros((2, 1_000_000))
+            assert call("run", False, (large, 0.5), results=2) == (2_000_000, 0)
+            assert large[1, 0] == 3.0**0.5
+            assert not np.delete(large.ravel(), 1_000_000).any()
+        with pytest.raises(RuntimeError, match=r"run\.1\.0: expected an array f2"):
+            node.call("run", True, (np.zeros(3), 2.0), results=2)
+
+
+@contextmanager
+def computed_by(kernel: Kernel, call: Callable[..., Any]) -> Iterator[None]:
+    """Have a host compute all that a kernel is asked for."""
+    own = {name: kernel.__dict__.pop(name) for name in ENTRIES if name in kernel.__dict__}
+    for name in ENTRIES:
+        kernel.__dict__[name] = lambda *arguments, name=name: call(name, *arguments)
+    try:
+        yield
+    finally:
+        for name in ENTRIES:
+            del kernel.__dict__[name]
+        kernel.__dict__.update(own)
+
+
+def problem_of(name: str) -> tuple[Problem, float]:
+    """A shipped hammer under five pulses, a textbook oscillator under a sine, and the end of the run."""
+    hammer = ph.load(name)
+    at = hammer.position or 0.0
+    if hammer.waveform is not None:
+        period = 5.0 * hammer.waveform.width
+        train = ph.PulseTrain(hammer.waveform, period=period, pulses=5)
+        return Problem(hammer, train, (at, 0.0), 0.0, 2e-11), 5.0 * period
+    # A ball of a gram, or a mass and a stiffness of 1.
+    is_ball = hammer.mass < 0.5
+    height, sine = (1e-3, ("5 mN", 60.0)) if is_ball else (0.4, ("0.3 N", 0.13))
+    start = (at + height, 0.0)
+    return Problem(hammer, ph.SineForce(*sine), start, 0.0, 2e-11), 0.2 if is_ball else 40.0
+
+
+def states(problem: Problem, end: float, times: FloatArray) -> tuple[FloatArray, Record]:
+    """Displacement and velocity, and the record."""
+    record = problem.run(end)
+    return problem.resample(record, times)[:, :2], record
+
+
+def assert_close(found: FloatArray, expected: FloatArray) -> None:
+    """Check agreement to 1e-12 of the range of each column."""
+    for column, right in zip(found.T, expected.T, strict=True):
+        np.testing.assert_allclose(column, right, rtol=0.0, atol=1e-12 * np.abs(right).max(initial=1e-300))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped())
+def test_a_module_computes_what_machine_code_computes(name: str, tmp_path: Path) -> None:
+    problem, end = problem_of(name)
+    path = tmp_path / "kernel.wasm"
+    path.write_bytes(problem.kernel.web_module())
+    host = Wasmtime(path.read_bytes())
+    assert host.imports == []
+    times = np.linspace(0.0, end, 401)
+    machine, record = states(problem, end, times)
+    scales = np.ptp(machine, axis=0)
+    # Where a mass that differs by rounding leads elsewhere, machine code and module may differ too.
+    other_problem, _ = problem_of(name)
+    other_problem.constants[INVERSE_MASS] *= 1.0 + 5e-16
+    other, _ = states(other_problem, end, times)
+    apart = (np.abs(other - machine) > 5e-13 * scales).any(axis=1)
+    known = int(np.argmax(apart)) if apart.any() else len(times)
+    assert known > 40
+    with Node(path) as node:
+        found = []
+        for call in (host.call, node.call):
+            with computed_by(problem.kernel, call):
+                found.append(states(problem, end, times))
+    (web, web_record), (in_node, node_record) = found
+    np.testing.assert_array_equal(in_node, web)
+    np.testing.assert_array_equal(node_record.contacts, web_record.contacts)
+    np.testing.assert_allclose(web[:known] / scales, machine[:known] / scales, rtol=0.0, atol=1e-12)
+    over = [int((each.contacts[:, 3] < times[known - 1]).sum()) for each in (record, web_record)]
+    assert over[0] == over[1]
+    # Surface, time and velocity in, velocity out.
+    begun, web_begun = (each.contacts[: over[0], [0, 1, 2, 4]] for each in (record, web_record))
+    assert_close(web_begun, begun)
+    # Where the armature leaves from rest, and at a maximum, a curve is flat: the time is known to the square
+    # root of what the curve is known to.
+    flat = {"rtol": 0.0, "atol": 1e-8 * end}
+    np.testing.assert_allclose(web_record.contacts[: over[0], 3], record.contacts[: over[0], 3], **flat)
+    # What is computed from one record has no horizon.
+    steps = np.arange(len(record.nodes) - 1)
+
+    def from_record() -> list[FloatArray]:
+        ends = np.ascontiguousarray(record.nodes[:, 0])
+        energies = problem.quadratures(record, steps, ends[:-1], ends[1:])
+        return [problem.resample(record, times)[:, :10], problem.peaks(record), energies[:, :5]]
+
+    expected = from_record()
+    with computed_by(problem.kernel, host.call):
+        curves, peaks, energies = from_record()
+    assert_close(curves, expected[0])
+    assert_close(peaks[:, 1:], expected[1][:, 1:])
+    np.testing.assert_allclose(peaks[:, 0], expected[1][:, 0], **flat)
+    assert_close(energies, expected[2])
