@@ -1,1 +1,1 @@
-"""Run-to-run calibration of a compensation table for an unmeasured hammer, from one reading per dot."""
+"""Run-to-run calibration of a compensation table for an unmeasured hammer, from sensor readings of dots."""

@@ -4,14 +4,15 @@ The constants are in prior standard deviations: the prior is the standard normal
 the posterior is found by the Levenberg-Marquardt method (Nocedal and Wright, *Numerical Optimization*, 2006,
 section 10.3) with Broyden's rank-one updates of the Jacobian (their section 11.1), and the posterior near it
 is approximated by a normal distribution (Laplace; MacKay, *Information Theory, Inference, and Learning
-Algorithms*, 2003, chapter 27). A belief is a mixture of these normal distributions, since readings may have
-more than one explanation. Errors follow Student's t distribution, so that outliers have little weight.
+Algorithms*, 2003, chapter 27). A belief is a mixture of these normal distributions, since several sets of
+constants may explain the readings. Errors follow Student's t distribution, so that outliers have little
+weight.
 
 The readings of a hammer that is fired while it still moves are strongly nonlinear in the constants, and a
 search that starts far away stops at a local minimum. The estimation is therefore a continuation in the noise:
-at the first level the part of a reading that a quadratic function of the constants does not explain counts
-as noise; the following levels reduce that noise, down to the noise of the sensor. The search ends at the last
-level that explains the readings. A mode that no starting point leads to is missed.
+at the first level, the residual of a quadratic fit of the reading to the constants counts as noise; the
+following levels reduce that noise, down to the noise of the sensor. The search ends at the last level that
+explains the readings. A mode that no starting point leads to is missed.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class Evidence:
     rough: FloatArray  # RMS residual of the quadratic surrogate of a reading
 
     def at(self, level: float) -> FloatArray:
-        """Compute the standard deviations of the readings at a level of the continuation, (readings,)."""
+        """Compute the standard deviations of the readings at a level of the continuation in the noise."""
         return np.asarray(np.hypot(self.noise, level * self.rough))
 
 
@@ -85,7 +86,7 @@ class Belief:
 
     @classmethod
     def of(cls, ends: Sequence[Mode]) -> Belief:
-        """Build the belief from the modes at which searches ended; duplicate modes count once."""
+        """Build a belief from the modes at which searches ended; duplicate modes are merged."""
         modes: list[Mode] = []
         for end in sorted(ends, key=lambda end: end.objective):
             if all(mode.apart(end) > 1.0 for mode in modes):
@@ -121,10 +122,10 @@ class Belief:
 def believe(
     evidence: Evidence, starts: Sequence[FloatArray], before: Sequence[FloatArray] = ()
 ) -> Search[Belief]:
-    """Estimate the constants of a unit from its readings; yields the constants whose readings are needed.
+    """Estimate the constants of a unit from its readings; yield the constants whose readings are needed.
 
-    Searches begin at the modes `before` of the previous stage. If there is none, or if none of these searches
-    ends at the finest level, searches begin at each of `starts` too.
+    Searches begin at the modes `before` of the previous stage. If there are no such modes, or if none of
+    these searches ends at the finest level, searches begin at each of `starts` too.
     """
     ends = yield from together([_descend(evidence, start, _NEAR) for start in before])
     if not any(end.level == LEVELS[-1] for end in ends):
@@ -176,7 +177,7 @@ def _misfit(shown: FloatArray, evidence: Evidence) -> float:
 
 
 def _look(constants: FloatArray, shown: FloatArray) -> Search[_Place]:
-    """Evaluate the Jacobian at an iterate by forward differences."""
+    """Evaluate the Jacobian of the readings at an iterate by forward differences."""
     (moved,) = yield [constants + _STEP * np.eye(constants.size)]
     return _Place(constants, shown, np.asarray((moved - shown).T / _STEP), fresh=True)
 

@@ -16,7 +16,7 @@ Convergence: the difference of two corrections does not grow if no eigenvalue of
 exceeds 1 in absolute value, where G' is the sensitivity of the unit. G' is unknown; a starts at 1 and is
 halved until the condition holds for samples of the posterior.
 
-`Adjustable` says which entries of a table a learner may change, and within which bounds.
+`Adjustable` defines which entries of a table a learner may change, and within which bounds.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ ADVANCE, WIDTH, DELAY, BRAKE = range(4)
 
 
 class OpenLoop(NamedTuple):
-    """Open-loop drive, the same pulse at every slot: its settings (4, entries) and its waveform."""
+    """Open-loop drive, the same pulse at every slot: its table settings (4, entries) and its waveform."""
 
     settings: FloatArray
     pulse: Waveform
@@ -73,21 +73,21 @@ class OpenLoop(NamedTuple):
 
 @dataclass(frozen=True)
 class Adjustable:
-    """Entries of a table that are learned: advance, width, and the brake width where there is a brake pulse.
+    """Entries of a table that are learned: advance, width, and brake width of entries with a brake pulse.
 
-    `base` (4, entries) are the settings to which corrections are added, at a rate in Hz, as times after the
-    slots for the hammer with its driver, s. Corrections are arrays (..., inputs), in units of `STEP`.
+    `base` (4, entries) are the settings to which corrections are added, in s relative to the slots, at a slot
+    rate in Hz, for the hammer with its driver. Corrections are arrays (..., inputs), in units of `STEP`.
     """
 
     task: Task
     rate: float
     base: FloatArray
     own: OpenLoop | None = None
-    """Open loop of the hammer's own pulse; None if the task uses that pulse or the pulse has no width."""
+    """Open loop with the hammer's own pulse; None if the task uses that pulse or the pulse has no width."""
 
     @cached_property
     def inputs(self) -> IntArray:
-        """Row and column in the settings of each input, shape (2, inputs)."""
+        """Row and column in the settings of each learned input, shape (2, inputs)."""
         numbers = [number_of(each, self.task.reach) for each in histories(self.task.gaps, self.task.reach)]
         cells = [(row, number) for row in (ADVANCE, WIDTH) for number in numbers]
         cells += [(BRAKE, number) for number in numbers if self.base[BRAKE, number] > 0.0]
@@ -102,7 +102,7 @@ class Adjustable:
 
     @property
     def loops(self) -> list[OpenLoop]:
-        """Open loops to compare with: the pulse of the task and, if present, the hammer's own pulse."""
+        """Open loops that a table is compared with: with the task's pulse and, if any, the hammer's own."""
         plain = OpenLoop(self.open_loop, self.task.pulse)
         return [plain] if self.own is None else [plain, self.own]
 
@@ -113,7 +113,7 @@ class Adjustable:
         return np.asarray((self._bounded(self._raw(after)) - self.base)[rows, columns] / STEP)
 
     def started_from(self, base: FloatArray) -> Adjustable:
-        """Return a copy that starts from other settings, (4, entries), clipped to all bounds."""
+        """Return a copy with other base settings, (4, entries), clipped to all bounds."""
         # Unlike entries of the first table, entries of this table may not stay beyond a bound.
         strict, own = base.copy(), base.copy()
         strict[ADVANCE] = -np.inf
@@ -159,7 +159,7 @@ _STEEP: Final = 2.0  # Weight of the quartic term of the objective relative to t
 _SIZES: Final = (1.0, 0.5, 0.2)  # Step fractions of the line search
 _NEWTON: Final = 10  # Iteration limit of the law on simulated hammers after a stage
 BAD: Final = 10.0
-"""Value of `Update.left` above which another starting table is tried."""
+"""Remaining objective (`Update.left`) above which the learner tries another starting table."""
 
 _SLOW: Final = 0.85  # The iteration stops if the objective exceeds this fraction of the value before
 _LEAST_LAW: Final = 1e-2  # Lower bound of the fraction a of the model error that is corrected
@@ -167,11 +167,11 @@ _OTHERS: Final = 4  # Number of posterior samples on which the convergence condi
 _ALIKE: Final = 24  # Number of posterior samples on which table and open loops are compared
 _GAIN: Final = 0.02  # Smallest mean gain of a table, as a fraction of the dots, with which it is used
 TRIED: Final = slots_of(cycle_with_lead_in(6, 0))
-"""Slots of the line on which corrections are evaluated by simulation: the de Bruijn cycle of order 6."""
+"""Slots of the line that evaluates corrections by simulation: the de Bruijn cycle of order 6."""
 
 
 def _judged_slots() -> tuple[int, ...]:
-    """List the slots of the cycle with its lead-in, and of the rows of dots, each row from rest."""
+    """List the slots of the test pattern: the cycle with its lead-in, and rows of dots, each from rest."""
     slots = slots_of(cycle_with_lead_in())
     for step in STEPS:
         slots += tuple(slots[-1] + 1 + SLOTS + slot for slot in row_of_dots(step))
@@ -179,17 +179,18 @@ def _judged_slots() -> tuple[int, ...]:
 
 
 PRINTED: Final = _judged_slots()
-"""Slots on which tables are judged: the cycle with its lead-in, and rows of 200 slots, each from rest."""
+"""Slots of the pattern that tables are tested with: the cycle with its lead-in, and rows of 200 slots, each
+from rest."""
 
 JUDGED: Final = np.asarray(PRINTED) >= LEAD_IN
-"""Mask of the dots that count, (dots,): all except the lead-in."""
+"""Mask of the dots of `PRINTED` that are evaluated, (dots,): all except the lead-in."""
 
 IN_CYCLE: Final = np.asarray(PRINTED)[JUDGED] < LEAD_IN + 2**SLOTS
-"""Mask of the dots of the cycle among the dots that count, (counted dots,)."""
+"""Mask of the dots of the cycle among the evaluated dots, (evaluated dots,)."""
 
 
 class Verdict(NamedTuple):
-    """Comparison of a table with the open loops on samples of the posterior."""
+    """Result of comparing a table with the open loops on samples of the posterior."""
 
     gains: bool  # Whether the table is better than both open loops
     loop: OpenLoop  # The open loop that is used otherwise
@@ -199,7 +200,7 @@ class Verdict(NamedTuple):
 
 
 class Update(NamedTuple):
-    """Result of a stage."""
+    """Result of a learning stage: corrections, contraction, comparison with open loop, objective."""
 
     corrections: FloatArray  # (inputs,)
     contraction: float  # Largest eigenvalue of Q - L (G + a (G' - G))
@@ -208,7 +209,7 @@ class Update(NamedTuple):
 
 
 class _Unit(NamedTuple):
-    """Posterior modes of a unit's constants, as hammers."""
+    """Posterior modes of a unit's constants, as hammers with weights and model error."""
 
     hammers: Sequence[Hammer]  # The most probable first
     weights: FloatArray  # Their probabilities
@@ -217,7 +218,7 @@ class _Unit(NamedTuple):
 
 @dataclass(frozen=True)
 class LearningLaw:
-    """Learning law of a production: the prior, the ladder, and the update; it holds no data of a unit."""
+    """Learning law of a production: prior, ladder, and update of corrections; without data of a unit."""
 
     entries: Adjustable
     production: Production
@@ -233,7 +234,7 @@ class LearningLaw:
     first: OpenLoop  # Open loop with the larger mean fraction of good dots over the production
 
     def update(self, belief: Belief, corrections: FloatArray, unexplained: FloatArray) -> Printing[Update]:
-        """Compute the corrections after a stage; yields the lines that simulated hammers have to print.
+        """Compute the corrections after a stage; yield the lines that simulated hammers have to print.
 
         `unexplained` (2, dots) is the model error of arrival and force of the dots of the line, normalised by
         the limits.
@@ -274,8 +275,8 @@ class LearningLaw:
     def started_anew(self, belief: Belief) -> LearningLaw | None:
         """Return a copy of the law that starts from a table tuned for the most probable hammer.
 
-        The dots from rest of the tuned hammer have the force and the arrival times of the nominal hammer.
-        None if no table prints every dot.
+        The dots from rest of the tuned hammer have the force and the arrival times of the nominal hammer. The
+        result is None if no table prints every dot.
         """
         task = self.entries.task
         (hammer,) = self.production.hammers(belief.modes[0].mean[None])
@@ -303,7 +304,7 @@ class LearningLaw:
         return None
 
     def _followed(self, unit: _Unit, corrections: FloatArray) -> Printing[tuple[float, FloatArray]]:
-        """Iterate the law on simulated hammers; return the smallest objective and its corrections."""
+        """Iterate the law on simulated hammers; return the smallest objective, with its corrections."""
         best = np.inf, corrections
         for _ in range(_NEWTON):
             (off,), slopes = yield from together(
@@ -321,7 +322,7 @@ class LearningLaw:
         return best
 
     def _by_history(self, unexplained: FloatArray) -> FloatArray:
-        """Average the deviations of a line by history, and assign them to the dots of `TRIED`, (2 dots,)."""
+        """Average the deviations of a line by history; return the averages for the dots of `TRIED`."""
         task = self.entries.task
         shown, wanted = (histories_of(slots, task.gaps, task.reach)[:-1] for slots in (LINE, TRIED))
         sums = np.zeros((2, shown.max() + 1))
@@ -346,16 +347,17 @@ class LearningLaw:
         return np.asarray(np.einsum("m,kmd->kd", unit.weights, by_hammer) + unit.more)
 
     def _slopes(self, hammer: Hammer, corrections: FloatArray) -> Printing[FloatArray]:
-        """Compute the sensitivity G of the deviations to each input by differences, (2 dots, inputs)."""
+        """Compute the sensitivity G of the deviations to the inputs by differences, (2 dots, inputs)."""
         rows = [corrections, *(corrections + np.eye(len(corrections)))]
         off = yield from self._off([hammer] * len(rows), rows)
         return np.asarray((off[1:] - off[0]).T)
 
     def _compared(self, alike: Sequence[Hammer], corrections: FloatArray) -> Printing[Verdict]:
-        """Compare a table with the open loops on posterior samples.
+        """Compare a table with the open loops on samples of the posterior; return the verdict.
 
-        The table gains if the samples print more dots with it than in either open loop, and if no sample,
-        except for a fraction `doubt`, prints fewer dots or has a row in which errors grow from dot to dot.
+        The table gains if the samples print more dots with the table than in either open loop, and if no
+        sample, except for a fraction `doubt`, prints fewer dots or has a row in which errors grow from dot to
+        dot.
         """
         press, settings = self.production.press(alike), self.entries.settings(corrections)
         table = yield from order_good(press, [settings] * len(alike))
@@ -373,13 +375,13 @@ class LearningLaw:
         return Verdict(gains, loops[chosen], float(np.fmax.reduce(growth)), float(good.mean()), every)
 
     def _leads(self, share: FloatArray, others: FloatArray) -> bool:
-        """Whether a drive prints more dots (M,) than others (drives, M) on average, fewer on no hammer."""
+        """Whether a drive prints more dots (M,) than others (drives, M) on average, on no hammer fewer."""
         harmless = np.quantile(share - others.max(axis=0), self.doubt) >= 0.0
         return bool(harmless and share.mean() - others.mean(axis=1).max() >= _GAIN)
 
 
 def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
-    """Compute the mask of dots of `PRINTED` within limits, (M, dots), for each open loop."""
+    """Compute, for each open loop, the mask of dots of `PRINTED` within limits, (M, dots), as a coroutine."""
     count = len(press.hammers)
     return (
         yield from together(
@@ -391,18 +393,18 @@ def order_loops(press: Press, entries: Adjustable) -> Printing[list[BoolArray]]:
 def order_good(
     press: Press, settings: Sequence[FloatArray], pulses: Sequence[Waveform] | None = None
 ) -> Printing[BoolArray]:
-    """Compute the mask of dots of `PRINTED` within limits, without the lead-in, (M, dots)."""
+    """Compute the mask of evaluated dots of `PRINTED` within limits, (M, dots), as a coroutine."""
     _dots, judgement = yield from press.order_line(settings, PRINTED, pulses)
     return np.asarray(judgement.good[:, JUDGED])
 
 
 def _badness(off: FloatArray) -> float:
-    """Compute the objective of the law: squared deviations plus weighted fourth powers."""
+    """Compute the objective of the learning law: squared deviations plus weighted fourth powers."""
     return float(np.sum(off**2 + _STEEP * off**4))
 
 
 def _gain(off: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Compute L of the law, (inputs, 2 dots): a pseudo-inverse weighted as in `_badness`."""
+    """Compute the gain L of the law, (inputs, 2 dots): a pseudo-inverse of G weighted as in `_badness`."""
     weight = 1.0 + 2.0 * _STEEP * off**2
     normal = slopes.T @ (weight[:, None] * slopes) + _DAMPING * len(TRIED) * np.eye(slopes.shape[1])
     return np.asarray(np.linalg.solve(normal, slopes.T * weight))

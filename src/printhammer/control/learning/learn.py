@@ -1,4 +1,4 @@
-"""Run-to-run calibration of units, and its result: prints before, during and after learning."""
+"""Run-to-run calibration of units, and the result: dots before, during and after learning."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from printhammer.support.threads import together
 
 
 class Progress(NamedTuple):
-    """State of the units after a number of dots each: judged dots, last test line, and decisions."""
+    """State of the units after a number of dots: evaluated dots, last test line, and decisions."""
 
     dots: int
-    cycle: Judgement  # Judgement of the slots `PRINTED`
-    line: Judgement  # Judgement of the test line
+    cycle: Judgement  # Evaluation of the dots of `PRINTED`
+    line: Judgement  # Evaluation of the dots of the test line
     # Estimates from the readings, arrays of shape (units,); NaN before the first reading
     learned: BoolArray  # Whether the learned table is used, rather than an open loop
     misfit: FloatArray  # RMS of the residuals of the readings, in standard deviations
@@ -49,7 +49,7 @@ class Progress(NamedTuple):
 
     @property
     def good(self) -> BoolArray:
-        """Mask of the dots within limits, without the lead-in, (units, dots)."""
+        """Mask of the evaluated dots within limits, without the lead-in, (units, dots)."""
         return np.asarray(self.cycle.good[:, JUDGED])
 
 
@@ -102,7 +102,7 @@ def calibrate(
 
 
 def table_of(learner: Learner, base: CompensationTable, driver: str, hammer: Hammer) -> CompensationTable:
-    """Convert the drive that a learner has chosen, its table or an open loop, to a table for a hammer.
+    """Convert the drive that a learner has chosen, a table or an open loop, to a table for a hammer.
 
     `base` is the starting table, tuned for the hammer as switched by `driver`.
     """
@@ -184,7 +184,7 @@ class Learning(Result, rows=_DOTS):
 
     @property
     def title(self) -> str:
-        """Title of the result."""
+        """One-line title with hammer and slot rate."""
         return f"{self.hammer.name} learns its table at {self.rate:g} Hz"
 
     def summary(self) -> Summary:
@@ -222,7 +222,7 @@ class Learning(Result, rows=_DOTS):
 
     @property
     def believed_hammer(self) -> Hammer:
-        """The nominal hammer with the estimated constants of the unit."""
+        """Nominal hammer with the estimated constants of the unit."""
         spread = self.variability.constants(self.hammer)
         off = self.believed - np.array([self.hammer.constants[name].si for name in spread])
         sigma = np.array(list(spread.values()))
@@ -279,20 +279,20 @@ def learn(
 ) -> Learning:
     """Calibrate the compensation table of an unmeasured unit from run to run, from its impact times.
 
-    The unit prints test lines; a sensor measures the impact time of each dot and, optionally, its force, with
+    The unit prints test lines; a sensor measures the impact time and, optionally, the force of each dot, with
     noise. The constants of the unit are estimated from the readings by maximum a posteriori estimation with a
-    Laplace approximation, together with offset and gain of the sensor; the priors of these two have standard
-    deviations of 25 us, or the `offset` that the sensor states, and 1 %. Iterative learning control then
-    corrects advance, width and brakes of a table that was tuned for the nominal hammer and the stated
+    Laplace approximation, together with offset and gain of the sensor; the priors of offset and gain have
+    standard deviations of 25 us, or the `offset` that the sensor states, and 1 %. Iterative learning control
+    then corrects advance, width and brakes of a table that was tuned for the nominal hammer and the stated
     variability. The first line is printed in open loop. The table is used only if the posterior explains the
     readings, and if no sample of it prints fewer dots of the test cycle and of rows of 200 slots with the
-    table, or a row in which errors grow. Otherwise the better of two open loops is used: that of the driver,
-    or of the hammer's own pulse.
+    table, or a row in which errors grow. Otherwise the better of two open loops is used: with the pulse of
+    the driver, or with the hammer's own pulse.
 
     Parameters
     ----------
     hammer : Hammer
-        The nominal hammer; the learner knows no other.
+        The nominal hammer, the only hammer that the learner knows.
     unit : Hammer, optional
         The unit to calibrate; by default drawn from the variability with the seed.
     rate : float or str
@@ -307,8 +307,8 @@ def learn(
     members : int, optional
         Number of simulated hammers on which the ladder is chosen, 100 to 5000.
     forgetting : float, optional
-        Fraction by which earlier corrections decay at each stage, above 0 and below 1. It keeps corrections
-        from growing that the readings do not determine.
+        Fraction by which earlier corrections decay at each stage, above 0 and below 1. The decay keeps
+        corrections that the readings do not determine from growing.
     doubt : float, optional
         Largest fraction of the posterior samples that may print fewer dots within limits with the table
         than in an open loop, for the table to be used (default: 0, none).

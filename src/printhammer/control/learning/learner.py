@@ -35,7 +35,7 @@ _LATE: Final = (
 
 
 class Mean(NamedTuple):
-    """Means of the readings of dots, normalised by the limits, and their counts, (measured, dots)."""
+    """Mean readings of dots, normalised by the limits, and the numbers of readings, (measured, dots)."""
 
     value: FloatArray  # NaN where no dot was seen
     seen: FloatArray  # Number of readings in each mean
@@ -52,7 +52,8 @@ class Learner:
     Parameters
     ----------
     law : LearningLaw
-        Learning law of the production; replaced by a law with another starting table if it does not converge.
+        Learning law of the production; replaced by a law with another starting table if the law does not
+        converge.
     """
 
     def __init__(self, law: LearningLaw) -> None:
@@ -69,7 +70,7 @@ class Learner:
 
     @property
     def finished(self) -> bool:
-        """Whether all stages are over."""
+        """Whether all learning stages are complete."""
         return self.stage == len(RUNS)
 
     @property
@@ -90,7 +91,7 @@ class Learner:
 
     @property
     def pulse(self) -> Waveform:
-        """Pulse of the drive in use."""
+        """Waveform of the drive in use, learned table or open loop."""
         return self.law.entries.task.pulse if self.learned else self.verdict.loop.pulse
 
     @property
@@ -99,12 +100,12 @@ class Learner:
         return float("nan") if self.belief is None else self.belief.modes[0].misfit
 
     def see(self, ladder: Readings, line: Readings) -> None:
-        """Store the readings of a run: of the dots of the ladder and of the line."""
+        """Store the sensor readings of a run: the dots of the ladder, and the dots of the line."""
         self._ladders.append(self._scaled(ladder))
         self._line.append(self._scaled(line))
 
     def _scaled(self, readings: Readings) -> FloatArray:
-        """Normalise readings by the limits, (measured, dots)."""
+        """Normalise readings by the limits, shape (measured, dots)."""
         limits, shown = self.law.entries.task.limits, [readings.time]
         if self.law.production.measured > 1 and readings.force is not None:
             shown.append(readings.force)
@@ -113,7 +114,7 @@ class Learner:
         )
 
     def learn(self) -> Printing[None]:
-        """Estimate the constants and update the table after a stage; yields the lines to simulate."""
+        """Estimate the constants and update the table after a stage; yield the lines to simulate."""
         law = self.law
         noise = law.production.noise[:, None]
         line = mean(self._line, noise)
@@ -174,7 +175,7 @@ class Learner:
 
 
 def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
-    """Average readings over runs, without NaN and, from `_FEWEST` runs on, without outliers."""
+    """Average readings over runs, leaving out NaN and, from `_FEWEST` runs on, outliers."""
     values = np.stack(readings)
     known = np.isfinite(values)
     if len(values) >= _FEWEST:
@@ -186,12 +187,12 @@ def mean(readings: Sequence[FloatArray], noise: FloatArray) -> Mean:
 
 
 def _unknown(law: LearningLaw) -> Verdict:
-    """Return the verdict before any reading: the better open loop of the production."""
+    """Return the verdict before the first reading: use the open loop that is better on the production."""
     return Verdict(False, law.first, *[float("nan")] * 3)
 
 
 def _unexplained(rest: FloatArray, noise: FloatArray) -> FloatArray:
-    """Estimate the model error from residuals (measured, dots) by shrinking out the noise; 0 if unseen."""
+    """Estimate the model error from residuals (measured, dots), shrunk by the noise; 0 without a reading."""
     known = np.isfinite(rest).any(axis=1, keepdims=True)
     size = 1.4826 * np.nanmedian(np.where(known, np.abs(rest), 0.0), axis=1, keepdims=True)
     more = np.maximum(size**2 - noise**2, 0.0)

@@ -57,7 +57,7 @@ class Surrogate:
 
     @classmethod
     def of(cls, rows: FloatArray, values: FloatArray) -> Surrogate:
-        """Fit values (members,) to constants (members, constants) by ridge regression, without NaN."""
+        """Fit readings (members,) as a function of constants (members, constants) by ridge regression."""
         known = np.isfinite(values)
         size = rows.shape[1]
         upper = np.triu_indices(size)
@@ -82,12 +82,12 @@ class Surrogate:
         return np.asarray(self.constant + rows @ self.slope + bent)
 
     def gradient(self, rows: FloatArray) -> FloatArray:
-        """Evaluate the derivatives of the reading by the constants, (M, constants)."""
+        """Evaluate the derivatives of the reading with respect to the constants, (M, constants)."""
         return np.asarray(self.slope + rows @ self.curvature)
 
 
 DOTS: Final = 9
-"""Number of dots of a ladder."""
+"""Number of dots of the ladder of test pulses."""
 
 # Widths of single pulses and of both pulses of a pair, as fractions of the nominal width
 _SINGLE: Final = (0.7, 0.85, 1.0, 1.15, 1.3, 1.45)
@@ -110,12 +110,12 @@ class Rung(NamedTuple):
 
     @property
     def dots(self) -> int:
-        """Number of dots of the rung."""
+        """Number of dots of the rung: 1 for a single pulse, 2 for a pair."""
         return 2 if self.later else 1
 
 
 def candidates(task: Task) -> list[Rung]:
-    """List the rungs to choose from; no rung fires a pulse while the armature is in the pack."""
+    """List the candidate rungs of a ladder; no rung fires a pulse while the armature is in the pack."""
     hammer, widest = task.hammers[0], task.widest / task.width
     rungs = [Rung(part) for part in _SINGLE if part <= widest]
     for first in _FIRST:
@@ -204,7 +204,7 @@ LINE: Final = slots_of(cycle_with_lead_in(5, 0))
 
 
 class Order(NamedTuple):
-    """A request to print: hammers, a drive for each, and the end time."""
+    """Order to print: hammers, a drive for each hammer, and the end time of the simulation, s."""
 
     hammers: Sequence[Hammer]  # (M,)
     drives: Sequence[PulseSequence]  # One drive per hammer, (M,)
@@ -212,7 +212,7 @@ class Order(NamedTuple):
 
 
 class Printed(NamedTuple):
-    """Result of an order."""
+    """Printed order: the dots of each hammer, and a mask of the completed simulations."""
 
     dots: DotTable  # (M, largest number of firings of a drive)
     ok: BoolArray  # Mask of the runs that completed, (M,)
@@ -220,14 +220,14 @@ class Printed(NamedTuple):
 
 @dataclass(frozen=True)
 class Press:
-    """Prints ladders and lines with hammers, real units or simulated, at a rate in Hz."""
+    """Press: simulates the printing of ladders and lines with hammers, at a slot rate in Hz."""
 
     task: Task
     rate: float
     hammers: Sequence[Hammer]
 
     def ladder(self, rungs: Sequence[Rung]) -> tuple[FloatArray, FloatArray]:
-        """Simulate a ladder: flight times, s, and forces normalised by the nominal force, (M, dots)."""
+        """Simulate a ladder; return flight times, s, and forces over the nominal force, (M, dots)."""
         return printed(self.order_ladder(rungs), self.task)
 
     def line(
@@ -246,7 +246,8 @@ class Press:
         """Compute the multipliers of rows printed with settings (4, entries), for each hammer, (M,).
 
         A multiplier is the largest absolute Floquet multiplier of two rows, with a dot in every slot and in
-        every second slot; see `printhammer.derivatives.rows.row_multipliers`. NaN if neither row is periodic.
+        every second slot; see `printhammer.derivatives.rows.row_multipliers`. The result is NaN if neither
+        row is periodic.
         """
         task, count, drives = self.task, len(self.hammers), []
         for step in _STEPS:
@@ -257,7 +258,7 @@ class Press:
         return np.asarray(np.fmax.reduce(np.abs(growth).reshape(len(_STEPS), count)))
 
     def order_ladder(self, rungs: Sequence[Rung]) -> Printing[tuple[FloatArray, FloatArray]]:
-        """Compute the result of `ladder` as a coroutine that yields the order."""
+        """Coroutine of `ladder`: yields the order to print, and returns the result from the printed order."""
         task, count = self.task, len(self.hammers)
         drives = []
         for rung in rungs:
@@ -283,7 +284,7 @@ class Press:
         slots: Sequence[int] = LINE,
         pulses: Sequence[Waveform] | None = None,
     ) -> Printing[tuple[DotTable, Judgement]]:
-        """Compute the result of `line` as a coroutine that yields the order."""
+        """Coroutine of `line`: yields the order to print, and returns the result from the printed order."""
         task, due = self.task, slot_times(slots, self.rate)
         fired = [task.pulse] * len(settings) if pulses is None else pulses
         known: dict[int, dict[tuple[float, float, float], Waveform]] = {id(pulse): {} for pulse in fired}
@@ -301,7 +302,7 @@ class Press:
 
 
 def printed(work: Printing[T], task: Task) -> T:
-    """Run a coroutine to its end, simulating the orders that it yields."""
+    """Run a coroutine to its end: simulate the orders that it yields, and return the result."""
     return answered(work, partial(_run, effort=task.effort))
 
 

@@ -29,7 +29,7 @@ from printhammer.support.threads import together
 FORGETTING: Final = 0.02  # Default of `forgetting`
 DOUBT: Final = 0.0  # Default of `doubt`: no posterior sample may lose
 MEMBERS: Final = 400
-"""Number of simulated hammers on which a ladder is chosen."""
+"""Default number of simulated hammers on which a ladder is chosen."""
 _FEW: Final = 24  # Number of simulated hammers on which the open loops are compared
 
 
@@ -53,7 +53,7 @@ def law_for(
 ) -> tuple[LearningLaw, CompensationTable]:
     """Prepare the learning law for a hammer at a rate, Hz, and the robust table that it starts from.
 
-    Arguments are those of `learn`.
+    Arguments are those of `printhammer.learn`.
     """
     if not 0.0 < forgetting < 1.0:
         raise InputError.of("forgetting", forgetting, "a number above 0 and below 1")

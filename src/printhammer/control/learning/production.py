@@ -1,4 +1,4 @@
-"""Prior of a learner: the nominal hammer, the variability of the production, and the sensor's errors."""
+"""Prior of a learner: nominal hammer, variability of the production, and errors of the sensor."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ class Production:
 
     @property
     def size(self) -> int:
-        """Length of a row."""
+        """Length of a row: number of constants and sensor errors."""
         return self.constants + self.measured + 1
 
     @property
     def offset(self) -> float:
-        """Standard deviation of the offset of the sensor's times, s."""
+        """Prior standard deviation of the offset of the sensor's times, s."""
         return OFFSET if self.sensor.offset is None else self.sensor.offset
 
     @property
@@ -78,11 +78,11 @@ class Production:
         ]
 
     def hammers(self, rows: FloatArray) -> list[Hammer | None]:
-        """Build the hammers of rows (M, size); None for constants that no hammer can have."""
+        """Build the hammers of rows (M, size); None for a row with invalid constants."""
         return self.variability.hammers(self.nominal, rows[:, : self.constants])
 
     def press(self, hammers: Sequence[Hammer]) -> Press:
-        """Return a press for hammers at the rate of the production."""
+        """Return a press for hammers at the slot rate of the production."""
         return Press(self.task, self.rate, hammers)
 
     def readings(
@@ -114,6 +114,6 @@ class Production:
 def _told(
     line: Printing[tuple[DotTable, Judgement]], force: float
 ) -> Printing[tuple[FloatArray, FloatArray]]:
-    """Extract the flight times, s, and the forces of a line, normalised by `force`."""
+    """Extract from dots of a line the flight times, s, and the forces, normalised by `force`."""
     dots, _judgement = yield from line
     return dots.flight_time, dots.peak_force / force

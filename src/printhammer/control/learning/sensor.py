@@ -1,7 +1,7 @@
 """Impact sensor of a learner: the time from firing to impact and, optionally, the force, with noise.
 
-A microphone, a piezo element or the coil itself (`printhammer.impact_time`) measures the time; a load cell
-or the darkness of the dot the force. The noise depends on seed, unit and run only.
+A microphone, a piezo element or the coil itself (`printhammer.impact_time`) measures the time; a load cell or
+the darkness of the dot indicates the force. The noise depends on seed, unit and run only.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class ImpactSensor(Declared):
         return Readings(time, np.where(unseen | early, np.nan, shown))
 
     def _noise(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Draw noise of standard deviation 1 as a first-order autoregressive process."""
+        """Draw noise of standard deviation 1 as a first-order autoregressive process over the dots."""
         white = rng.standard_normal(count)
         if not self.colour:
             return white
