@@ -297,7 +297,7 @@ class ImpactTrain(Result):
 
     @property
     def hammer(self) -> Hammer | None:
-        """Hammer whose impacts these are; None if the times were given as an array."""
+        """Hammer of the section; None if the times were given as an array."""
         return None if self.source is None else self.source.hammer
 
     @property
@@ -315,7 +315,7 @@ class ImpactTrain(Result):
         return {name: getattr(self.source, name, None) for name in ("surface", "first", "last", "wanted")}
 
     def entries(self) -> dict[str, tuple[Column, Any]]:
-        """Return the Dataset variables: times over `impact`, histogram over `bin`, lags over `lag`."""
+        """Return the Dataset variables: times over `impact`, histogram, autocorrelation over `lag`."""
         number = np.arange(1, len(self.times) + 1, dtype=np.int32)
         places = {
             "impact": ("1", "number of the impact", "impact", number),

@@ -334,7 +334,7 @@ def buzz_is_delicate(context: Context, claim: Claim) -> Measured:
 
 
 def _count(context: Context, hammer: Hammer, train: BuzzTrain, interval: float) -> int:
-    """Count the buzz-printed dots of a train with another interval or hammer but the same kind and pulses."""
+    """Count the dots that a buzz-printing train still prints with a changed interval or hammer."""
     times = tuple(k * interval for k in range(len(train.times)))
     if train.kind != "uniform":
         times = delayed_train(hammer, interval, len(train.times))

@@ -50,7 +50,7 @@ def flow(
 
 
 def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
-    """Return the derivatives of the initial state at rest at time 0, shape (3, n): m, m/s, m.
+    """Return the derivatives of the rest state at time 0, (3, n): displacement, velocity, latest maximum.
 
     If a pulse with a sharp edge is fired at time 0, a shift of its firing changes the initial velocity. With
     a coil circuit, the shape is (6, n), for a start without current.
@@ -72,7 +72,7 @@ def rest_columns(problem: Problem, wanted: Sequence[Parameter]) -> FloatArray:
 
 
 def without_current(problem: Problem, wanted: Sequence[Parameter], columns: FloatArray) -> FloatArray:
-    """Return the derivatives of an initial state without current, shape (6, n); adds rows in Wb, Wb and V.
+    """Return the derivatives of an initial state without current, shape (6, n): rows 3 to 5 are electric.
 
     The flux linkage at zero current depends on the initial displacement. If a voltage is switched on at time
     0, a shift of its firing changes the initial flux linkage.

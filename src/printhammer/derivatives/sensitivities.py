@@ -101,7 +101,7 @@ class Sensitivities(Result):
 
     @property
     def title(self) -> str:
-        """Title of the table."""
+        """Title of the table of sensitivities."""
         return f"sensitivities of {self.hammer.name}"
 
     @property
@@ -219,7 +219,7 @@ class Spread(Result):
 
     @property
     def title(self) -> str:
-        """Title of the table."""
+        """Title of the table of deviations."""
         return f"spread of what {self.sensitivities.hammer.name} prints"
 
     @property
@@ -346,7 +346,7 @@ def sensitivities(
 def _constants(
     hammer: Hammer, drive: Drive, names: Sequence[str] | None
 ) -> tuple[list[Parameter], dict[str, str]]:
-    """Return the constants, and the reason for each constant that is omitted unless requested."""
+    """Return the constants to differentiate, and the reason for each constant that was omitted."""
     if names is not None:
         return parameters(hammer, drive, list(dict.fromkeys(names))), {}
     wanted: list[Parameter] = []

@@ -34,7 +34,7 @@ _KINDS: Final = {
 """Scale of each measured quantity, by name; other quantities are drawn as pure numbers."""
 
 _MANY: Final = 400
-"""Number of data from which the points are drawn small; arbitrary."""
+"""Number of data points from which on they are drawn small; arbitrary."""
 
 _LEGEND: Final = 8  # Largest number of entries in a legend; arbitrary
 _NAMED: Final = 6

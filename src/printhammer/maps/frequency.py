@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LOWEST: Final = 500.0
-"""Default lowest rate of a map, Hz, as in Figs. 8 and 9; scaled for other devices than the paper's."""
+"""Default lowest rate of a map, Hz, as in Figs. 8 and 9; scaled for hammers unlike the paper's."""
 
 HIGHEST: Final = 2000.0
-"""Default highest rate of a map, Hz, as in Figs. 8 and 9; scaled for other devices than the paper's."""
+"""Default highest rate of a map, Hz, as in Figs. 8 and 9; scaled for hammers unlike the paper's."""
 
 RATES: Final = 512
 """Default number of rates of a map; arbitrary."""

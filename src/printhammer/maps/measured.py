@@ -5,8 +5,8 @@ will become available in the future."
 
 Two layouts of CSV tables are accepted, each with units in the heading, SI or any other:
 
-- one row per sample: the columns ``rate [Hz],time [us],displacement [um]``, in any order; - one row per time:
-``time [us]``, then one column per rate, such as ``500 Hz [um],1.2 kHz [um]``.
+- one row per sample: the columns ``rate [Hz],time [us],displacement [um]``, in any order;
+- one row per time: ``time [us]``, then one column per rate, such as ``500 Hz [um],1.2 kHz [um]``.
 
 Times count from the first firing. Rows may be in any order, and each rate may have different times. An empty
 cell, or nan, is a gap.

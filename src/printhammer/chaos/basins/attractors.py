@@ -69,7 +69,7 @@ class Attractors:
         self._noise: dict[int, float] = {}
 
     def at(self, tolerance: float) -> Attractors:
-        """Return a copy for trains at another tolerance."""
+        """Return a copy of the known attractors for trains at another tolerance."""
         other = Attractors(self.regime, self.scales, tolerance)
         other.found, other._trees, other._noise = list(self.found), dict(self._trees), dict(self._noise)
         other._attempts = ATTEMPTS

@@ -152,7 +152,7 @@ def uncertainty_exponent(labels: npt.ArrayLike) -> float:
 _FEWEST_DISTANCES: Final = 3  # Smallest number of distances for a fit of the exponent
 
 SAMPLE: Final = 256
-"""Maximum number of cells recomputed at a tenth of the tolerance, and at most an eighth of all; arbitrary."""
+"""Maximum number of cells recomputed at a tenth of the tolerance, and at most an eighth of all cells."""
 
 FIRINGS: Final = 200
 """Default number of firings per round of the basin computation."""

@@ -1,6 +1,6 @@
 """Branch: a curve of periodic orbits in one parameter, with its bifurcations and grazings.
 
-Events along a branch are described in the terms of a hammer.
+Events along a branch are described in terms of the hammer, e.g. its contacts with pack and backstop.
 """
 
 from __future__ import annotations

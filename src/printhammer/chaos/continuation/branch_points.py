@@ -65,7 +65,7 @@ _CLOSER: Final = 4.0
 """Smallest scaled distance from a doubling at which the new orbit is sought; ratio of successive attempts."""
 _ASIDE: Final = 0.5
 _NEW_MULTIPLIER: Final = 0.3
-"""Tolerances of a new orbit: sideways offset relative to that distance; deviation of a multiplier from 1."""
+"""Tolerances of a new orbit: sideways offset relative to its distance; deviation of a multiplier from 1."""
 _HALF_NEAR: Final = 0.05
 """Largest scaled distance of an orbit from an orbit of half its period near their common doubling."""
 _HALF_DOUBLES: Final = 0.5
@@ -103,7 +103,7 @@ def doubling_test(jacobian: FloatArray) -> float:
 
 
 def torus_test(jacobian: FloatArray) -> float:
-    """Compute the Neimark-Sacker test function: product of mu_i mu_j - 1 over multiplier pairs; 1 without."""
+    """Compute the Neimark-Sacker test function: product of mu_i mu_j - 1 over pairs of multipliers."""
     multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
     i, j = np.triu_indices(len(multipliers), 1)
     return float(np.prod(multipliers[i] * multipliers[j] - 1.0).real)

@@ -43,7 +43,7 @@ _LEAST_AMPLITUDE: Final = 1e-5
 _CLOSER: Final = 4.0
 """Smallest scaled distance from a crossing at which the other curve is sought; ratio of attempts."""
 _ASIDE: Final = 0.5
-"""Largest distance of a point from its prediction, relative to that distance, for it to be on the curve."""
+"""Largest distance from the predicted point, relative to the step, for a point to lie on the curve."""
 
 
 def locate_crossing(

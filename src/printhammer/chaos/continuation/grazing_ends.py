@@ -30,7 +30,7 @@ _STEEP: Final = 10.0
 _CLOSER: Final = 0.7
 """Impact speed, relative to that at the last attempt, below which a grazing is sought again."""
 _ON_CURVE: Final = 1e-5
-"""Largest scaled closing error of an orbit that is accepted as one of the last of a branch."""
+"""Largest scaled closing error of an orbit that is accepted as one of the last orbits of a branch."""
 
 
 def grazing_end(

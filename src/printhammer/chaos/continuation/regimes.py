@@ -101,7 +101,7 @@ class Branches(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the first branch."""
+        """Provenance of the first branch, which all branches share."""
         return self.found[0].provenance if self.found else super().provenance
 
     def notes(self) -> dict[str, Any]:

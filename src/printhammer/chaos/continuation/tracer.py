@@ -46,7 +46,7 @@ _MOST_SECTIONS: Final = 8  # Maximum number of segments of a branch at different
 _SAME_PHASE: Final = 1e-3
 """Difference of two section phases, as a fraction of the period, below which they are the same."""
 _CLEAR: Final = 1e-3
-"""Scaled distance from a lost end within which orbits are removed: an impact nears their section."""
+"""Scaled distance from a lost end within which orbits are removed, since an impact nears the section."""
 _LEAST_CHORD: Final = 1e-5
 """Smallest scaled distance of two orbits whose chord defines the direction of the branch."""
 _NO_STOP: Final = Stop("section", math.nan, np.zeros(0), "the section moves")
@@ -319,7 +319,7 @@ class Tracer:
         steps: Steps,
         threads: int | None,
     ) -> Branch:
-        """Build the branch and the properties of its orbits from segments at sections of their own."""
+        """Build the branch and the properties of its orbits from segments that use different sections."""
         family = pieces[0][0]
         # A segment begins with the last orbit of the segment before it.
         owned = [

@@ -128,7 +128,7 @@ class BifurcationCurve(Result, rows="point"):
     @property
     @derived("1", "whether stability is lost, the other multiplier being inside the unit circle", "point")
     def limits(self) -> BoolArray:
-        """Mask of the points where stability is lost, the other multiplier inside the circle, (N,)."""
+        """Mask of the points of lost stability, (N,): the other multiplier is inside the unit circle."""
         if self.kind == "grazing":
             return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0)
         return np.asarray(np.abs(self.multipliers).max(axis=1) < 1.0 + SAME)
@@ -306,7 +306,7 @@ def bifurcation_curve(
     most : int, optional
         Maximum number of steps in each direction.
     threads : int, optional
-        Number of threads; by default the number of cores. The curve does not depend on it.
+        Number of threads; by default the number of cores. The curve is independent of this number.
 
     Returns
     -------
@@ -346,7 +346,7 @@ def _nearest(traced: Traced, value: float) -> int:
 
 
 def curve_of(plane: Plane, traced: Traced, grid: tuple[int, int], threads: int | None) -> BifurcationCurve:
-    """Build the result from a traced curve."""
+    """Build the result of a traced curve, with normal forms and the periods of trains from rest."""
     places = traced.places
     coefficients, sides = traced.coefficients, np.zeros((len(places), MOST_PERIODS + 1), np.int64)
     if traced.kind == GRAZING and traced.surface == "backstop":

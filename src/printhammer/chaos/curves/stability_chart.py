@@ -88,7 +88,7 @@ class StabilityChart(Result):
     @property
     @derived("", "what was found")
     def message(self) -> str:
-        """Summary in one line: number of curves by kind, and where trains from rest settle."""
+        """Summary in one line: numbers of curves by kind, and the fraction of trains that settle."""
         kinds = [curve.kind for curve in self.curves]
         counts = ", ".join(f"{kinds.count(kind)} of {kind}" for kind in dict.fromkeys(kinds)) or "none"
         share = float(np.mean(self.settled == self.firings)) if self.settled.size else 0.0
@@ -219,7 +219,7 @@ def stability_chart(
 
 
 def _limits(branch: Branch) -> list[BranchEvent]:
-    """List the events at which a branch loses its stability, the other multiplier being inside the circle."""
+    """List the events at which a branch loses stability: the other multiplier is inside the unit circle."""
     lost = [event for event in branch.events if np.abs(event.multipliers).max() < 1.0 + SAME]
     return [event for event in lost if event.kind in TESTS]
 

@@ -242,7 +242,7 @@ class GrazingSystem:
 
 
 class ImpactSystem:
-    """Extended map for a critical multiplier with rigid impacts; unknowns include phase and velocity."""
+    """Extended map for rigid impacts and a critical multiplier; unknowns: phase, velocity, parameter."""
 
     def __init__(self, plane: Plane, kind: str) -> None:
         self.plane, self.kind = plane, kind

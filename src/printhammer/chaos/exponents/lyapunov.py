@@ -144,7 +144,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def hammer(self) -> Hammer:
-        """Hammer whose exponents these are."""
+        """Hammer to which the exponents belong."""
         return self.points.hammer
 
     @property
@@ -177,7 +177,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def cycle(self) -> int:
-        """Number of firings averaged before the error estimate: the period of a periodic train, else 1."""
+        """Number of firings per term of the error estimate: the period of a periodic train, else 1."""
         return cycle_of(self.verdict.period, len(self.factors))
 
     @property
@@ -279,7 +279,7 @@ def lyapunov(
     firings : int, optional
         Number of firings over which growth is averaged.
     transient : int, optional
-        Number of firings to discard before them.
+        Number of firings to discard before growth is averaged.
     state, tolerance, **firing
         As for `printhammer.strobe`.
 

@@ -40,7 +40,7 @@ SEED: Final = 1983
 
 REGULAR: Final = 0.2
 CHAOTIC: Final = 0.8
-"""Values of K: up to the first a series is regular, from the second on it is chaotic.
+"""Limits of K: a series is regular up to `REGULAR`, and chaotic from `CHAOTIC` on.
 
 K^2 is the fraction of the variance of M_c(n) that a straight line explains: at most a twentieth for a regular
 series, about two thirds or more for a chaotic series.
@@ -50,7 +50,7 @@ FEWEST: Final = 100
 """Smallest length of a series; its mean square displacement is computed up to a tenth of the length."""
 
 SETTLING: Final = 0.5
-"""Ratio of the last to the first quarter's standard deviation below which a series is a transient."""
+"""Ratio of standard deviations, last to first quarter of a series, below which it is a transient."""
 
 LONGEST_CYCLE: Final = 64
 """Largest cycle length of a series that is tested; at most a quarter of its length."""
@@ -106,7 +106,7 @@ class ZeroOne(Result):
 
     @property
     def phrase(self) -> str:
-        """K with the numbers of angles and of data, in one line."""
+        """Summary of K, the number of angles, and the length of the series, in one line."""
         # Avoids a negative zero.
         k = round(self.k, 3) + 0.0
         return f"K = {k:.3f}, median of {len(self.angles)} angles over {self.length} numbers"

@@ -122,7 +122,7 @@ class Orbits(Result):
 
     @property
     def stable(self) -> tuple[Orbit, ...]:
-        """Stable orbits of the list, in its order."""
+        """Stable orbits, in the order of the list."""
         return tuple(orbit for orbit in self.found if orbit.kind == STABLE)
 
     @property
@@ -137,8 +137,8 @@ class Orbits(Result):
 
         The estimate is not a bound: orbits near no guess are not counted.
 
-        Good-Turing estimate: 1 minus the fraction of guesses that are the only one to converge to their orbit
-        (I. J. Good, Biometrika 40 (1953) 237).
+        Good-Turing estimate: 1 minus the fraction of guesses that converge to an orbit reached by no other
+        guess (I. J. Good, Biometrika 40 (1953) 237).
         """
         return 1.0 - self.hits.count(1) / sum(self.hits) if self.hits else math.nan
 

@@ -46,7 +46,7 @@ _NEAR: Final = 1e-5
 _FINEST: Final = 1e-3
 """Distance of points, as a fraction of the spacing, below which a bend gets no further point."""
 _TIGHT: Final = 1e-12
-"""Smallest step along a fundamental segment; a larger gap of the images there is a jump of the map."""
+"""Smallest step along a fundamental segment; a gap of the images at this step is a jump of the map."""
 _SETTLED: Final = 0.1
 """Extent of an image of a fundamental segment, relative to the spacing, below which a sink is sought."""
 _CLOSE: Final = 1e-10  # Relative residual at which Newton's method has converged
@@ -351,7 +351,7 @@ class _Inward:
         self.places.append(1.0)
 
     def ahead(self, step: float) -> FloatArray:
-        """Extrapolate the curve along its last direction from the saddle, a step beyond its end."""
+        """Extrapolate the curve by a step beyond its end, along the line from the saddle."""
         return np.asarray(self.saddle + (self.points[-1] - self.saddle) * self.shrink**-step)
 
     def at(self, place: float) -> FloatArray:

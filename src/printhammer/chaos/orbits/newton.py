@@ -50,7 +50,7 @@ _LEAST_SHARE: Final = 2.0**-7
 
 @dataclass(frozen=True)
 class Images:
-    """Images of many states, one per row: states, derivatives, differentiability, reasons of failure."""
+    """Images of many states, one per row: states, derivatives, differentiability, reasons for failure."""
 
     states: FloatArray
     jacobians: FloatArray
@@ -59,7 +59,7 @@ class Images:
 
     @classmethod
     def empty(cls, count: int) -> Images:
-        """Return a table of images filled with NaN, to be computed."""
+        """Return a table of images filled with NaN, one row per state."""
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, 2, 2), np.nan),

@@ -40,7 +40,7 @@ NEUTRAL: Final = 1e-6
 CLOSES: Final = 1e-6
 """Largest closing error of a valid orbit, in half-widths of the strobe window.
 
-If the larger multiplier exceeds 1 in absolute value, the limit is multiplied by it.
+If the larger multiplier exceeds 1 in absolute value, the limit is multiplied by that absolute value.
 """
 
 _OK: Final = "ok"

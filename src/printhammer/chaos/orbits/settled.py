@@ -10,7 +10,7 @@ they seem stationary. Therefore the states alone prove a period q only if
   shrinks; cycles caused by the adaptive steps of the integrator are far smaller.
 
 Otherwise the period is the smallest divisor d of q for which Newton's method finds a stable orbit of d
-firings close to the states that the states approach.
+firings that lies close to the states and that the states approach.
 """
 
 from __future__ import annotations

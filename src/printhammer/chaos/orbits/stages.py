@@ -85,7 +85,7 @@ _EVEN: Final = 8
 _JOINED: Final = 48
 """Maximum number of guesses per stage and period that are concatenations of two shorter orbits."""
 _TOUCHES: Final = 4
-"""Number of spread states for each state just after a touch of a rigid backstop."""
+"""Number of spread states per state just after a touch of a rigid backstop, among the starts."""
 _COMPLETED: Final = 6
 _MORE: Final = 512
 """Largest period, in firings, for which further returns are tried if the indices show a gap; their number."""
@@ -124,7 +124,7 @@ class _Known:
 
 @dataclass
 class Search:
-    """Search for periodic orbits in stages, in progress.
+    """Search for periodic orbits, run in stages.
 
     Starts come in blocks and guesses in batches. The result of a stage depends only on stages with no more
     starts and no more guesses, so that a larger search never loses an orbit of a smaller search.
@@ -339,7 +339,7 @@ class Search:
                 described.append((orbit, own.hits))
 
     def _along(self, described: list[tuple[Orbit, int]]) -> None:
-        """Add orbits on the branches through short orbits, and orbits from concatenations with them."""
+        """Add orbits on branches through short orbits, and concatenations with these new orbits."""
         first = [orbit for orbit, _hits in described]
         short = [orbit for orbit in first if orbit.firings <= self.follow and orbit.smooth]
         states = self.effort.quiet.mapped(crossings, short)

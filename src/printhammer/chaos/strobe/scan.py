@@ -4,8 +4,8 @@ Most trains settle within a few firings, so that their period is known long befo
 periodic as soon as
 
 - its states q firings apart agree a hundred times closer than the classification requires, over a window of
-  at least 2 q firings, no smaller number of firings does as closely as the classification requires, and the
-  distance of states a divisor of q apart does not shrink; and
+  at least 2 q firings, states fewer firings apart do not agree as closely as the classification requires, and
+  the distance of states a divisor of q apart does not shrink; and
 - a small perturbation decays: the derivative of the state after q firings with respect to the state before
   them has no eigenvalue beyond 0.99 in absolute value.
 

@@ -135,7 +135,7 @@ class States:
 
     @property
     def points(self) -> FloatArray:
-        """States, one row per firing: displacement, velocity and memory, with a driver also current."""
+        """States, one row per firing: displacement, velocity, memory and, with a driver, current."""
         current = [] if self.current is None else [self.current]
         return np.column_stack([self.x, self.v, self.memory, *current])
 
@@ -151,10 +151,10 @@ class States:
         return settled(train.regime.at_firings, self.points, period, _scales(train))
 
     def resting(self, train: Train, distances: FloatArray, tolerance: float) -> tuple[int, int] | None:
-        """Return the cycle of a motion that rests on the backstop, in firings, and its rests; else None.
+        """Return the cycle of a motion that rests on the backstop, in firings, and its number of rests.
 
-        The cycle is 0 if the motion does not repeat; then at least two rests are required. Cycles of less
-        than 5 firings are excluded, since rounding does not change them.
+        None if the motion does not rest. The cycle is 0 if the motion does not repeat; then at least two
+        rests are required. Cycles of less than 5 firings are excluded, since rounding does not change them.
         """
         if not is_memoryless(train.regime):
             return None

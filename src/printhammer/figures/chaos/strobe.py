@@ -82,7 +82,7 @@ def plot(strobe: Strobe, *, fit: bool = False) -> Figure:
 
 
 def _close(strobe: Strobe) -> Window:
-    """Return a window that fits the points, or the window of the hammer without points."""
+    """Return a window that fits the points; without points, the window of the hammer."""
     known = np.isfinite(strobe.x)
     if not known.any():
         return strobe.window

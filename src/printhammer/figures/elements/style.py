@@ -38,7 +38,7 @@ SURFACES: Final = {"backstop": "#8a8a8a", "pack": YELLOW}
 """Colours of backstop and pack, used as tints."""
 
 WIDTH: Final = 6.4
-"""Width of a figure, in."""
+"""Default width of a figure, in inches."""
 
 TEXT, SMALL, TINY = 9.0, 8.0, 6.5  # Font sizes, points
 LINE, THIN, HAIR = 1.4, 0.9, 0.6  # Line widths, points
@@ -96,7 +96,7 @@ def in_style() -> AbstractContextManager[None]:
 
 
 def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Decorate a drawing function so that its figure is built in the style.
+    """Decorate a drawing function: build its figure in the style, with the hammer's noun for a dot.
 
     The noun is the attribute `strike` of an argument: a hammer, a result or a frequency-time map.
     """

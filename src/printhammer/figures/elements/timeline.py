@@ -51,7 +51,7 @@ def timeline(
     remarks : sequence of str, optional
         Sentences shown above the figure; messages of runs that stopped early are added.
     height : float, optional
-        Height of the figure, in.
+        Height of the figure, in inches.
     """
     hammer = motions[0].hammer
     figure = new_figure(height)
@@ -95,7 +95,8 @@ def timeline(
 def between_surfaces(ax: Axes, hammer: Hammer, motion: Motion, above: float) -> float:
     """Draw displacement, µm, against time, ms, between tinted pack and backstop; return the margin, µm.
 
-    The margin below the motion is 8 % of its range; `above` is the margin above, as a multiple of that.
+    The margin below the motion is 8 % of its range; `above` is the margin above, as a multiple of the margin
+    below.
     """
     ms, um = scale("time").factor, scale("displacement").factor
     assert hammer.front is not None
