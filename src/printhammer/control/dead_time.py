@@ -190,7 +190,7 @@ class DeadTime(Result, rows="voltage temperature", endings=(*ENDINGS, ".h")):
         if strong.any():
             lacking.append(
                 f"At {int(strong.sum())} {pairs} the shortest pulse that the driver can give strikes"
-                " harder than the blow already."
+                " harder than the blow."
             )
         return Summary(
             [facts, "", Grid(columns, most=24), *(styled("poor", f"\n{each}") for each in lacking)]

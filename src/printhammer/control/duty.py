@@ -181,18 +181,18 @@ class ThermalDuty(Result, rows="ambient burst"):
         )
         rates = [
             Cells("ambient", self.ambient, "°C", "g"),
-            Cells("dots a second\nfor ever", self.rate, "Hz", ".4g"),
+            Cells("largest\ncontinuous rate", self.rate, "Hz", ".4g"),
         ]
         bursts = [
-            Cells("in bursts of", fast.ravel(), "Hz", ".6g"),
+            Cells("burst rate", fast.ravel(), "Hz", ".6g"),
             Cells("ambient", ambient.ravel(), "°C", "g"),
-            Cells("would come to", temperature, "°C", ".1f"),
-            Cells("too hot after", time, "s", ".3g"),
-            Cells("part of the time", 100.0 * self.share.T.ravel(), "%", ".1f"),
+            Cells("steady temperature", temperature, "°C", ".1f"),
+            Cells("time to limit", time, "s", ".3g"),
+            Cells("duty cycle", 100.0 * self.share.T.ravel(), "%", ".1f"),
         ]
         facts = [
             ("limit of the winding", f"{self.limit:g} °C"),
-            ("heat of one dot there", f"{1e3 * self.limit_heat:.4g} mJ"),
+            ("heat of one dot at the limit", f"{1e3 * self.limit_heat:.4g} mJ"),
             (
                 "driver on",
                 f"{1e3 * self.heat.on_time:.4g} ms a dot, at most {self.heat.most:.4g} Hz"

@@ -53,14 +53,14 @@ _DEGREE: Final = 1  # Degree of the nuisance polynomial
 _LEAST: Final = 8  # Smallest number of samples in the window
 _MOST: Final = 200_000  # Largest number of samples in a record
 _SPAN: Final = 1.5  # Range of the converter, relative to the largest value around the touch
-_FLOWING: Final = 0.02  # Current at the touch below which it counts as decayed, relative to its largest
+_FLOWING: Final = 0.02  # Current at the touch, over the largest current, that counts as decayed
 _MOST_BEFORE: Final = 0.5  # Largest length of the window before the touch, in flight times
 _AROUND: Final = 0.2  # Largest shift within a window, in contact times
 _STEADY: Final = 1e-9  # Relative change of the coil voltage below which no driver switches
 _FINEST: Final = 400  # Largest number of shifts per contact time
 _MOVES: Final = 3  # Maximum number of window positions tried
 _FIRM: Final = ("pack.stiffness", "pack.damping")
-_SOFT: Final = 1e-9  # Factor on these constants that makes a pack negligible
+_SOFT: Final = 1e-9  # Factor on the pack's constants that makes its force negligible
 
 
 _UNLIKE: Final = 0.5

@@ -61,9 +61,9 @@ class ImpactTime(Result, rows=_CELLS):
     bits: IntArray = coordinate("1", "resolution of the converter", "bits")
     bias: FloatArray = column("s", "mean error on the nominal hammer", _CELLS, more="NaN without a detection")
     deviation: FloatArray = column("s", "standard deviation of the error on the nominal hammer", _CELLS)
-    missed: FloatArray = column("1", "fraction of its impacts that are not detected", _CELLS)
+    missed: FloatArray = column("1", "fraction of the nominal hammer's impacts that are not detected", _CELLS)
     flagged: FloatArray = column(
-        "1", "fraction of its impacts whose estimates are flagged and not used", _CELLS
+        "1", "fraction of the nominal hammer's impacts whose estimates are flagged and not used", _CELLS
     )
     unit_bias: FloatArray = column("s", "mean error over units", _CELLS)
     unit_deviation: FloatArray = column("s", "standard deviation of the error over units", _CELLS)
@@ -221,7 +221,7 @@ def impact_time(
     shape = levels.size, rates.size, widths.size
     total = int(np.prod(shape))
     if not 0 < total <= MOST:
-        raise InputError(f"{total} ways to sample are asked for", key="sampling", expected=f"1 to {MOST}")
+        raise InputError(f"{total} sampling settings are requested", key="sampling", expected=f"1 to {MOST}")
     spread = Variability.of(hammer) if variability is None else variability
     drawn = spread.draw(hammer, others, first)
     rng = np.random.default_rng((first, 1))

@@ -43,8 +43,8 @@ def check_place(out: str | Path) -> None:
     there = [path for path in places if path.exists()]
     if there and not _is_report(folder):
         raise InputError(
-            f"{there[0]}: expected a new folder or an earlier report, this file is of neither; --force writes"
-            " over it",
+            f"{there[0]}: expected a new folder or an earlier report, this file belongs to neither; --force"
+            " overwrites it",
             file=there[0],
         )
 

@@ -27,26 +27,26 @@ class Drawing(Declared):
     """Figure of the paper, drawn for a hammer."""
 
     number: int = part("number in the paper")
-    title: str = part("what it is")
-    caption: str = part("what it shows for this hammer")
-    says: str = part("what the paper says of it, in our words")
-    svg: bytes = part("the picture; empty where it could not be drawn")
-    pdf: Path | None = part("its file as vectors, seen from the folder of the report")
-    reason: str = part("why it could not be drawn; empty where it was")
+    title: str = part("title of the figure")
+    caption: str = part("caption: what the figure shows for this hammer")
+    says: str = part("statement of the paper about the figure, in our words")
+    svg: bytes = part("SVG image; empty if the figure could not be drawn")
+    pdf: Path | None = part("path of the vector file, relative to the folder of the report")
+    reason: str = part("reason why the figure could not be drawn; empty if drawn")
     claims: tuple[JudgedClaim, ...] = part("claims that cite the figure")
-    seconds: float = part("time that it took")
+    seconds: float = part("computation time of the figure")
 
 
 class Report(Declared):
     """Result of `write_report`: claims, figures and files."""
 
     hammer: Hammer = part("the hammer")
-    results: list[JudgedClaim] = part("the claims, judged")
+    results: list[JudgedClaim] = part("the evaluated claims")
     drawings: list[Drawing] = part("the figures")
     provenance: Mapping[str, Any] = part("versions, fingerprint, tolerance")
     reconstruction: Results = part("results of a reconstruction, of this hammer or of another")
-    seconds: float = part("time that all took")
-    files: list[Path] = part("what was written", default_factory=list)
+    seconds: float = part("total computation time")
+    files: list[Path] = part("paths of the written files", default_factory=list)
 
     def count(self, verdict: str) -> int:
         """Return the number of claims with a given verdict, such as "holds"."""
@@ -107,10 +107,10 @@ def linked_source(source: str, drawn: set[int]) -> Any:
 class Miss(Declared):
     """Measured value outside the band of its claim, as text."""
 
-    words: str = part("what was measured")
-    value: str = part("what it is")
-    band: str = part("what it must be")
-    distance: str = part("how far these are apart")
+    words: str = part("name of the measured quantity")
+    value: str = part("measured value, with unit")
+    band: str = part("required value or range")
+    distance: str = part("distance of the value from the band")
 
 
 def misses(claim: Claim, value: Mapping[str, Any] | None) -> list[Miss]:

@@ -304,7 +304,7 @@ class Ensemble:
 
         if self.states[member, 0] > 0.0:
             raise InputError(
-                f"member {member} starts later than at time 0, which a motion cannot yet", key="start"
+                f"member {member} starts after time 0, which a single motion does not support", key="start"
             )
         drive, state = self.drives[member], self.states[member, 1:].tolist()
         return simulate(

@@ -30,7 +30,7 @@ FLIGHTS: Final = 3.0
 
 _SETTLED: Final = 0.05  # Distance from rest at the end of a window, as a fraction of the way to the pack
 _PATIENCE: Final = 16.0  # Largest window of a device that does not settle, in flight times
-_LONGEST: Final = 64.0  # As `_PATIENCE`, for a device that makes no dot, in times of its scales
+_LONGEST: Final = 64.0  # Largest window of a device that makes no dot, in time scales
 _LAST: Final = 1.0  # Upper limit of a window, s
 TOLERANCE: Final = 5e-7  # The result depends on thresholds only
 MOST_STEPS: Final = 500_000  # Largest number of steps of a single pulse

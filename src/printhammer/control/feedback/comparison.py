@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 BURST: Final = "11101101"  # Pattern of the recorded run; arbitrary
 MOST_GAPS: Final = 500  # Largest number of gaps in a double-pulse test
-# Default first and last gap of the double-pulse test, in single-pulse flight times, and their number
+# Default first and last gap of the double-pulse test, in single-pulse flight times, and number of gaps
 _GAPS: Final = (1.5, 6.0, 46)
 
 
@@ -87,7 +87,7 @@ class Feedback(Result, rows=_DOTS):
         more="NaN without a dot, and for a lost dot",
     )
     arrival: FloatArray = column(
-        "s", "arrival minus slot time and single-pulse flight time", _DOTS, more="NaN likewise"
+        "s", "arrival minus slot time and single-pulse flight time", _DOTS, more="NaN without a dot"
     )
     lost: IntArray = column("1", "lost dots", "strategy", dtype=np.int32)
     extra_contacts: IntArray = column("1", "extra contacts", "strategy", dtype=np.int32)

@@ -45,17 +45,18 @@ WINDOW: Final = 120e-6  # Length of the time window of samples, s
 # Expected standard deviations at a touch: displacement, as a fraction of the stroke, and speed, m/s
 _PLACE_ERROR: Final = 0.03
 _SPEED_ERROR: Final = 0.03  # Initial standard deviation of the speed, m/s
-# The same after the first launch, in addition to the effect of the current scale
+# Initial standard deviation of the speed after the first launch, m/s, in addition to the effect of the
+# current scale
 _LAUNCH_ERRORS: Final = (0.005, 0.003)
 # Distance before the touch at which the simulation of a contact begins, as a fraction of the stroke
 _BEFORE: Final = 0.15
-# Time after a touch for which its samples are used, in single-pulse flight times
+# Time after a touch during which samples are used, in single-pulse flight times
 CONTACT: Final = 1.1
 # Change of a touch time beyond which an estimate is rejected, in single-pulse flight times
 _ASTRAY: Final = 0.4
 # Current, as a fraction of the largest, that presses the armature against the backstop after a landing
 _CLAMP: Final = 1.0
-_CLAMPED, _LONGEST = 0.6, 1.2  # Duration of that current, and its maximum, in single-pulse flight times
+_CLAMPED, _LONGEST = 0.6, 1.2  # Usual and largest duration of the pressing current, in flight times
 _FADED: Final = 3.0  # Time for a current to decay, in time constants of the driver
 _CLEAR: Final = 0.22  # Fraction of a launch's flight time after which the armature is off the backstop
 _PATIENCE: Final = 40e-6  # Time between the end of a contact and a throw that is decided again, s

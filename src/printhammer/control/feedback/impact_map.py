@@ -42,7 +42,7 @@ _WIDTHS: Final = (0.85, 1.0, 1.2)
 _RELEASES: Final = np.linspace(0.0, 0.85, 29)
 _EARLY: Final = np.linspace(0.14, 1.07, 38)
 _LATE: Final = np.linspace(1.1, 2.9, 48)
-_WATCHED, _WAIT = 3.0, 1.7  # Length of the force simulations, and of the others after the throw, likewise
+_WATCHED, _WAIT = 3.0, 1.7  # Lengths of force simulations, and after the throw, flight times
 # Time after which a change of the current has decayed, in time constants of the driver
 _FADED: Final = 2.5
 _LARGEST_FORCE: Final = 1.15  # Force above which an action is inadmissible, relative to the single pulse
@@ -93,11 +93,11 @@ class ImpactMap:
 
     back: FloatArray  # Return current, A, (A,)
     fire: FloatArray  # Time after the touch at which the next push begins, s, (A,)
-    width: FloatArray  # Width of that push, s; `ALWAYS` if it lasts to the next touch, (A,)
+    width: FloatArray  # Width of the next push, s; `ALWAYS` if the push lasts to the next touch, (A,)
     release: FloatArray  # Time after the touch at which the push ends, s, (T, A)
     # Peak force relative to the single pulse; NaN for an inadmissible action, (T, A)
     force: FloatArray
-    # Time from this touch to the next, s, and speed of the next touch, m/s; NaN likewise, (T, A)
+    # Time from this touch to the next, s, and speed of the next touch, m/s; NaN if inadmissible, (T, A)
     next_touch: FloatArray
     next_speed: FloatArray
     next_kind: IntArray  # `PUSHED` or `FREE`, (A,)

@@ -24,14 +24,15 @@ from printhammer.support.arrays import FloatArray, IntArray
 # Start times and widths of the brake pulses in the first grid, in single-pulse flight times
 _STARTS: Final = np.linspace(0.85, 1.75, 28)
 _WIDTHS: Final = np.linspace(0.1, 0.75, 20)
-# Finer grids about the best pulse, and their half-widths, likewise: each covers a step of the previous grid
+# Half-widths of finer grids about the best pulse, in single-pulse flight times: each grid covers one step of
+# the previous grid
 _NEAR: Final = np.linspace(-1.0, 1.0, 7)
 _FINER: Final = (0.034, 0.01, 0.003)
-# Time that converts a distance from rest to an equivalent speed, likewise
+# Time that converts a distance from rest to an equivalent speed, in single-pulse flight times
 _FALL: Final = 1.0 / 3.0
-# Times after the touch at which the residual motion is evaluated, likewise
+# Times after the touch at which the residual motion is evaluated, in single-pulse flight times
 _WATCHED: Final = np.linspace(2.2, 3.4, 16)
-_SETTLED: Final = 0.65  # Time after the brake pulse from which on the armature counts as at rest, likewise
+_SETTLED: Final = 0.65  # Time after the brake pulse until the armature counts as at rest, in flight times
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Landing:
 
     release: FloatArray  # Time after the touch at which the push ends, s, (T,)
     force: FloatArray  # Force relative to the single pulse, (T,)
-    # Start of the brake pulse after the touch, and its width, s, (T,)
+    # Start of the brake pulse after the touch, and width of the brake pulse, s, (T,)
     brake: FloatArray
     width: FloatArray
     # Residual speed, m/s; a distance from rest counts as the speed that covers it in a third of the
@@ -99,7 +100,7 @@ def _left(
 
 # Candidate widths of the launch, in single-pulse flight times
 _WIDTHS_LAUNCH: Final = np.linspace(0.2, 1.0, 81)
-_LENGTH: Final = 4.0  # Length of their simulations, likewise
+_LENGTH: Final = 4.0  # Length of launch simulations, in single-pulse flight times
 _ALMOST: Final = 0.9  # Force of the touch without a push, relative to the single pulse
 _WEAKER: Final = 0.03  # Change of the current scale for the finite difference
 

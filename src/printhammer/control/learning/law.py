@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 
 STEP: Final = 1e-6  # Unit of the corrections, s
 _LARGEST: Final = 25.0  # Largest change of an entry after a stage, in units of `STEP`
-# Allowance for a unit that leaves the pack later than the nominal hammer; no pulse is fired before its end, s
+# Allowance, s, for a unit that leaves the pack later than the nominal hammer; no pulse is fired earlier
 MARGIN: Final = 20e-6
 _LEAST: Final = 0.5  # Smallest width of a pulse, as a fraction of the nominal width
 _LEAST_BRAKE: Final = 0.05  # Smallest width of a brake pulse, as a fraction of the nominal width

@@ -164,7 +164,10 @@ class Learning(Result, rows=_DOTS):
         more="NaN before there are readings, and where they are not explained",
     )
     certainty: FloatArray = column(
-        "1", "fraction of likely units that print every dot within limits", "stage", more="NaN likewise"
+        "1",
+        "fraction of likely units that print every dot within limits",
+        "stage",
+        more="NaN without an expected fraction",
     )
     slot: IntArray = coordinate("1", "number of the slot", "dot", name="slot")
     force_deviation: FloatArray = column(

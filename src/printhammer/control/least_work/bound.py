@@ -73,7 +73,7 @@ def bound(hammer: Hammer, single: Nominal, force: float, largest: float) -> Boun
     first, later = loading + top - float(stored[0]), loading + top - float(stored.max())
     assert hammer.position is not None
     bottom = stored_energy(hammer, hammer.position)
-    # Conservative for every pack law: a pack returns at most what it took.
+    # Conservative for every pack law: a pack returns at most the energy that it absorbed.
     back = _given_back(hammer, top - bottom + loading)
     return Bound(first, later, loading + top - bottom - back, turn, loading)
 

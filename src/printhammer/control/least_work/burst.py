@@ -234,7 +234,7 @@ class LeastWork(Result, rows="node"):
         assert dots is not None
         touched = np.where(dots.struck, dots.fired_at + dots.flight_time, np.inf)
         away = np.abs(touched[:, :, np.newaxis] - self.slots)
-        # A slot's dot is the touch nearest to it, whichever pulse made it.
+        # A slot's dot is the touch nearest to the slot, whichever pulse made the dot.
         which = away.argmin(axis=1)
         late = away.min(axis=1)
         rows = np.arange(len(drives))[:, np.newaxis]

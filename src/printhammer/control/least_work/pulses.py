@@ -24,7 +24,7 @@ from printhammer.support.arrays import FloatArray
 GONE: Final = 1e-2  # Fraction of its peak below which the current of a pulse counts as decayed
 _PER_SLOT: Final = 2  # Number of pulses per slot
 _TRIED: Final = 1024  # Number of Sobol points evaluated to select starts
-_TRIES, _MOST_TRIES = 4, 10  # Number of starts, and its maximum while no start succeeds
+_TRIES, _MOST_TRIES = 4, 10  # Number of starts, and maximum number while no start succeeds
 _ROUNDS: Final = 40  # Iteration limit of SLSQP
 _SHORTEST: Final = 0.02  # Smallest width, as a fraction of the largest
 _SAMPLES: Final = 301  # Samples of the power per slot

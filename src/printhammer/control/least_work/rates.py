@@ -31,7 +31,7 @@ class LeastWorkRates(Result):
     count: int = scalar("1", "number of dots of each burst", name="dots")
     net_ratio: FloatArray = column("1", "net coil work over the energy absorbed by the pack", "rate")
     positive_ratio: FloatArray = column("1", "positive coil work over the absorbed energy", "rate")
-    bound_ratio: FloatArray = column("1", "lower bound on the positive work, likewise normalised", "rate")
+    bound_ratio: FloatArray = column("1", "lower bound on the positive work over the absorbed energy", "rate")
     squared_current: FloatArray = column("A^2 s", "integral of the squared current", "rate")
     adequate: IntArray = column("1", "number of adequate dots", "rate")
     status: TextArray = column(

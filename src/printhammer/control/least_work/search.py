@@ -30,7 +30,7 @@ _SPREAD: Final = 512  # Number of Sobol profiles
 _KEPT: Final = 16  # Number of profiles refined
 _CLOUD: Final = 32  # Number of points in a cloud
 _MOVES: Final = 8  # Number of times the cloud is moved
-_REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and its reduction factor per move
+_REACH, _SHRINKS = 0.25, 0.7  # Half-width of the first cloud, and factor on the half-width per move
 
 
 def printing_profile(
@@ -94,12 +94,12 @@ def _in_steps(levels: FloatArray, edges: FloatArray, duration: float, nodes: int
 LEAD: Final = 2.0  # Length of the first slot, from rest to the touch, in flight times of the single pulse
 LANDING: Final = 5.0  # Length of the landing, in flight times of the single pulse
 _FEWEST, _MOST = 8, 96  # Smallest and largest number of nodes per slot
-# Fraction of a step by which a slot's current overlaps the next slot, which replaces it
+# Fraction of a step by which a slot's current overlaps the next slot, whose current replaces it
 _OVERLAP: Final = 0.01
 _LAGS: Final = 1e-3  # Largest lag in the pack accepted, in units of `RELOADING`
 _WRONG: Final = 10.0  # Penalty for an extra contact or a failed simulation, in units of the loading work
 _WEAK: Final = 3.0  # Weight of a force shortfall in the comparison of profiles
-_TRIES, _MOST_TRIES = 3, 12  # Number of starts, and its maximum while no start succeeds
+_TRIES, _MOST_TRIES = 3, 12  # Number of starts, and maximum number while no start succeeds
 _LEGS: Final = 2  # Maximum number of consecutive SLSQP runs, each from the end of the previous one
 _ROUNDS, _ROUNDS_AGAIN = 30, 20  # SLSQP iteration limits, from a profile and from the preceding current
 _SEARCH_TOLERANCE: Final = 5e-7  # Integration tolerance of the comparison of profiles
@@ -147,7 +147,8 @@ class NodePlan:
         *slots, last, landing = self._currents
         waveforms, times, begin, node = [], [], 0.0, 0
         for current in (*slots, np.concatenate([last, landing])):
-            # Each overlaps the next slot, which replaces it, so that rounding leaves no gap.
+            # Each slot's current overlaps the next slot, whose current replaces it, so that rounding leaves
+            # no gap.
             values = np.concatenate([[begin], current, current[-1:]])
             offsets = np.append(np.arange(current.size + 1), current.size + _OVERLAP) * self._step
             waveforms.append(Sampled.from_samples(offsets, values, interpolation="linear"))

@@ -120,7 +120,7 @@ class Task:
     """Settings common to all slots of a burst: hammer, limits, required force, objective."""
 
     hammer: Hammer  # Driven hammer
-    coil: CoilForce  # Force of its coil
+    coil: CoilForce  # Force of the hammer's coil
     largest: float  # Current limit of either sign, A
     slew: float  # Slope limit of either sign, A/s
     force: float  # Least force of a dot, N

@@ -161,7 +161,7 @@ class Quality(Result):
                     f" and {quantity(self.backstop_loss, 'J')} a dot{pressed}"
                 ),
             ),
-            ("coil", f"{quantity(self.work, 'J')} a dot, {self.mean_power:.3f} W in the mean{heat}"),
+            ("coil", f"{quantity(self.work, 'J')} a dot, {self.mean_power:.3f} W on average{heat}"),
         ]
         return Summary([Facts(rows)])
 

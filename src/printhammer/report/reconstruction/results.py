@@ -68,7 +68,9 @@ class BaseRates(_Table):
         description="for each constant its lowest and highest value and their unit"
     )
     claims: dict[_ClaimName, _Counted] = Field(description="for each claim how often it holds")
-    poincare_panels: dict[str, _Panel] = Field({}, description="for each panel of Fig. 11 the same")
+    poincare_panels: dict[str, _Panel] = Field(
+        {}, description="for each panel of Fig. 11 how often it has the verdict of the paper"
+    )
 
     def share(self, name: str) -> Share | None:
         """Return the fraction of random hammers for which a claim holds; None if it was not measured."""
@@ -99,7 +101,9 @@ class Predictions(_Table):
 class Searched(_Table):
     """One search for a hammer: the claims it aimed at, its seed, and the number of hammers tried."""
 
-    aim: Literal["stated", "all", "panels", "buzz", "claims"] = Field(description="the claims that led")
+    aim: Literal["stated", "all", "panels", "buzz", "claims"] = Field(
+        description="the claims that the search aimed at"
+    )
     seed: int = Field(description="the seed of the search")
     candidates: _Count = Field(description="the number of hammers tried")
 
@@ -107,8 +111,8 @@ class Searched(_Table):
 class BestFor(_Table):
     """Hammer that satisfies one claim most closely."""
 
-    value: dict[str, Any] = Field(description="what was measured with it")
-    holds: bool = Field(description="whether the claim holds for it")
+    value: dict[str, Any] = Field(description="the values measured with the hammer")
+    holds: bool = Field(description="whether the claim holds for the hammer")
     constants: dict[str, _Number] = Field(description="its constants by file key, SI")
     costs: list[_ClaimName] = Field(description="the claims that it loses")
 
@@ -116,8 +120,8 @@ class BestFor(_Table):
 class Failing(_Table):
     """Claim that fails for the shipped hammer, with measured value, reason and best hammer."""
 
-    value: dict[str, Any] = Field(description="what was measured with the shipped hammer")
-    why: str = Field(description="why it fails")
+    value: dict[str, Any] = Field(description="the values measured with the shipped hammer")
+    why: str = Field(description="the reason why the claim fails")
     best: BestFor | None = Field(None, description="the best hammer for this claim")
 
 
@@ -141,7 +145,9 @@ class FamilyMember(_Table):
     constants: dict[str, _Number] = Field(description="its constants by file key, SI")
     verdicts: dict[_ClaimName, Literal["holds", "fails"]] = Field(description="its verdict on each claim")
     panels: Annotated[int, Field(ge=0)] = Field(description="the number of panels of Fig. 11 as printed")
-    conclusions: dict[str, _Number | None] = Field(description="what follows for it, by name, SI")
+    conclusions: dict[str, _Number | None] = Field(
+        description="quantities that follow for the hammer, by name, SI"
+    )
 
 
 class Conclusion(_Table):
@@ -150,7 +156,7 @@ class Conclusion(_Table):
     low: _Number | None = Field(description="the lowest value in the family")
     high: _Number | None = Field(description="the highest value in the family")
     robust: bool = Field(description="whether it holds for all of them")
-    text: str = Field(description="a sentence about it")
+    text: str = Field(description="the conclusion in a sentence")
 
 
 class Family(_Table):
@@ -158,28 +164,38 @@ class Family(_Table):
 
     format: Literal[1] = Field(description="1, the version of the format")
     hammers: list[FamilyMember] = Field(min_length=1, description="the hammers")
-    conclusions: dict[str, Conclusion] = Field(description="what holds for all of them, and what does not")
+    conclusions: dict[str, Conclusion] = Field(
+        description="the conclusions, each with its range over the hammers"
+    )
 
 
 class FamilyPanels(_Table):
     """How many of the twelve panels of Fig. 11 agree with the paper, for one hammer of the family."""
 
-    exact: _Count = Field(description="the number with the verdict of the paper, exactly")
-    computed: _Count = Field(description="the same as the Runge-Kutta method of 1983 computes them")
-    same: _Count = Field(description="the number whose two verdicts are the same")
+    exact: _Count = Field(description="the number with the verdict of the paper, with the default integrator")
+    computed: _Count = Field(
+        description="the number with the verdict of the paper, with the Runge-Kutta method of 1983"
+    )
+    same: _Count = Field(description="the number of panels with the same verdict by both integrators")
 
 
 class Change(_Table):
     """Frequency with which two integrators classify the same panel of Fig. 11 differently."""
 
-    first: str = Field(description="one way of computing")
+    first: str = Field(description="the first integrator")
     second: str = Field(description="the other")
     panels: _Some = Field(description="the number of panels")
-    differ: _Count = Field(description="the number of those with another verdict")
-    share: _Number = Field(description="their share")
-    share_error: _Number | None = Field(description="two standard errors of it, panels of a hammer as one")
-    periodic_to_strange: _Count = Field(description="periodic the first way, strange the second")
-    strange_to_periodic: _Count = Field(description="strange the first way, periodic the second")
+    differ: _Count = Field(description="the number of panels with another verdict")
+    share: _Number = Field(description="the fraction of panels with another verdict")
+    share_error: _Number | None = Field(
+        description="two standard errors of that fraction, with the panels of a hammer as one sample"
+    )
+    periodic_to_strange: _Count = Field(
+        description="the number of panels periodic with the first integrator, strange with the second"
+    )
+    strange_to_periodic: _Count = Field(
+        description="the number of panels strange with the first integrator, periodic with the second"
+    )
 
 
 class Schemes(_Table):
@@ -194,7 +210,9 @@ class Schemes(_Table):
     family: dict[str, FamilyPanels] = Field(description="panels of Fig. 11 of each hammer of the family")
     hammers: _Some = Field(description="the number of random hammers")
     seed: int = Field(description="the seed of the random hammers")
-    changes: list[Change] = Field(description="how often verdicts change over their panels")
+    changes: list[Change] = Field(
+        description="how often verdicts change over the panels of the random hammers"
+    )
 
 
 FILES: Final[dict[str, type[_Table]]] = {
@@ -222,11 +240,13 @@ class Results:
     """Results of the reconstruction in a folder; each result is None if its file is absent."""
 
     folder: Path | Traversable
-    base_rates = _file("base_rates", BaseRates, "How often each claim holds among random plausible hammers.")
-    predictions = _file("predictions", Predictions, "What the search on the stated claims alone predicts.")
-    search = _file("search", Search, "The search that found the shipped hammer.")
-    family = _file("family", Family, "Different hammers for which the claims hold as well.")
-    schemes = _file("schemes", Schemes, "What the integrators of 1983 do to verdicts.")
+    base_rates = _file(
+        "base_rates", BaseRates, "Base rates: how often each claim holds among random plausible hammers."
+    )
+    predictions = _file("predictions", Predictions, "Predictions of the search on the stated claims alone.")
+    search = _file("search", Search, "Record of the searches that found the shipped hammer.")
+    family = _file("family", Family, "Family of distinct hammers that satisfy the claims about as well.")
+    schemes = _file("schemes", Schemes, "Effect of the integrators of 1983 on verdicts.")
 
     def check(self) -> None:
         """Read all result files, to check them."""

@@ -31,7 +31,7 @@ from printhammer.support.arrays import FloatArray
 
 # Standard deviation of the model error of a contact, as a fraction of the stroke
 _MODEL_ERROR: Final = 0.003
-_GRID: Final = 1.0 / 128.0  # Spacing of the fronts at which contacts are simulated, likewise
+_GRID: Final = 1.0 / 128.0  # Spacing of the simulated pack fronts, as a fraction of the stroke
 # Finite-difference steps: front in grid steps, current scale, displacement as a fraction of the stroke, speed
 # in m/s
 _FRONT_STEPS: Final = 4
