@@ -56,7 +56,7 @@ class Section(Result):
     first: int = scalar(
         "1",
         "first of the firings between which touches were recorded",
-        more="the very first one is number 1",
+        more="the very first firing is number 1",
     )
     last: int = scalar("1", "last of the firings between which touches were recorded")
     t: FloatArray = column("s", "time of touch", "touch")
@@ -66,13 +66,13 @@ class Section(Result):
     )
     since: FloatArray = column("s", "time since the last firing", "touch")
     t_out: FloatArray = column(
-        "s", "time of leaving", "touch", more="nan where the contact is open at the end of the run"
+        "s", "time of leaving", "touch", more="nan if the contact is open at the end of the run"
     )
     v_out: FloatArray = column("m/s", "velocity at leaving", "touch", more="nan likewise")
     wanted: int = scalar(
         "1",
-        "number of touches asked for",
-        more="fewer where the surface is not touched often enough",
+        "number of touches requested",
+        more="fewer are recorded if the surface is not touched often enough",
     )
     status: str = part("how the run ended")
     tolerance: float = part("tolerance of the integration")
@@ -255,34 +255,38 @@ class ImpactTrain(Result):
     """Times of a train of impacts, with the statistics of the intervals between them."""
 
     times: FloatArray = column("s", "time of the impact", "impact", name="t")
-    intervals: FloatArray = part("times between successive impacts, s", more="one fewer", repr=False)
+    intervals: FloatArray = part(
+        "times between successive impacts, s", more="one interval fewer than times", repr=False
+    )
     mean: float = scalar("s", "mean of the intervals")
     deviation: float = scalar("s", "standard deviation of the intervals")
     variation: float = scalar(
         "1",
-        "coefficient of variation, deviation over mean",
+        "coefficient of variation, i.e. standard deviation over mean",
         more="0 for a clock, 1 for a Poisson process",
     )
-    edges: FloatArray = part("edges of the bins of the histogram, s", more="one more than bins", repr=False)
+    edges: FloatArray = part(
+        "edges of the bins of the histogram, s", more="one edge more than bins", repr=False
+    )
     counts: IntArray = column("1", "intervals in the bin", "bin", name="count", dtype=np.int32)
     autocorrelation: FloatArray = column(
         "1",
         "autocorrelation of the intervals",
         "lag",
-        more="from lag 0 on; nan where all intervals are the same",
+        more="from lag 0 on; nan if all intervals are equal",
     )
     window: float = scalar("s", "length of the windows in which impacts are counted")
     windows: int = scalar(
         "1",
         "number of windows",
-        more="they follow each other from half a mean interval before the first impact on",
+        more="successive windows, from half a mean interval before the first impact on",
     )
     fano: float = scalar(
         "1",
         "variance over mean of the numbers of impacts in the windows",
         more="1 for a Poisson process, nan for fewer than two windows",
     )
-    source: Section | None = part("where the times come from", repr=False)
+    source: Section | None = part("section from which the times come", repr=False)
 
     @property
     def title(self) -> str:
@@ -290,7 +294,7 @@ class ImpactTrain(Result):
         return "impact train"
 
     @property
-    @derived("s", "time since the impact before", "impact")
+    @derived("s", "time since the preceding impact", "impact")
     def interval(self) -> FloatArray:
         """Time since the preceding impact, s; NaN for the first impact."""
         return np.concatenate([[np.nan], self.intervals])

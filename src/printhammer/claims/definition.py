@@ -26,13 +26,13 @@ class Claim(Declared):
 
     name: str = part("name")
     kind: Kind = part('"stated", "typical" or "shape"')
-    source: str = part("where the paper says it")
-    says: str = part("what it says, in our words")
-    reading: str = part("what is measured, and what must be so")
-    note: str = part("what a reader must know beside; may be empty")
+    source: str = part("section, page or figure of the paper that makes the statement")
+    says: str = part("statement of the paper, in our words")
+    reading: str = part("measured values, and the condition for the claim to hold")
+    note: str = part("additional note for the reader; may be empty")
     settings: Mapping[str, Any] = part("numbers that set up the experiment, SI")
     band: Mapping[str, Any] = part(
-        "what each measured value must be: a number or text, true or false; a list (least, largest) of"
+        "allowed values of each measured value: a number or text, true or false; a list (least, largest) of"
         " two numbers, or of texts; a table of `SIDES`"
     )
 

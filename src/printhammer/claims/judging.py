@@ -39,13 +39,11 @@ class Measured:
 class JudgedClaim(Declared):
     """Claim with its measured values and the verdict: holds, fails or not yet."""
 
-    claim: Claim = part("what was judged")
-    value: Mapping[str, Any] | None = part(
-        "measured values by name, SI; None where nothing could be measured"
-    )
+    claim: Claim = part("claim that was evaluated")
+    value: Mapping[str, Any] | None = part("measured values by name, SI; None if no value could be measured")
     verdict: Verdict = part('"holds", "fails" or "not yet"')
-    detail: str = part("one sentence: what was found, or why nothing could be")
-    seconds: float = part("time that it took; no part of `as_dict`", default=0.0)
+    detail: str = part("sentence that describes the values, or the reason why none could be measured")
+    seconds: float = part("computation time, s; not included in `as_dict`", default=0.0)
 
     @property
     def missed(self) -> list[str]:

@@ -25,24 +25,24 @@ from printhammer.run.problem import Problem, Record
 from printhammer.support.arrays import FloatArray
 
 DOT_QUANTITIES: Final = {
-    "flight_time": ("s", "from firing to touch"),
+    "flight_time": ("s", "time from firing to touch"),
     "impact_speed": ("m/s", "speed at touch"),
     "peak_force": ("N", "largest pack force"),
     "indentation": ("m", "largest indentation"),
-    "contact_time": ("s", "from touch to leaving"),
+    "contact_time": ("s", "time from touch to leaving"),
     "loading_work": ("J", "work done on the pack up to its largest indentation"),
-    "net_loss": ("J", "energy that the pack kept"),
-    "return_time": ("s", "from firing to the first touch of the backstop after the dot"),
-    "return_speed": ("m/s", "speed at that touch"),
+    "net_loss": ("J", "energy absorbed by the pack"),
+    "return_time": ("s", "time from firing to the first touch of the backstop after the dot"),
+    "return_speed": ("m/s", "speed at the first touch of the backstop after the dot"),
 }
 """Unit and meaning of each quantity of a dot, by name."""
 
 RUN_QUANTITIES: Final = {
     "coil_work": ("J", "work of the coil"),
-    "drive_work": ("J", "work of a drive that is a force"),
-    "pack_loss": ("J", "energy that the pack took"),
-    "backstop_loss": ("J", "energy that the backstop took"),
-    "damping_loss": ("J", "energy that the damping of the armature took"),
+    "drive_work": ("J", "work of a force drive"),
+    "pack_loss": ("J", "energy absorbed by the pack"),
+    "backstop_loss": ("J", "energy absorbed by the backstop"),
+    "damping_loss": ("J", "energy dissipated by the armature's damping"),
 }
 """Unit and meaning of the energies of a whole run, by name; the last is for hammers with damping."""
 
@@ -58,7 +58,7 @@ class Struck(Declared):
 
     index: int = part("number of the firing")
     touch: int = part("row of the contact with the pack")
-    back: int | None = part("row of the first touch of the backstop after it")
+    back: int | None = part("row of the first touch of the backstop after the dot")
     t_peak: float = scalar("s", "time of the largest indentation")
     t_force: float = scalar("s", "time of the largest force")
 
@@ -171,9 +171,10 @@ class Changes(Declared):
     """Derivatives of the quantities of dots and run with respect to ``value / scale`` of each constant."""
 
     dots: FloatArray = part(
-        "of `DOT_QUANTITIES`, shape (dots, quantities, n)", more="NaN where a dot is lost or one is not known"
+        "derivatives of `DOT_QUANTITIES`, shape (dots, quantities, n)",
+        more="NaN for a lost dot or an unknown derivative",
     )
-    run: FloatArray = part("of `RUN_QUANTITIES`, shape (5, n)")
+    run: FloatArray = part("derivatives of `RUN_QUANTITIES`, shape (5, n)")
     smooth: bool = part("whether the motion is differentiable throughout")
 
 

@@ -30,20 +30,20 @@ class Flow(Declared):
         " circuit also electric state and path, as of a node, shape (m, 8)"
     )
     changes: FloatArray = part(
-        "changes at the marks, shape (m, 3 or 8, n): displacement, m; velocity, m/s; latest local maximum, m;"
-        " with constants also work of coil and of a drive force, loss in pack, backstop and damping, J, since"
-        " the first mark; with a circuit four rows more: flux linkage of the coil and of its shorted turn,"
-        " Wb, voltage of the reservoir, V, and end of a fixed off-time, s"
+        "changes at the marks, shape (m, 3 or 8, n): displacement, m; velocity, m/s; latest local maximum,"
+        " m; with constants also work of coil and of a force drive, loss in pack, backstop and damping, J,"
+        " since the first mark; with a circuit four more rows: flux linkage of the coil and of its shorted"
+        " turn, Wb, voltage of the reservoir, V, and end of a fixed off-time, s"
     )
     growth: FloatArray = part(
-        "logarithms of the growth of columns kept orthonormal, each since the mark before, shape (m, n)"
+        "logarithms of the growth of orthonormalised columns since the preceding mark, shape (m, n)"
     )
     passed: FloatArray = part(
-        "changes at chosen nodes of the record, before and after the switch there, shape (q, 2, .., n)"
+        "changes at chosen nodes of the record, before and after the discontinuity, shape (q, 2, .., n)"
     )
-    columns: FloatArray = part("the changes at the last mark, shape (.., n)")
+    columns: FloatArray = part("changes at the last mark, shape (.., n)")
     smooth: bool = part("whether the motion is differentiable from the first mark to the last")
-    status: int = part("code of how the run ended")
+    status: int = part("code of the status of the run")
 
     @property
     def status_name(self) -> str:

@@ -45,18 +45,20 @@ _MOST_SINGLE: Final = 20
 class Parameter(Declared):
     """Constant of hammer or drive, with the derivatives of the kernel's arrays."""
 
-    name: str = part('such as "pack.stiffness", "waveform.width", "period", "firing.1"')
+    name: str = part('name of the constant, such as "pack.stiffness", "waveform.width", "period", "firing.1"')
     value: float = part("in SI")
     scale: float = part(
-        "unit in which it is changed, SI: its absolute value, or what is typical of its dimension for the"
-        " motion where that is zero"
+        "scale of its changes, SI: the absolute value of the constant, or, if that is zero, a value typical"
+        " of its dimension"
     )
     unit: str = part("SI unit")
-    meaning: str = part("one phrase")
-    hammer: FloatArray = part("change of the packed constants with ``value / scale``, shape (h,)", repr=False)
-    firings: FloatArray = part("change of the firing times [s], shape (f,)", repr=False)
+    meaning: str = part("meaning of the constant in one phrase")
+    hammer: FloatArray = part(
+        "derivative of the packed constants with respect to ``value / scale``, shape (h,)", repr=False
+    )
+    firings: FloatArray = part("derivative of the firing times [s], shape (f,)", repr=False)
     pieces: FloatArray = part(
-        "change of the tables of the waveforms, see `Drive.kernel_arrays`, shape (m, 6)", repr=False
+        "derivative of the waveforms' segment tables, see `Drive.kernel_arrays`, shape (m, 6)", repr=False
     )
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _IN_PARTS: Final = "relative change of a quantity per relative change of a constant"
 _INDEPENDENT: Final = "standard deviation for independent constants"
-_WORST: Final = "deviation with all constants at their worst ends"
+_WORST: Final = "worst-case deviation, with all constants at their limits"
 
 TOLERANCE: Final = 1e-12
 """Default integration tolerance of the run."""
@@ -69,12 +69,12 @@ class Sensitivities(Result):
         "quantity_unit",
         "value",
         "dot quantity",
-        more="nan for a lost dot, and for what the run does not reach",
+        more="nan for a lost dot, and for events after the end of the run",
         name="value",
     )
     derivatives: FloatArray = column(
         "quantity_unit / constant_unit",
-        "change of a quantity with a constant",
+        "derivative of a quantity with respect to a constant",
         "dot quantity constant",
         name="derivative",
     )
@@ -84,17 +84,18 @@ class Sensitivities(Result):
     run: FloatArray = column("J", "energy of the run", "energy", name="run_value")
     run_derivatives: FloatArray = column(
         "J / constant_unit",
-        "change of a quantity with a constant",
+        "derivative of a quantity with respect to a constant",
         "energy constant",
-        more="the end of the run staying where it is",
+        more="the end time of the run is fixed",
         name="run_derivative",
     )
     left_out: Mapping[str, str] = part(
-        "constants at whose value nothing is differentiable with them, and why", repr=False
+        "constants at whose value the motion is not differentiable, with the reason", repr=False
     )
     duration: float = scalar("s", "end of the run")
     smooth: bool = part(
-        "False where the motion passes a touch without velocity", more="derivatives after it mean nothing"
+        "False if the motion passes a touch without velocity",
+        more="derivatives after such a touch are invalid",
     )
     status: str = part("how the run ended", more='the derivatives are nan unless it is "ok"')
     tolerance: float = part("tolerance of the integration")
@@ -206,16 +207,18 @@ class Sensitivities(Result):
 class Spread(Result):
     """Spread of the dots due to tolerances of the constants, to first order."""
 
-    sensitivities: Sensitivities = part("what it follows from", repr=False)
+    sensitivities: Sensitivities = part("sensitivities from which the spread is computed", repr=False)
     spreads: FloatArray = column("1", "relative spread of a constant", "constant", name="spread")
     dots: FloatArray = column(
         "quantity_unit",
-        "deviation that one constant alone makes",
+        "deviation caused by a single constant",
         "dot quantity constant",
-        more="of a quantity of a dot, not negative",
+        more="absolute value, per quantity of a dot",
         name="contribution",
     )
-    run: FloatArray = part("the same of the quantities of the run, J", more="shape (4, n)", repr=False)
+    run: FloatArray = part(
+        "deviation of the energies of the run caused by a single constant, J", more="shape (4, n)", repr=False
+    )
 
     @property
     def title(self) -> str:

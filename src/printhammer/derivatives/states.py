@@ -51,12 +51,16 @@ class TangentMap(Declared):
     )
     start: float = scalar("s", "time at the start")
     end: float = scalar("s", "time at the end")
-    state_at_start: tuple[float, float, float] = part("the state there")
-    state_at_end: tuple[float, float, float] = part("the state there")
+    state_at_start: tuple[float, float, float] = part(
+        "displacement, m, velocity, m/s, and latest local maximum, m, at that time"
+    )
+    state_at_end: tuple[float, float, float] = part(
+        "displacement, m, velocity, m/s, and latest local maximum, m, at that time"
+    )
     branch_at_start: int = part("code of the mode, see `printhammer.kernel.model.modes`")
-    branch_at_end: int = part("the same at the end", more="-1 where the run ended before")
+    branch_at_end: int = part("code of the mode at the end", more="-1 if the run ended before")
     smooth: bool = part(
-        "False where the motion in between passes a touch without velocity, where the state has no derivative"
+        "whether the state has a derivative; False if the motion passes a touch without velocity"
     )
     status: str = part("how the run ended")
 
@@ -86,28 +90,29 @@ class Exponent(Declared):
     """Lyapunov exponents of a strobe map: mean logarithmic growth of small perturbations per firing."""
 
     value: float = part(
-        "the largest exponent, per firing",
-        more="minus infinity where the motion forgets its past, NaN if the run ended early",
+        "largest exponent, per firing",
+        more="minus infinity if the motion forgets its past, NaN if the run ended early",
     )
     standard_error: float = part(
-        "of the value, from the scatter of overlapping batch means; infinite for fewer than eight firings"
+        "standard error of the largest exponent, from overlapping batch means; infinite for fewer than eight"
+        " firings"
     )
     second: float = part(
-        "the other exponent of the plane of displacement and velocity, per firing; under a voltage the second"
-        " largest",
+        "second exponent in the plane of displacement and velocity, per firing; with a voltage drive the"
+        " second largest",
         more="a third, that of the memory of the pack, is minus infinity: every contact meets fresh paper",
     )
     period: float = scalar("s", "time between firings")
     factors: FloatArray = part("logarithm of the growth from each firing to the next")
-    smooth: bool = part("False where the motion passes a touch without velocity, where it has no derivative")
+    smooth: bool = part("whether the motion has a derivative; False if it passes a touch without velocity")
     status: str = part("how the run ended")
     second_factors: FloatArray = part(
         "as `factors`, for the second exponent", repr=False, default_factory=lambda: np.zeros(0)
     )
     states: FloatArray = part(
-        "displacement, m, velocity, m/s, mode, and latest local maximum, m, at the firings, shape"
-        " (number of factors + 1, 4); under a voltage also electric state and path, (.., 8)",
-        more="NaN where the run ended before",
+        "displacement, m, velocity, m/s, mode, and latest local maximum, m, at the firings, shape (number of"
+        " factors + 1, 4); with a voltage drive also electric state and path, (.., 8)",
+        more="NaN if the run ended before",
         repr=False,
         default_factory=lambda: np.zeros((0, 4)),
     )

@@ -42,14 +42,14 @@ POLISHED: Final = 12
 class Attractor(Declared):
     """Attractor of a pulse train: a periodic orbit or a strange attractor."""
 
-    name: str = part('"period-q" or "strange"')
-    period: int | None = part("period q; None for a strange attractor")
+    name: str = part('name of the attractor: "period-q" or "strange"')
+    period: int | None = part("period q in firings; None for a strange attractor")
     states: FloatArray = part(
-        "displacements, m, and velocities, m/s, at successive firings: the orbit from its least displacement"
-        " on, or points of a strange attractor, shape (q, 2) or (n, 2)"
+        "displacement, m, and velocity, m/s, at successive firings: the orbit, from its least displacement"
+        " on, shape (q, 2), or points of a strange attractor, shape (n, 2)"
     )
     exponent: float = part(
-        "largest exponent of the strobe map per firing, of a strange attractor; else NaN", default=math.nan
+        "largest exponent of the strobe map, per firing; NaN for a periodic orbit", default=math.nan
     )
     standard_error: float = part("standard error of the exponent", default=math.nan)
 

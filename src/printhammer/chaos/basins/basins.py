@@ -54,7 +54,7 @@ BOX: Final = 4
 class BasinEntropy(Declared):
     """Basin entropy of a plane of cells, in natural logarithms."""
 
-    box: int = part("cells along the side of a box")
+    box: int = part("number of cells along the side of a box")
     boxes: int = part("number N of whole boxes with at least one decided cell")
     boundary_boxes: int = part("number Nb of boxes whose cells lead to more than one attractor")
     entropy: float = part(
@@ -66,7 +66,7 @@ class BasinEntropy(Declared):
         "S / Nb; NaN where no box has more than one attractor",
         more="more than ln 2 shows that the boundary is fractal; less shows nothing",
     )
-    left_out: int = part("cells outside whole boxes, or undecided")
+    left_out: int = part("number of cells outside whole boxes, or undecided")
 
     @property
     def fractal(self) -> bool:
@@ -92,7 +92,9 @@ def basin_entropy(labels: npt.ArrayLike, *, box: SupportsIndex = BOX) -> BasinEn
     """
     plane = np.asarray(labels)
     if plane.ndim != 2 or not plane.size or plane.dtype.kind not in "iu":
-        raise InputError(f"labels: shape {plane.shape}", key="labels", expected="a plane of whole numbers")
+        raise InputError(
+            f"labels: shape {plane.shape}", key="labels", expected="a two-dimensional array of integers"
+        )
     side = read_count(box, "box")
     if side > min(plane.shape):
         raise InputError.of("box", box, f"at most {min(plane.shape)} cells")
@@ -194,21 +196,23 @@ class Basins(Result, rows="v x"):
         "1",
         "attractor",
         "v x",
-        more="its number from 1 on, 0 undecided, -1 the run ended early, -2 there is no such state",
+        more="number from 1 on; 0: undecided, -1: run ended early, -2: no valid state",
         name="label",
         dtype=np.int32,
     )
     attractors: tuple[Attractor, ...] = part(
-        "in the order of their numbers: by period, strange ones last, then by their least displacement"
+        "attractors, sorted by period (strange ones last), then by least displacement"
     )
-    firings: IntArray = column("1", "firings until it was decided", "v x", more="or given up", dtype=np.int32)
+    firings: IntArray = column(
+        "1",
+        "number of firings after which the cell was decided",
+        "v x",
+        more="or after which it stayed undecided",
+        dtype=np.int32,
+    )
     status: TextArray = column("", "how the run ended", "v x", more='or "no state"')
-    compared: int = scalar(
-        "1", "number of sampled cells that were also integrated at a tenth of the tolerance"
-    )
-    changed: int = scalar(
-        "1", "number of sampled cells whose label differs there: rounding decides the label"
-    )
+    compared: int = scalar("1", "number of sampled cells that were recomputed at a tenth of the tolerance")
+    changed: int = scalar("1", "number of recomputed cells whose label differs, since rounding decides it")
     tolerance: float = part("tolerance of the integration")
 
     @property
@@ -309,8 +313,8 @@ class Basins(Result, rows="v x"):
         numbers = np.arange(1, len(self.attractors) + 1, dtype=np.int32)
         for name, unit, meaning, values in (
             ("verdict", "", "kind of attractor", kinds),
-            ("share", "1", "share of the cells that have a state", share),
-            ("standard_error", "1", "standard error of the share", error),
+            ("share", "1", "fraction of the cells with a state", share),
+            ("standard_error", "1", "standard error of the fraction", error),
             ("attractor", "1", "number of the attractor", numbers),
         ):
             sort: Kind = "coordinate" if name == "attractor" else "column"
@@ -446,11 +450,11 @@ def _key(attractor: Attractor) -> tuple[int, float, float]:
 def read_axis(entry: Any, name: str, unit: str) -> FloatArray:
     """Parse the bounds of an axis and its number of values; InputError if they are invalid."""
     if not isinstance(entry, tuple | list) or len(entry) != 3:
-        raise InputError.of(name, entry, "least and largest value and their number")
+        raise InputError.of(name, entry, "least value, largest value and number of values")
     low, high = (read_number(end, unit, name) for end in entry[:2])
     count = read_count(entry[2], f"{name}: number of values")
     if not low < high or count < 2:
-        raise InputError.of(name, entry, "two ends, the second the larger one, and 2 or more")
+        raise InputError.of(name, entry, "two ascending bounds and a number of at least 2")
     return np.linspace(low, high, count)
 
 

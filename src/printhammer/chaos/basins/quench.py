@@ -60,33 +60,33 @@ class QuenchMap(Result):
     """Effect of a second pulse as a function of the time between the firings and of its width."""
 
     hammer: Hammer = part("the hammer")
-    waveform: Waveform = part("the first pulse; the second has another width")
+    waveform: Waveform = part("first pulse; the second pulse differs in width")
     gaps: FloatArray = coordinate("s", "time between the two firings", "gap", name="gap")
     widths: FloatArray = coordinate("s", "width of the second pulse", "width", name="width")
     struck: BoolArray = column(
-        "1", "whether the second firing made a dot", "gap width", more="False for a lost one"
+        "1", "whether the second firing made a dot", "gap width", more="False for a lost dot"
     )
     peak: FloatArray = column(
         "m",
         "largest local maximum after the second firing",
         "gap width",
-        more="nan where there is none; of a lost dot read from samples, good to 1e-5 of the way to the pack",
+        more="nan without a maximum; for a lost dot interpolated, accurate to 1e-5 of the stroke",
     )
     force: FloatArray = column(
-        "N", "largest pack force of the second dot", "gap width", more="nan for a lost one"
+        "N", "largest pack force of the second dot", "gap width", more="nan for a lost dot"
     )
     flight_time: FloatArray = column(
         "s",
         "flight time of the second dot",
         "gap width",
-        more="from firing to touch, nan likewise",
+        more="from firing to touch; nan for a lost dot",
     )
     status: TextArray = column("", "how the run ended", "gap width")
     single_force: float = scalar(
-        "N", "largest pack force of the first pulse alone", more="nan where it makes no dot"
+        "N", "largest pack force of the first pulse alone", more="nan if it makes no dot"
     )
     single_flight_time: float = scalar("s", "flight time of the first pulse alone", more="nan likewise")
-    tail: float = scalar("s", "time after the second firing within which a second dot was waited for")
+    tail: float = scalar("s", "time after the second firing within which a contact counts as the second dot")
     tolerance: float = part("tolerance of the integration")
 
     @property
@@ -127,13 +127,13 @@ class QuenchMap(Result):
         return (self.peak - self.hammer.origin) / (front - self.hammer.origin)
 
     @property
-    @derived("1", "force of the second dot over that of the first alone", "gap width")
+    @derived("1", "ratio of the force of the second dot to that of the first pulse alone", "gap width")
     def force_ratio(self) -> FloatArray:
         """Ratio of the peak force of the second dot to that of the first pulse alone."""
         return self.force / self.single_force
 
     @property
-    @derived("s", "how much shorter the second dot flies", "gap width")
+    @derived("s", "flight time of the first pulse alone minus that of the second dot", "gap width")
     def flight_gain(self) -> FloatArray:
         """Flight time of the first pulse alone minus that of the second dot, s."""
         return self.single_flight_time - self.flight_time
@@ -231,11 +231,11 @@ def quench_map(
     width = getattr(pulse, "width", None)
     if not isinstance(width, float):
         raise InputError(
-            f"waveform: a {pulse.shape} has no width", key="waveform", expected="a pulse that has one"
+            f"waveform: a {pulse.shape} has no width", key="waveform", expected="a pulse with a width"
         )
     if hammer.front is None:
         raise InputError(
-            f"the hammer {hammer.name!r} has no pack", key="pack", expected="one that a dot is made on"
+            f"the hammer {hammer.name!r} has no pack", key="pack", expected="a hammer with a pack"
         )
     scale = time_scale(hammer, pulse)
     times = read_axis((0.5e-3 * scale, 0.9e-3 * scale, 128) if gaps is None else gaps, "gaps", "s")

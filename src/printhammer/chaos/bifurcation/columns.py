@@ -42,13 +42,13 @@ MOST_STATES: Final = 1 << 19
 class Columns(Declared):
     """States of many trains at successive sections, with the final state of each train."""
 
-    x: FloatArray = column("m", "displacement", "train point", more="NaN where a run ended before")
+    x: FloatArray = column("m", "displacement", "train point", more="NaN after the end of a run")
     v: FloatArray = column("m/s", "velocity", "train point", more="likewise")
     branch: npt.NDArray[np.int8] = column(
         "1",
-        "code of the mode, a place in `printhammer.run.ensemble.MODE_NAMES`",
+        "mode of motion, as an index of `printhammer.run.ensemble.MODE_NAMES`",
         "train point",
-        more="-1 where a run ended before",
+        more="-1 after the end of a run",
     )
     memory: FloatArray = column(
         "m", "latest local maximum on the unloading branch inside the pack", "train point", more="else 0"
@@ -56,11 +56,11 @@ class Columns(Declared):
     current: FloatArray = column(
         "A", "current in the coil", "train point", more="0 unless a voltage drives it"
     )
-    status: TextArray = column("", "how the runs ended; `NOT_RUN` before", "train")
+    status: TextArray = column("", "status of each run; `NOT_RUN` before the run", "train")
     last: FloatArray = part(
-        "displacement, velocity, branch of the pack or -1, memory, and the electric part of the state at the"
-        " firing after all that are asked for, where the next train can go on; `FROM_REST` where it cannot,"
-        " shape (M, 7)"
+        "state from which the next train can continue, at the firing after the last requested one, shape (M,"
+        " 7): displacement, velocity, branch of the pack or -1, memory, and the electric part of the state;"
+        " `FROM_REST` if no train can continue"
     )
 
     def __len__(self) -> int:

@@ -45,28 +45,28 @@ MOST_UNDECIDED: Final = 32
 class Window(Declared):
     """Range of neighbouring parameter values whose trains have the same classification; values in SI."""
 
-    verdict: str = part('"period-q", "strange", "superstable" or "undecided"')
-    period: int = part("number q; 0 where there is none")
+    verdict: str = part('classification: "period-q", "strange", "superstable" or "undecided"')
+    period: int = part("period q in firings; 0 if aperiodic")
     low: float = part("least value")
     high: float = part("largest value")
-    width: float = part("width of the window up to half-way to the neighbours")
+    width: float = part("width of the window, up to half-way to the neighbouring values")
     columns: int = part("number of values")
 
 
 class Route(Declared):
     """Route to chaos: the windows between one end of the parameter range and the first strange train."""
 
-    way: Literal["rising", "falling"] = part("sense of the values of the parameter")
+    way: Literal["rising", "falling"] = part("direction in which the parameter is followed")
     before: tuple[Window, ...] = part(
-        "the windows before the first strange train, in this order; all of them if there is none"
+        "windows before the first strange train, in this direction; all windows without a strange train"
     )
     first: float | None = part(
-        "value of the first strange train, SI",
+        "parameter value of the first strange train, SI",
         more="None without a strange train, or if the search stopped before it",
     )
     complete: bool = part(
-        "False where `MOST_UNDECIDED` trains without a period came first that are not strange, and the way"
-        " was not followed further"
+        "whether the search reached a strange train or the end of the range; False if it stopped after"
+        " `MOST_UNDECIDED` undecided trains"
     )
 
     @property
@@ -122,29 +122,31 @@ def doublings(windows: Sequence[Window]) -> list[Window]:
 class Bifurcation(Result, rows="direction column"):
     """Bifurcation diagram: states at the firings against a parameter, in one or several directions."""
 
-    regime: Regime = part("hammer, periodic drive and phase; the parameter has other values in each column")
-    parameter: str = scalar("", "what is changed, see `printhammer.run.regime.Regime.with_`")
+    regime: Regime = part("hammer, periodic drive and phase; the parameter differs in each column")
+    parameter: str = scalar("", "name of the parameter, see `printhammer.run.regime.Regime.with_`")
     directions: tuple[str, ...] = coordinate(
-        "", "how the state was carried", "direction", more='"from rest", "up" or "down"', name="direction"
+        "",
+        "direction in which the state was carried",
+        "direction",
+        more='"from rest", "up" or "down"',
+        name="direction",
     )
     values: FloatArray = coordinate("SI", "value of the parameter", "column", more="ascending", name="value")
     firing: IntArray = coordinate(
-        "1", "number of the firing", "firing", more="the first of a train is number 1", dtype=np.int32
+        "1", "number of the firing", "firing", more="the first firing of a train is number 1", dtype=np.int32
     )
-    x: FloatArray = column(
-        "m", "displacement", "direction column firing", more="nan where a run ended before"
-    )
+    x: FloatArray = column("m", "displacement", "direction column firing", more="nan after the end of a run")
     v: FloatArray = column("m/s", "velocity", "direction column firing", more="nan likewise")
     branch: npt.NDArray[np.int8] = column(
         "1",
         "mode of motion",
         "direction column firing",
-        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where a run ended before",
+        more="as an index of `printhammer.run.ensemble.MODE_NAMES`, -1 after the end of a run",
         codes=MODE_NAMES,
     )
     cycles: IntArray = column(
         "1",
-        "firings after which states repeat, 0 for none",
+        "number of firings after which the states repeat, 0 if aperiodic",
         "direction column",
         more="the smallest number, up to 64",
         name="cycle",
@@ -154,14 +156,14 @@ class Bifurcation(Result, rows="direction column"):
         "1",
         "distance of states a period apart, half-widths of the window",
         "direction column",
-        more="nan where there is no period",
+        more="nan without a period",
         name="distance",
     )
     exponents: FloatArray = column(
         "1",
         "largest exponent of the strobe map, per firing",
         "direction column",
-        more="of trains without a period, nan where it was not computed",
+        more="for aperiodic trains; nan if it was not computed",
         name="exponent",
         head="exponent per firing",
     )
@@ -176,20 +178,22 @@ class Bifurcation(Result, rows="direction column"):
         "1",
         "whether the period differs at a tenth or a hundredth of the tolerance",
         "direction column",
-        more="computed for periods from 5 on of motions that may come to rest on a rigid backstop",
+        more="computed for motions of period 5 or more that may come to rest on a rigid backstop",
         dtype=np.int8,
     )
     status: TextArray = column("", "how the run ended", "direction column")
     levels: IntArray = column(
         "1",
-        "refinement, 0 for a given value",
+        "refinement level, 0 for a given value",
         "column",
-        more="k for those put between them at the k-th refinement",
+        more="k for values inserted at the k-th refinement",
         name="level",
         dtype=np.int32,
     )
     carried: int = scalar(
-        "1", "number of trains that were run again to close the joints of strands", name="trains_run_again"
+        "1",
+        "number of trains that were run again to close the joints between strands",
+        name="trains_run_again",
     )
     tolerance: float = part("tolerance of the integration")
 
@@ -252,12 +256,12 @@ class Bifurcation(Result, rows="direction column"):
         reasons = (
             (
                 settling,
-                "neighbouring motions approach each other: they still settle, more firings show the period",
+                "neighbouring motions converge; more firings will show the period",
             ),
             (known & ~settling, "the exponent lies within three standard errors of zero"),
             (
                 undecided & ~known,
-                "no exponent was computed: the option exponents does so, except where a touch grazes",
+                "no exponent was computed; use the option `exponents` (none exists at a grazing touch)",
             ),
         )
         count = int(undecided.sum())
@@ -272,7 +276,7 @@ class Bifurcation(Result, rows="direction column"):
         return [f"{whose} at a finer tolerance: long cycles hang on the last bits."] if count else []
 
     @property
-    @derived("1", "part of the period between a firing and its point")
+    @derived("1", "time from a firing to its point, as a fraction of the period")
     def phase(self) -> float:
         """Time from a firing to the point of the diagram, as a fraction of the period."""
         return self.regime.phase

@@ -45,15 +45,15 @@ class Stop(Declared):
     """End of a curve of fixed points, with the reason for stopping."""
 
     reason: str = part(
-        '"bound"; "closed"; "no value": the map has none beyond; "lost": Newton\'s method does not converge'
-        ' beyond; "jump": what it converges to there is no continuation; "length": the number of steps is'
-        ' used up; "not asked"; or what the caller\'s watch says'
+        '"bound"; "closed"; "no value": the map has no value beyond; "lost": Newton\'s method does not'
+        ' converge beyond; "jump": it converges to another curve; "length": maximum number of steps; "not'
+        " asked\": not followed; or the reason of the caller's watch"
     )
     parameter: float = part("parameter at the end")
     state: FloatArray = part("state at the end")
-    sentence: str = part("the reason as a sentence")
+    sentence: str = part("reason as a sentence")
     node: Node | None = part(
-        "where the caller's watch stops between two nodes: the last node of the curve",
+        "last node of the curve, if the caller's watch stops between two nodes",
         default=None,
         repr=False,
     )
@@ -74,9 +74,9 @@ class Curve(Declared):
 class Steps(Declared):
     """Step sizes and maximum number of steps along a curve, in scaled variables."""
 
-    first: float = part("length of the first step", default=0.02)
-    smallest: float = part("smallest length", default=1e-7)
-    largest: float = part("largest length", default=0.1)
+    first: float = part("scaled length of the first step", default=0.02)
+    smallest: float = part("smallest scaled step length", default=1e-7)
+    largest: float = part("largest scaled step length", default=0.1)
     most: int = part("maximum number of steps in each direction", default=1000)
     precision: float = part(
         "scaled correction of Newton's method below which a point is on the curve", default=1e-11

@@ -49,25 +49,25 @@ class BranchEvent(Declared, eq=False):
     """Event on a branch: a bifurcation, a grazing, or a change of the section."""
 
     kind: EventKind = part(
-        '"fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period are'
-        ' born; "Neimark-Sacker": a complex pair of multipliers crosses the unit circle, a torus is born;'
-        ' "pitchfork" and "transcritical": two branches cross, of which one turns back or none does,'
-        ' "branching" where that is unknown; "grazing": a contact appears or vanishes; "section": nothing'
-        " to the orbit, but a contact comes near the section, which moves to another phase"
+        '"fold": the branch turns back; "period doubling": a multiplier is -1, orbits of twice the period'
+        ' are born; "Neimark-Sacker": a complex pair of multipliers crosses the unit circle, a torus is'
+        ' born; "pitchfork", "transcritical": two branches cross, and one or none turns back; "branching": a'
+        ' crossing of unknown kind; "grazing": a contact appears or vanishes; "section": the section moves'
+        " to another phase, since a contact nears it"
     )
-    value: float = part("value of the constant, SI")
+    value: float = part("value of the parameter, SI")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
     phase: float = part("phase of the section, as a fraction of the period")
     multipliers: npt.NDArray[np.complex128] = part("multipliers at the point, shape (2,)")
     surface: str = part('surface of a grazing: "pack", "backstop" or, if several contacts change, ""')
     change: Change = part(
-        'of a grazing, as the constant grows: a contact "appears", "vanishes", "splits" in two or two "merge"'
-        ' ("merges"); "several" where more than one changes at once. Else empty'
+        'change at a grazing as the parameter grows: a contact "appears", "vanishes" or "splits", two'
+        ' contacts "merge" ("merges"), or "several" contacts change; empty for other events'
     )
     contacts: tuple[str, str] = part("sequence of contacts before and after the point along the branch")
     after: int = part("index of the orbit of the branch before the point")
     sharp: bool = part("whether the point was located; otherwise it is only bracketed by two orbits")
-    point: BranchPoint = part("the point of the curve", repr=False)
+    point: BranchPoint = part("special point of the curve", repr=False)
 
     @property
     def message(self) -> str:
@@ -181,18 +181,18 @@ class Branch(Result):
 
     regime: Regime = part("hammer and periodic drive at the start, and phase of the section")
     parameter: str = scalar(
-        "", 'the constant: "period", "rate", or the key of one of the hammer, the waveform or the drive'
+        "", 'name of the parameter: "period", "rate", or the key of a constant of hammer, waveform or drive'
     )
-    unit: str = part("its SI unit")
-    bounds: tuple[float, float] = scalar("SI", "values between which the branch was followed")
-    firings: int = column("1", "firings after which the orbits repeat", "", dtype=np.int32)
+    unit: str = part("SI unit of the parameter")
+    bounds: tuple[float, float] = scalar("SI", "parameter values between which the branch was followed")
+    firings: int = column("1", "number of firings after which the orbits repeat", "", dtype=np.int32)
     tolerance: float = part("tolerance of the integration")
-    values: FloatArray = column("SI", "value of the constant", "orbit", name="value")
+    values: FloatArray = column("SI", "value of the parameter", "orbit", name="value")
     phases: FloatArray = column(
         "1",
-        "part of the period between a firing and the section",
+        "phase of the section, as a fraction of the period",
         "orbit",
-        more="that of the regime but where a contact comes near it",
+        more="changes where a contact nears the section",
         name="orbit_phase",
     )
     x: FloatArray = column("m", "displacement at the section", "orbit firing")
@@ -201,27 +201,33 @@ class Branch(Result):
         "Floquet multipliers of the orbits, the larger absolute value first", more="shape (N, 2)", repr=False
     )
     backstop_contacts: IntArray = column(
-        "1", "backstop contacts in a period of the orbit", "orbit", dtype=np.int32
+        "1", "number of backstop contacts in one period of the orbit", "orbit", dtype=np.int32
     )
-    pack_contacts: IntArray = column("1", "pack contacts in a period of the orbit", "orbit", dtype=np.int32)
-    printed: IntArray = column("1", "firings of a period that make a dot", "orbit", dtype=np.int32)
-    lost: IntArray = column("1", "firings of a period that make no dot", "orbit", dtype=np.int32)
+    pack_contacts: IntArray = column(
+        "1", "number of pack contacts in one period of the orbit", "orbit", dtype=np.int32
+    )
+    printed: IntArray = column(
+        "1", "number of firings in one period that make a dot", "orbit", dtype=np.int32
+    )
+    lost: IntArray = column("1", "number of firings in one period that make no dot", "orbit", dtype=np.int32)
     flight_time: FloatArray = column(
-        "s", "from the firing to the touch of the pack", "orbit firing", more="nan for a lost dot"
+        "s", "time from the firing to the touch of the pack", "orbit firing", more="nan for a lost dot"
     )
     impact_speed: FloatArray = column(
         "m/s", "velocity at the touch of the pack", "orbit firing", more="nan for a lost dot"
     )
     peak_force: FloatArray = column("N", "largest pack force", "orbit firing", more="nan for a lost dot")
-    coil_work: FloatArray = column("J", "work of the coil in a period of the orbit", "orbit")
-    drive_work: FloatArray = column("J", "work of a drive that is a force in a period of the orbit", "orbit")
-    pack_loss: FloatArray = column("J", "energy that the pack takes in a period of the orbit", "orbit")
+    coil_work: FloatArray = column("J", "work of the coil in one period of the orbit", "orbit")
+    drive_work: FloatArray = column("J", "work of a force drive in one period of the orbit", "orbit")
+    pack_loss: FloatArray = column("J", "energy absorbed by the pack in one period of the orbit", "orbit")
     backstop_loss: FloatArray = column(
-        "J", "energy that the backstop takes in a period of the orbit", "orbit"
+        "J", "energy absorbed by the backstop in one period of the orbit", "orbit"
     )
-    damping_loss: FloatArray = column("J", "energy that the damping takes in a period of the orbit", "orbit")
+    damping_loss: FloatArray = column(
+        "J", "energy dissipated by the damping in one period of the orbit", "orbit"
+    )
     residual: FloatArray = column(
-        "1", "distance from itself after a period, in half-widths of the window", "orbit"
+        "1", "closing error after one period, in half-widths of the window", "orbit"
     )
     contacts: tuple[str, ...] = part(
         "sequence of the contacts of each orbit, P for the pack and B for the backstop", repr=False
@@ -229,20 +235,22 @@ class Branch(Result):
     symmetry: str = scalar(
         "",
         'whether the middle orbit is its own mirror image, x -> -x half a period later: "symmetric" or'
-        ' "asymmetric"; "" where a pack or a backstop is on one side',
+        ' "asymmetric"; "" if a pack or a backstop acts on one side',
     )
     events: tuple[BranchEvent, ...] = part(
         "folds, period doublings, Neimark-Sacker points, crossings and grazings, in order along the curve",
         repr=False,
     )
     stops: tuple[Stop, Stop] = part(
-        "why and where the branch ends before its first and after its last orbit",
+        "ends of the branch before its first and after its last orbit, with the reasons for stopping",
         repr=False,
     )
     follow_event: Callable[[BranchEvent, int, int | None], Branch] = part(
-        "follows the branch that begins at an event, given the number of steps and of threads", repr=False
+        "function that follows the branch from an event, given the numbers of steps and threads", repr=False
     )
-    curve: Curve = part("the same in the variables of `printhammer.chaos.continuation.arclength`", repr=False)
+    curve: Curve = part(
+        "branch as a curve of fixed points of `printhammer.chaos.continuation.arclength`", repr=False
+    )
 
     @property
     def title(self) -> str:
@@ -273,13 +281,13 @@ class Branch(Result):
         return len(self.values)
 
     @property
-    @derived("1", "part of the period between a firing and the section")
+    @derived("1", "phase of the section, as a fraction of the period")
     def phase(self) -> float:
         """Phase of the section at the first orbit, as a fraction of the period; see also `phases`."""
         return self.regime.phase
 
     @property
-    @derived("1", "whether all small changes of the state die out", "orbit", dtype=np.int32)
+    @derived("1", "whether all small perturbations of the state decay", "orbit", dtype=np.int32)
     def stable(self) -> BoolArray:
         """Mask of the stable orbits, shape (N,): all small perturbations decay.
 
@@ -334,16 +342,34 @@ class Branch(Result):
         # At least one: a dimension of length 0 has another meaning in the classic NetCDF format.
         rows = self.events or (None,)
         for name, unit, meaning, missing, value in (
-            ("kind", "1", "what happens on the way", -1, lambda event: KINDS.index(event.kind)),
+            ("kind", "1", "kind of the event", -1, lambda event: KINDS.index(event.kind)),
             ("value", self.unit, self.parameter, np.nan, lambda event: event.value),
-            ("after", "1", "number of the orbit that it follows", -1, lambda event: event.after),
-            ("located", "1", "whether it was located", -1, lambda event: event.sharp),
-            ("x", "m", "displacement at the section there", np.nan, lambda event: event.state[0]),
-            ("v", "m/s", "velocity at the section there", np.nan, lambda event: event.state[1]),
-            ("phase", "1", "part of the period to the section", np.nan, lambda event: event.phase),
-            ("text", "", "what happens, in a few words", "", lambda event: event.message),
-            ("contacts_before", "", "sequence of contacts before it", "", lambda event: event.contacts[0]),
-            ("contacts_after", "", "sequence of contacts after it", "", lambda event: event.contacts[1]),
+            ("after", "1", "index of the orbit before the event", -1, lambda event: event.after),
+            ("located", "1", "whether the event was located", -1, lambda event: event.sharp),
+            ("x", "m", "displacement at the section at the event", np.nan, lambda event: event.state[0]),
+            ("v", "m/s", "velocity at the section at the event", np.nan, lambda event: event.state[1]),
+            (
+                "phase",
+                "1",
+                "phase of the section at the event, fraction of the period",
+                np.nan,
+                lambda event: event.phase,
+            ),
+            ("text", "", "description of the event in a few words", "", lambda event: event.message),
+            (
+                "contacts_before",
+                "",
+                "sequence of contacts before the event",
+                "",
+                lambda event: event.contacts[0],
+            ),
+            (
+                "contacts_after",
+                "",
+                "sequence of contacts after the event",
+                "",
+                lambda event: event.contacts[1],
+            ),
         ):
             codes, dtype = KINDS if name == "kind" else (), np.int32 if missing == -1 else None
             note = Column(unit, meaning, ("event",), name=f"event_{name}", dtype=dtype, codes=codes)

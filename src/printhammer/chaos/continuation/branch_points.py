@@ -79,17 +79,15 @@ class BranchPoint(Declared):
         '"fold", "period doubling", "Neimark-Sacker", "pitchfork", "transcritical", "branching", "change" or'
         ' "section"'
     )
-    node: Node = part("fixed point there")
+    node: Node = part("fixed point at the special point")
     after: int = part("index of the node of the curve before the point")
-    labels: tuple[Hashable, Hashable] = part("labels of the motion before and after it")
+    labels: tuple[Hashable, Hashable] = part("labels of the motion before and after the point")
     sharp: bool = part(
-        "False where it could not be located to the precision of the curve",
-        more="only bracketed by two nodes",
+        "whether the point was located to the precision of the curve",
+        more="otherwise it is only bracketed by two nodes",
         default=True,
     )
-    sides: tuple[Node, Node] | None = part(
-        "for a change: fixed points close before and behind it", default=None
-    )
+    sides: tuple[Node, Node] | None = part("fixed points close to a change, on both sides", default=None)
 
     @property
     def parameter(self) -> float:

@@ -52,7 +52,7 @@ class Touch(Declared):
     surface: Surface = part('"pack" or "backstop"')
     t_in: float = scalar("s", "time of touch")
     t_out: float = scalar(
-        "s", "time of leaving", more="may be in the next period; infinite for a contact without end"
+        "s", "time of leaving", more="may be in the next period; infinite if the contact does not end"
     )
     v_in: float = scalar("m/s", "velocity at touch")
 
@@ -62,7 +62,7 @@ class Passage(Declared):
 
     touches: tuple[Touch, ...] = part("in order")
     period: float = scalar("s", "time between firings")
-    firings: int = part("number of firings on the way")
+    firings: int = part("number of firings between the two sections")
 
     def of(self, surface: Surface) -> list[Touch]:
         """Return the touches of one surface, in order of time."""
@@ -94,10 +94,10 @@ class Course(Declared):
 
     states: FloatArray = part("displacement, m, and velocity, m/s, at the sections, shape (firings, 2)")
     peak_forces: FloatArray = column(
-        "N", "largest pack force of the contacts of each firing", "firing", more="NaN without one"
+        "N", "largest pack force of the contacts of each firing", "firing", more="NaN without a contact"
     )
     coil_work: float = part("work of the coil")
-    drive_work: float = part("work of a drive that is a force")
+    drive_work: float = part("work of a force drive")
     pack_loss: float = part("loss in the pack")
     backstop_loss: float = part("loss in the backstop")
     damping_loss: float = part("loss in the damping of the armature")
@@ -141,7 +141,7 @@ class RegimeFamily:
             growth = float(np.abs(np.linalg.eigvals(jacobian)).max())
             slope = self._slope(state, parameter, image, growth)
         if slope is None or jacobian is None:
-            return MapValue.none(2, "the runs with a slightly different constant or state ended early")
+            return MapValue.none(2, "runs with a slightly different parameter or state ended early")
         return MapValue(image, jacobian, slope, passage.sequence, extra=passage)
 
     def margin(self, state: FloatArray, parameter: float) -> float:

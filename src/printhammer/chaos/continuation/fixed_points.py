@@ -35,10 +35,10 @@ class MapValue(Declared):
         more="a change along a curve is an event",
         default=(),
     )
-    trouble: str = part("why the map has no value at this point; empty if it has one", default="")
+    trouble: str = part("reason why the map has no value at this point; empty if it has a value", default="")
     extra: Any = part("further data that the map attaches to this evaluation", default=None, repr=False)
     monodromy: FloatArray | None = part(
-        "derivative whose eigenvalues are the multipliers, where the map is larger than that of the orbit",
+        "derivative whose eigenvalues are the multipliers, if the map has more unknowns than the orbit",
         default=None,
         repr=False,
     )
@@ -60,7 +60,7 @@ class Node(Declared):
     state: FloatArray = part("state u, shape (n,)")
     parameter: float = part("parameter p")
     tangent: FloatArray = part("direction of the curve in scaled variables, of length 1, shape (n + 1,)")
-    arc: float = part("length of the curve from its start in scaled variables, negative before it")
+    arc: float = part("arc length from the start of the curve in scaled variables, negative before the start")
     value: MapValue = part("map at the point")
     residual: float = part("largest scaled component of G(u, p) - u")
 

@@ -26,7 +26,7 @@ from printhammer.support.arrays import FloatArray
 if TYPE_CHECKING:
     from printhammer.chaos.continuation.family import Surface
 
-_CURRENT: Final = "under a voltage the current at a touch belongs to the state"
+_CURRENT: Final = "with a voltage drive, the current at a touch belongs to the state"
 _CLOSE: Final = 0.01
 """Time before and after a touch during which the surface is removed, as a fraction of the period."""
 _STILL: Final = 1e-9  # Speed, relative to the typical one, below which an orbit turns at its section
@@ -43,11 +43,11 @@ class Flight(Declared):
 
     end: FloatArray = part("displacement, m, and velocity, m/s, at the end, shape (2,)")
     jacobian: FloatArray = part("derivative with respect to the state at the start, shape (2, 2)")
-    accelerations: tuple[float, float] = part("acceleration at its start and at its end, m/s^2")
-    contacts: tuple[str, ...] = part("surfaces touched on the way")
+    accelerations: tuple[float, float] = part("acceleration at the start and at the end, m/s^2")
+    contacts: tuple[str, ...] = part("surfaces touched during the flight")
     surface: float = part("displacement of the surface, m")
     rebound: float = part("coefficient of restitution; NaN without a rigid backstop")
-    trouble: str = part("why there is no flight; empty if there is one")
+    trouble: str = part("reason why there is no flight; empty if there is a flight")
 
 
 def fly(

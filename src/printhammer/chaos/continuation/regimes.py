@@ -60,7 +60,7 @@ class Branches(Result):
 
     found: tuple[Branch, ...] = part("branches, sorted by number of firings, then by order of discovery")
     refused: tuple[str, ...] = part(
-        "why an orbit could not be followed, or a search found no orbit, a sentence each", default=()
+        "one sentence per orbit that could not be followed, and per search that found no orbit", default=()
     )
 
     @property

@@ -54,53 +54,58 @@ class BifurcationCurve(Result, rows="point"):
     regime: Regime = part("hammer and periodic drive at the start")
     kind: str = scalar("", '"fold", "period doubling", "Neimark-Sacker" or "grazing"')
     surface: str = scalar("", 'surface of a grazing: "pack" or "backstop"; else empty')
-    names: tuple[str, str] = scalar("", "names of the two constants")
-    units: tuple[str, str] = scalar("", "SI units of the constants")
-    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "ranges of the constants")
+    names: tuple[str, str] = scalar("", "names of the two parameters")
+    units: tuple[str, str] = scalar("", "SI units of the parameters")
+    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "ranges of the parameters")
     firings: int = scalar("1", "number of firings after which the orbits repeat")
     tolerance: float = part("tolerance of the integration")
-    first: FloatArray = column("SI", "the first constant", "point")
-    second: FloatArray = column("SI", "the second constant", "point")
+    first: FloatArray = column("SI", "value of the first parameter", "point")
+    second: FloatArray = column("SI", "value of the second parameter", "point")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (N, 2)", repr=False)
     phase: FloatArray = column(
-        "1", "part of the period from a firing to the section", "point", more="at a grazing: to the touch"
+        "1",
+        "phase of the section, as a fraction of the period, from a firing on",
+        "point",
+        more="for a grazing: phase of the touch",
     )
     multipliers: npt.NDArray[np.complex128] = part(
         "Floquet multipliers, the larger absolute value first",
-        more="shape (N, 2); at a grazing those of the orbit without the touch",
+        more="shape (N, 2); for a grazing those of the orbit without the touch",
         repr=False,
     )
     coefficient: FloatArray = column(
         "SI",
         "coefficient of the normal form",
         "point",
-        more="of a period doubling without unit, positive where it is supercritical; of a grazing of a rigid"
-        " backstop that of the square root, m^(1/2)/s; nan where there is none or it is not known",
+        more="for a period doubling dimensionless, positive if supercritical; for a grazing of a rigid"
+        " backstop the factor of the square root, m^(1/2)/s; nan for other kinds or if unknown",
     )
     sides: IntArray = column(
         "1",
         "side of a grazing of a rigid backstop on which orbits exist",
         "point orbit",
-        more="without the touch, then with one touch in 1, 2, 3 and 4 of its periods: 1 for larger values of"
-        " the first constant, -1 for smaller ones, 0 for neither",
+        more="orbit without the touch, then orbits with one touch in 1, 2, 3 and 4 periods: 1 for larger"
+        " values of the first parameter, -1 for smaller values, 0 for neither side",
         dtype=np.int32,
     )
     contacts: tuple[str, ...] = part(
         "sequence of the contacts of each orbit, P for the pack and B for the backstop", repr=False
     )
     points: tuple[CodimensionTwo, ...] = part("points of codimension two, in order along the curve")
-    stops: tuple[Stop, Stop] = part("why and where the curve ends", repr=False)
+    stops: tuple[Stop, Stop] = part("ends of the curve, with the reasons for stopping", repr=False)
     grid: tuple[FloatArray, FloatArray] = part(
-        "values of the two constants, shapes (m,) and (n,), at which trains from rest were judged", repr=False
+        "values of the two parameters, shapes (m,) and (n,), at which trains from rest were classified",
+        repr=False,
     )
     crossings: Callable[[int, float], list[Place]] = part(
-        "solves for the places at which the curve passes a value of the first or second constant", repr=False
+        "function that solves for the points at which the first or second parameter has a given value",
+        repr=False,
     )
     settled: IntArray = column(
         "1",
-        "firings after which the train from rest repeats",
+        "number of firings after which the train from rest repeats",
         "value main",
-        more="0 where it does not within the firings given to it, -1 where its run stopped",
+        more="0 if it does not repeat within the firings simulated, -1 if its run stopped",
         dtype=np.int32,
     )
 

@@ -53,16 +53,14 @@ _NOISE: Final = 1e-8  # Magnitude below which a test function or a tangent compo
 class CodimensionTwo(Declared):
     """Point of codimension two on a bifurcation curve, at which two degeneracies coincide."""
 
-    kind: str = part(
-        'such as "cusp", "fold-flip" or "kind, such as "cusp", "fold-flip" or "resonant grazing""'
-    )
-    first: float = part("value of the first constant, SI")
-    second: float = part("value of the second constant, SI")
+    kind: str = part('kind of the point, such as "cusp", "fold-flip" or "resonant grazing"')
+    first: float = part("value of the first parameter, SI")
+    second: float = part("value of the second parameter, SI")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
-    phase: float = part("part of the period from the firing to the section")
+    phase: float = part("phase of the section, as a fraction of the period from the firing on")
     multipliers: npt.NDArray[np.complex128] = part("multipliers of the orbit, shape (2,)")
-    after: int = part("index of the point of the curve before it; -1 before the first")
-    passages: int = part("n of a resonant grazing; else 1", default=1)
+    after: int = part("index of the preceding point of the curve; -1 before the first point")
+    passages: int = part("number n of passages of a resonant grazing; else 1", default=1)
 
     @property
     def message(self) -> str:

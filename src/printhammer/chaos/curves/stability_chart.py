@@ -55,25 +55,26 @@ _ACROSS: Final = (0.02, 0.98)
 class StabilityChart(Result):
     """Stability chart: curves that bound the stable region of an orbit, and periods of trains from rest."""
 
-    regime: Regime = part("hammer and periodic drive of the branch it came from")
-    names: tuple[str, str] = scalar("", "the two constants")
-    units: tuple[str, str] = scalar("", "their SI units")
-    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "their ranges")
+    regime: Regime = part("hammer and periodic drive of the original branch")
+    names: tuple[str, str] = scalar("", "names of the two parameters")
+    units: tuple[str, str] = scalar("", "SI units of the two parameters")
+    bounds: tuple[tuple[float, float], tuple[float, float]] = scalar("SI", "ranges of the two parameters")
     firings: int = scalar("1", "number of firings after which the orbit repeats")
     curves: tuple[BifurcationCurve, ...] = part("curves on which the orbit loses its stability", repr=False)
     grid: tuple[FloatArray, FloatArray] = part(
-        "values of the two constants, shapes (m,) and (n,), at which trains from rest were judged", repr=False
+        "values of the two parameters, shapes (m,) and (n,), at which trains from rest were classified",
+        repr=False,
     )
     settled: IntArray = column(
         "1",
-        "firings after which the train from rest repeats",
+        "number of firings after which the train from rest repeats",
         "value main",
-        more="0 where it does not within the firings given to it, -1 where its run stopped",
+        more="0 if it does not repeat within the firings simulated, -1 if its run stopped",
         dtype=np.int32,
     )
-    refused: tuple[str, ...] = part("why a curve could not be followed, a sentence each", default=())
+    refused: tuple[str, ...] = part("one sentence per curve that could not be followed", default=())
     across: tuple[float, ...] = part(
-        "values of the first constant at which limits were sought along the second, SI", default=()
+        "values of the first parameter at which limits were sought along the second, SI", default=()
     )
 
     @property
@@ -86,7 +87,7 @@ class StabilityChart(Result):
         return Summary([self.message])
 
     @property
-    @derived("", "what was found")
+    @derived("", "summary in one line")
     def message(self) -> str:
         """Summary in one line: numbers of curves by kind, and the fraction of trains that settle."""
         kinds = [curve.kind for curve in self.curves]
@@ -129,7 +130,9 @@ class StabilityChart(Result):
             limits[i, : len(curve.limits)] = curve.limits
         pair = ("curve", "point")
         own = super().entries()
-        kind = Column("1", "how stability is lost", ("curve",), name="kind", codes=tuple(TESTS))
+        kind = Column(
+            "1", "kind of bifurcation at which stability is lost", ("curve",), name="kind", codes=tuple(TESTS)
+        )
         own["kind"] = kind, codes
         own["limits"] = Column("1", "whether stability is lost", pair, name="limits"), limits
         for k, (name, axis) in enumerate((("first", "main"), ("second", "value"))):
@@ -182,11 +185,11 @@ def stability_chart(
     if isinstance(branch, Branch):
         if first is not None or firing:
             raise InputError(
-                "a branch is given", key="first", expected="no first constant and no firing beside it"
+                "a branch is given", key="first", expected="no first parameter and no firing in addition"
             )
     elif first is None:
         raise InputError(
-            "first is missing", key="first", expected="the first constant with its least and largest value"
+            "first is missing", key="first", expected="the first parameter with its least and largest value"
         )
     else:
         fired: Firing = firing

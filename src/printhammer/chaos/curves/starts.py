@@ -69,7 +69,7 @@ def start_of(
     """
     if isinstance(source, Branch):
         if regime is not None:
-            raise InputError("a branch is given", key="regime", expected="no regime beside it")
+            raise InputError("a branch is given", key="regime", expected="no regime in addition")
         return _of_branch(source, event)
     opened = source if isinstance(source, Reopened) else reopen(source)
     if regime is None:

@@ -104,14 +104,14 @@ def check_two(first: str, second: str) -> None:
 class Place(Declared):
     """Point of a bifurcation curve in the plane of two parameters, with the orbit at this point."""
 
-    first: float = part("value of the first constant, SI")
-    second: float = part("value of the second constant, SI")
+    first: float = part("value of the first parameter, SI")
+    second: float = part("value of the second parameter, SI")
     state: FloatArray = part("displacement, m, and velocity, m/s, at the section, shape (2,)")
-    phase: float = part("part of the period from the firing to the section")
+    phase: float = part("phase of the section, as a fraction of the period from the firing on")
     jacobian: FloatArray = part("derivative of the strobe map, shape (2, 2)")
     contacts: str = part("sequence of the contacts, P and B")
     slope: FloatArray | None = part(
-        "derivative of the state after the firings with respect to the first constant", default=None
+        "derivative of the state after the firings with respect to the first parameter", default=None
     )
     acceleration: float = part(
         "acceleration at the touch of a grazing, m/s^2; NaN for other kinds", default=math.nan

@@ -55,24 +55,24 @@ if TYPE_CHECKING:
 class LyapunovChart(Result, rows="period"):
     """Lyapunov exponents against the period of the train; every array has one row per train."""
 
-    hammer: Hammer = part("the hammer", more="the first one where there are several")
+    hammer: Hammer = part("the hammer", more="the first hammer if there are several")
     drive: Drive = part("the drive of the first train")
     period: FloatArray = coordinate("s", "time between firings", "period")
-    first: int = scalar("1", "first of the firings between which growth counts")
-    last: int = scalar("1", "last of them")
+    first: int = scalar("1", "first of the firings between which growth is averaged")
+    last: int = scalar("1", "last of the firings between which growth is averaged")
     tolerance: float = part("tolerance of the integration")
     exponents: FloatArray = column(
         PER_FIRING, "Lyapunov exponents", "period exponent", more="as for `Lyapunov`"
     )
     standard_errors: FloatArray = column(PER_FIRING, "standard errors", "period exponent")
     total: FloatArray = column(PER_FIRING, "sum of the exponents", "period")
-    total_error: FloatArray = column(PER_FIRING, "its standard error", "period")
+    total_error: FloatArray = column(PER_FIRING, "standard error of the sum", "period")
     dimension: FloatArray = column("1", "Kaplan-Yorke dimension", "period")
-    dimension_error: FloatArray = column("1", "its standard error", "period")
-    k: FloatArray = column("1", "K of the 0-1 test", "period", more="nan where there are too few points")
-    verdict: tuple[str, ...] = column("", "verdict on the points", "period")
-    growth: tuple[str, ...] = column("", "what the largest exponent alone says", "period")
-    zero_one: tuple[str, ...] = column("", "verdict of the 0-1 test", "period")
+    dimension_error: FloatArray = column("1", "standard error of the dimension", "period")
+    k: FloatArray = column("1", "K of the 0-1 test", "period", more="nan for too few points")
+    verdict: tuple[str, ...] = column("", "classification by the strobe points", "period")
+    growth: tuple[str, ...] = column("", "classification by the largest exponent alone", "period")
+    zero_one: tuple[str, ...] = column("", "classification by the 0-1 test", "period")
     status: tuple[str, ...] = column("", "how the run ended", "period")
     smooth: BoolArray = column("1", "whether the motion has a derivative", "period", dtype=np.int8)
 
@@ -210,11 +210,15 @@ LEVELS: Final = (0.05, 0.25, 0.5, 0.75, 0.95)  # Quantile levels of the distribu
 class FiniteTime(Result, rows="length"):
     """Distribution of the largest exponent over successive stretches of several lengths."""
 
-    lengths: IntArray = coordinate("1", "firings of a stretch", "length", name="length", dtype=np.int32)
+    lengths: IntArray = coordinate(
+        "1", "length of a stretch, in firings", "length", name="length", dtype=np.int32
+    )
     level: FloatArray = coordinate("1", "quantile level", "level")
     stretches: IntArray = column("1", "number of stretches", "length", dtype=np.int32)
     mean: FloatArray = column(PER_FIRING, "mean of the exponents of the stretches", "length")
-    deviation: FloatArray = column(PER_FIRING, "their standard deviation", "length")
+    deviation: FloatArray = column(
+        PER_FIRING, "standard deviation of the exponents of the stretches", "length"
+    )
     negative: FloatArray = column("1", "fraction of the stretches whose exponent is negative", "length")
     quantiles: FloatArray = column(PER_FIRING, "quantiles of the exponents", "length level", name="quantile")
     values: tuple[FloatArray, ...] = part("exponents of the stretches of each length, 1/firing", repr=False)
@@ -255,7 +259,7 @@ def finite_time(
     if not wanted or sorted(set(wanted)) != wanted:
         raise InputError.of("lengths", lengths, "numbers of firings, ascending")
     if not known.ok:
-        raise InputError(f"the run ended early ({known.status})", key="train", expected="one that did not")
+        raise InputError(f"the run ended early ({known.status})", key="train", expected="a run that did not")
     growth = known.factors[:, 0]
     if len(growth) < FEWEST * wanted[-1]:
         raise InputError(

@@ -50,14 +50,17 @@ class CorrelationDimension(Result, rows="radius"):
     """Correlation sums of a series of states, local slopes, and the dimension if there is a plateau."""
 
     radius: FloatArray = coordinate("1", "distance of states", "radius", more="in units of the scales")
-    sums: FloatArray = column("1", "part of the pairs that lie closer", "radius", name="correlation_sum")
+    sums: FloatArray = column("1", "fraction of the pairs that are closer", "radius", name="correlation_sum")
     slopes: FloatArray = column(
-        "1", "slope of its logarithm over that of the distance", "radius", more="nan at the ends"
+        "1",
+        "local slope of the logarithm of the correlation sum over that of the distance",
+        "radius",
+        more="nan at the ends",
     )
     states: int = scalar("1", "number of states")
-    theiler: int = scalar("1", "pairs of states less than this many steps apart are left out")
+    theiler: int = scalar("1", "Theiler window: pairs of states less than this many steps apart are excluded")
     flat: float = scalar("1", "largest range of local slopes on a plateau")
-    plateau: tuple[float, float] = scalar("1", "distances between which the slope is flat, or nan")
+    plateau: tuple[float, float] = scalar("1", "range of distances of the plateau, or nan")
     dimension: float = scalar("1", "correlation dimension", more="nan without a plateau")
     low: float = scalar("1", "lower end of the interval of the dimension")
     high: float = scalar("1", "upper end of the interval of the dimension")

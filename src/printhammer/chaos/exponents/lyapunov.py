@@ -77,13 +77,13 @@ class Lyapunov(Result, rows="firing exponent"):
     """Lyapunov exponents of one train, with the classifications by strobe points and by the 0-1 test."""
 
     points: Strobe = part(
-        "the states at the firings between which growth counts, and the verdict on them",
-        more="it rests on recurrence and on the largest exponent",
+        "strobe points at the firings between which growth is averaged, with their classification",
+        more="the classification is based on recurrence and on the largest exponent",
     )
     exponents: FloatArray = scalar(
         PER_FIRING,
         "Lyapunov exponents, the largest one first",
-        more="minus infinity where the motion forgets its past, nan where the run ended early",
+        more="minus infinity if the motion forgets its past, nan if the run ended early",
     )
     standard_errors: FloatArray = scalar(
         PER_FIRING, "standard errors of the exponents", more="infinite for fewer than eight firings"
@@ -93,17 +93,19 @@ class Lyapunov(Result, rows="firing exponent"):
         "sum of the exponents",
         more="the mean logarithm of the determinant of the map",
     )
-    total_error: float = scalar(PER_FIRING, "its standard error")
+    total_error: float = scalar(PER_FIRING, "standard error of the sum")
     dimension: float = scalar(
-        "1", "Kaplan-Yorke dimension of the attractor", more="nan where it is not known, see `kaplan_yorke`"
+        "1", "Kaplan-Yorke dimension of the attractor", more="nan if unknown, see `kaplan_yorke`"
     )
-    dimension_error: float = scalar("1", "its standard error")
+    dimension_error: float = scalar("1", "standard error of the dimension")
     factors: FloatArray = part(
         "logarithms of the growth from each firing to the next", more="shape (n, 2)", repr=False
     )
-    smooth: bool = scalar("1", "False where the motion passes a touch without velocity, without a derivative")
+    smooth: bool = scalar(
+        "1", "whether the motion has a derivative; False if it passes a touch without velocity"
+    )
     zero_one: ZeroOne | None = part(
-        "what the 0-1 test says of the points", more="None for fewer than 100 of them", repr=False
+        "result of the 0-1 test of the strobe points", more="None for fewer than 100 points", repr=False
     )
 
     @property
@@ -166,7 +168,7 @@ class Lyapunov(Result, rows="firing exponent"):
     def verdict(self) -> Verdict:
         """Classification of the motion by its strobe points, with the evidence."""
         if self.points.verdict is None:
-            raise ValueError("the points have not been judged")
+            raise ValueError("the points have not been classified")
         return self.points.verdict
 
     @property
@@ -181,7 +183,7 @@ class Lyapunov(Result, rows="firing exponent"):
         return cycle_of(self.verdict.period, len(self.factors))
 
     @property
-    @derived("", "what the largest exponent alone says")
+    @derived("", "classification by the largest exponent alone")
     def growth(self) -> str:
         """Classification by the largest exponent alone: "chaotic", "regular" or "undecided"."""
         return _growth(float(self.exponents[0]), float(self.standard_errors[0]), self.smooth)

@@ -40,31 +40,29 @@ class Recurrence(Result):
     matrix: BoolArray = column(
         "1", "whether two states lie within the threshold of each other", "i j", name="recurs", dtype=np.int8
     )
-    threshold: float = scalar(
-        "1", "largest distance of states that count as the same", more="in units of the scales"
-    )
+    threshold: float = scalar("1", "largest distance of recurrent states", more="in units of the scales")
     theiler: int = scalar(
         "1",
-        "pairs of states less than this many steps apart are left out",
-        more="1 leaves out the main diagonal alone",
+        "Theiler window: pairs of states less than this many steps apart are excluded",
+        more="1 excludes the main diagonal only",
     )
     shortest: int = scalar("1", "length of the shortest line, in points")
     rate: float = scalar("1", "fraction of the counted pairs that recur")
     determinism: float = scalar(
-        "1", "part of the recurring pairs that lie on diagonal lines", more="nan where nothing recurs"
+        "1", "fraction of the recurrent pairs that lie on diagonal lines", more="nan if no pair recurs"
     )
-    mean_diagonal: float = scalar("1", "mean length of the diagonal lines", more="nan where there are none")
+    mean_diagonal: float = scalar("1", "mean length of the diagonal lines", more="nan without such lines")
     longest_diagonal: int = scalar(
         "1",
-        "length of the longest diagonal line, 0 where there is none",
-        more="the main diagonal does not count; the inverse is the divergence",
+        "length of the longest diagonal line, 0 without a line",
+        more="without the main diagonal; the inverse is the divergence",
     )
     entropy: float = scalar("nat", "entropy of the lengths of the diagonal lines")
     laminarity: float = scalar(
-        "1", "part of the points that lie on vertical lines", more="the main diagonal among them"
+        "1", "fraction of the points that lie on vertical lines", more="including the main diagonal"
     )
-    trapping: float = scalar("1", "mean length of the vertical lines", more="nan where there are none")
-    longest_vertical: int = scalar("1", "length of the longest vertical line, 0 where there is none")
+    trapping: float = scalar("1", "mean length of the vertical lines", more="nan without such lines")
+    longest_vertical: int = scalar("1", "length of the longest vertical line, 0 without a line")
 
     @property
     def title(self) -> str:
@@ -190,7 +188,7 @@ def _distances(scaled: FloatArray) -> FloatArray:
 def _threshold(distances: FloatArray, theiler: int, rate: float) -> float:
     """Find the smallest threshold whose recurrence rate is at least `rate`."""
     if not 0.0 < rate <= 1.0:
-        raise InputError.of("rate", rate, "a part of all pairs, above 0 up to 1")
+        raise InputError.of("rate", rate, "a fraction of all pairs, above 0 and up to 1")
     pairs = distances[np.triu_indices(len(distances), theiler)]
     wanted = max(math.ceil(rate * pairs.size), 1) - 1
     return float(np.partition(pairs, wanted)[wanted])
@@ -205,14 +203,14 @@ def rows_of(
         units = states.window.half_widths[[0, 1, 0]]
         if not np.isfinite(rows).all():
             raise InputError(
-                f"states: the run ended early ({states.status})", key="states", expected="one that did not"
+                f"states: the run ended early ({states.status})", key="states", expected="a run that did not"
             )
     else:
-        rows = read_array(states, "states", "numbers, a row for each state")
+        rows = read_array(states, "states", "numbers, one row per state")
         rows = rows[:, np.newaxis] if rows.ndim == 1 else rows
         if rows.ndim != 2:
             raise InputError(
-                f"states: an array of shape {rows.shape}", key="states", expected="a row for each state"
+                f"states: an array of shape {rows.shape}", key="states", expected="one row per state"
             )
         units = np.ones(rows.shape[1])
     if not 2 <= len(rows) <= most:

@@ -75,26 +75,28 @@ class ZeroOne(Result):
         "median of the correlations",
         more="near 0 for a regular series, near 1 for a chaotic one, nan where the series has gaps",
     )
-    verdict: str = scalar("", '"regular" up to 0.2, "chaotic" from 0.8 on, else "undecided"')
-    reason: str = scalar("", 'why the verdict is "undecided"', more="else empty")
+    verdict: str = scalar(
+        "", 'classification by K: "regular" up to 0.2, "chaotic" from 0.8 on, else "undecided"'
+    )
+    reason: str = scalar("", 'reason for the classification "undecided"', more="else empty")
     length: int = scalar("1", "length of the series")
     cycle: int = scalar(
         "1",
-        "number q after which the series most nearly repeats itself",
-        more="the mean of each q-th number was taken out",
+        "cycle length q after which the series most nearly repeats",
+        more="the mean of every q-th number was subtracted",
     )
     resolution: float = scalar(
-        "1", "amplitude up to which changes of the series count as none", more="in its own unit"
+        "1", "amplitude up to which changes of the series are ignored", more="in the unit of the series"
     )
-    seed: int = scalar("1", "seed of the angles")
+    seed: int = scalar("1", "seed of the random generator of the angles")
     angles: FloatArray = coordinate("rad", "angle c", "angle", name="angle")
     correlations: FloatArray = column("1", "correlation K_c", "angle", name="correlation")
-    shown: int = part("place of the angle whose correlation is the median", repr=False)
+    shown: int = part("index of the angle with the median correlation", repr=False)
     displacement: FloatArray = column(
         "unit of the series squared",
         "mean square displacement, corrected",
         "step",
-        more="after 1, 2, ... steps at the angle that is shown",
+        more="after 1, 2, ... steps, at the angle of the median",
     )
     p: FloatArray = column("unit of the series", "path, first coordinate", "number", more="likewise")
     q: FloatArray = column("unit of the series", "path, second coordinate", "number", more="likewise")
@@ -236,7 +238,7 @@ def _judged(k: float, cycle: int, rest: FloatArray, resolution: float) -> tuple[
     quarter = rest.size // 4
     early, late = float(np.std(rest[:quarter])), float(np.std(rest[-quarter:]))
     if early > resolution and late < SETTLING * early:
-        return "undecided", "the series has not settled: a longer transient may have to be left out"
+        return "undecided", "the series has not settled: discard a longer transient"
     if k < CHAOTIC:
         return "undecided", f"K = {k:.2f} lies between {REGULAR:g} and {CHAOTIC:g}: a longer series may tell"
     if rest.size // _CUT < CYCLES * cycle:

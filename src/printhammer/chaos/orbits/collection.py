@@ -79,13 +79,15 @@ class Orbits(Result):
     """
 
     regime: Regime = part("hammer and periodic drive")
-    found: tuple[Orbit, ...] = part("the orbits, by number of firings, stable ones first")
+    found: tuple[Orbit, ...] = part("orbits, sorted by number of firings, stable orbits first")
     longest: int = scalar("1", "largest orbit period searched for, in firings")
     starts: int = scalar("1", "number of motions searched for close returns")
     guesses: tuple[int, ...] = scalar("1", "number of guesses for orbits of 1, 2, ... firings")
-    repeats: int = scalar("1", "how many guesses led to an orbit of another one, or to one of fewer firings")
-    hits: tuple[int, ...] = scalar("1", "how many guesses led to each orbit")
-    failures: Mapping[str, int] = part("how many guesses led nowhere, by reason")
+    repeats: int = scalar(
+        "1", "number of guesses that led to an already known orbit, or to an orbit of fewer firings"
+    )
+    hits: tuple[int, ...] = scalar("1", "number of guesses that led to each orbit")
+    failures: Mapping[str, int] = part("number of guesses that failed, by reason")
     tolerance: float = part("tolerance of the integration")
 
     @property

@@ -47,10 +47,10 @@ class Records(Declared):
     """States of many motions at the sections of one phase, as a source of close returns."""
 
     states: FloatArray = part(
-        "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN where a run ended before"
+        "displacement, m, and velocity, m/s, shape (M, n, 2)", more="NaN after the end of a run"
     )
     usable: BoolArray = part("whether displacement and velocity are the whole state, shape (M, n)")
-    begins: bool = part("whether the first record is the long one", default=True)
+    begins: bool = part("whether the first record is the long record of the train from rest", default=True)
 
     def rows(self, begin: int, end: int) -> Records:
         """Return the records of the motions with indices from `begin` to before `end`."""

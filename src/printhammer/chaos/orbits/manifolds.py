@@ -65,12 +65,12 @@ class Manifolds(Result, rows="point"):
     v: FloatArray = column("m/s", "velocity", "point")
     curve: IntArray = column("1", "number of the curve, from 0 on", "point", dtype=np.int32)
     length: FloatArray = column(
-        "1", "way along the curve from the saddle, in half-widths of the window", "point"
+        "1", "arc length along the curve from the saddle, in half-widths of the window", "point"
     )
     kinds: IntArray = column("1", "kind of the curve", "curves", dtype=np.int32, codes=KINDS, name="kind")
     ends: tuple[str, ...] = part(
-        'why each curve ends: "length"; "points"; "sink", where it runs into a stable orbit; "no preimage",'
-        ' where Newton\'s method finds none; "no value", where no run comes through'
+        'reason for the end of each curve: "length"; "points"; "sink": it reaches a stable orbit; "no'
+        ' preimage": Newton\'s method finds no preimage; "no value": every run fails'
     )
     spacing: float = part("target distance of neighbouring points")
 
@@ -88,7 +88,7 @@ class Manifolds(Result, rows="point"):
         """Return the Dataset variables: states over `point`, kind and end of each curve over `curves`."""
         own = super().entries()
         ends = np.array(self.ends, "U16")
-        own["end"] = Column("", "why the curve ends", ("curves",), name="end"), ends
+        own["end"] = Column("", "reason for the end of the curve", ("curves",), name="end"), ends
         return own
 
 

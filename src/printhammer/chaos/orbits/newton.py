@@ -85,10 +85,12 @@ class Guess(Declared):
 class Closing(Guess):
     """Outcome of Newton's method for one initial guess: a closed orbit, or the reason for failure."""
 
-    jacobians: FloatArray = part("derivative of the end of each segment by its start, shape (m, 2, 2)")
+    jacobians: FloatArray = part(
+        "derivative of the end of each segment with respect to its start, shape (m, 2, 2)"
+    )
     residual: float = part("largest distance of an end from the next start, in half-widths of the window")
     smooth: bool = part("whether the orbit has a derivative")
-    reason: str = part("why it does not close; empty where it does")
+    reason: str = part("reason why the orbit does not close; empty if it closes")
 
     @property
     def closed(self) -> bool:

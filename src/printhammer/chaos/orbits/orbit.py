@@ -48,11 +48,11 @@ _KIND: Final = Column(
     "1", "fate of small perturbations of the state", (), name="kind", dtype=np.int32, codes=KINDS
 )
 _ENERGIES: Final = {
-    "coil_work": "work of the coil in a period of the orbit",
-    "drive_work": "work of a drive that is a force in a period of the orbit",
-    "pack_loss": "energy that the pack takes in a period of the orbit",
-    "backstop_loss": "energy that the backstop takes in a period of the orbit",
-    "damping_loss": "energy that the damping of the armature takes in a period of the orbit",
+    "coil_work": "work of the coil in one period of the orbit",
+    "drive_work": "work of a force drive in one period of the orbit",
+    "pack_loss": "energy absorbed by the pack in one period of the orbit",
+    "backstop_loss": "energy absorbed by the backstop in one period of the orbit",
+    "damping_loss": "energy dissipated by the armature's damping in one period of the orbit",
 }
 _SECTION: Final = (
     ("section_x", "m", "displacement at the section"),
@@ -70,7 +70,11 @@ class Orbit(Result):
 
     regime: Regime = part("hammer, periodic drive, and phase of the section at which the orbit was found")
     firings: int = column(
-        "1", "firings after which the motion repeats", "", more="and no smaller number", dtype=np.int32
+        "1",
+        "number of firings after which the motion repeats",
+        "",
+        more="the smallest such number",
+        dtype=np.int32,
     )
     x: FloatArray = column("m", "displacement at the firing", "firing")
     v: FloatArray = column("m/s", "velocity at the firing", "firing")
@@ -78,12 +82,12 @@ class Orbit(Result):
         "1",
         "mode of motion at the firing",
         "firing",
-        more="a place in `printhammer.run.ensemble.MODE_NAMES`",
+        more="as an index of `printhammer.run.ensemble.MODE_NAMES`",
         dtype=np.int32,
         codes=MODE_NAMES,
     )
     memory: FloatArray = column(
-        "m", "latest local maximum inside the pack", "firing", more="0 but on the unloading branch"
+        "m", "latest local maximum inside the pack", "firing", more="0 except on the unloading branch"
     )
     section: FloatArray = part(
         "displacement, m, and velocity, m/s, at the section", more="shape (2,)", repr=False
@@ -96,32 +100,34 @@ class Orbit(Result):
         "1",
         "whether the motion has a derivative",
         "",
-        more="not where it passes a touch without velocity",
+        more="False if it passes a touch without velocity",
         dtype=np.int32,
     )
     residual: float = column(
         "1",
-        "distance from itself after a period, in half-widths of the window",
+        "closing error after one period, in half-widths of the window",
         "",
-        more="re-integrated whole",
+        more="from one integration of the whole period",
     )
     contacts: Rows[Contact] = part(
-        "all contacts that begin in a period of the orbit, times from its first firing on", repr=False
+        "all contacts that begin in one period of the orbit; times count from the first firing", repr=False
     )
     dots: Rows[Dot] = part(
-        "what each firing did on the paper, times from the first firing on",
-        more="empty under an endless force",
+        "dot of each firing; times count from the first firing",
+        more="empty under a continuous periodic force",
         repr=False,
     )
-    energy: Ledger | None = part("energies of a period of the orbit, J", repr=False)
+    energy: Ledger | None = part("energies in one period of the orbit, J", repr=False)
     margin: float = column(
         "1",
-        "signed nearness of a grazing, in units of the way from backstop to pack",
+        "signed distance from a grazing, in units of the distance from backstop to pack",
         "",
         more="see `printhammer.chaos.strobe.map.Image`",
     )
     tolerance: float = part("tolerance of the integration")
-    status: str = part('"ok", or why there is no such orbit', more="all numbers are nan then")
+    status: str = part(
+        '"ok", or the reason why there is no such orbit', more="in that case all numbers are nan"
+    )
 
     @property
     def title(self) -> str:
@@ -134,7 +140,9 @@ class Orbit(Result):
         return self.status == _OK
 
     @property
-    @derived("1", "part of the drive's period from the first firing to the section", kind="column")
+    @derived(
+        "1", "phase of the section after the first firing, as a fraction of the drive period", kind="column"
+    )
     def phase(self) -> float:
         """Phase of the section after the first firing, as a fraction of the drive period."""
         return self.regime.phase
@@ -163,31 +171,31 @@ class Orbit(Result):
         return self.kind == STABLE
 
     @property
-    @derived("1", "backstop contacts in a period of the orbit", kind="column", dtype=np.int32)
+    @derived("1", "number of backstop contacts in one period of the orbit", kind="column", dtype=np.int32)
     def backstop_contacts(self) -> int:
         """Number of backstop contacts in one period of the orbit."""
         return sum(contact.surface == "backstop" for contact in self.contacts)
 
     @property
-    @derived("1", "pack contacts in a period of the orbit", kind="column", dtype=np.int32)
+    @derived("1", "number of pack contacts in one period of the orbit", kind="column", dtype=np.int32)
     def pack_contacts(self) -> int:
         """Number of pack contacts in one period of the orbit."""
         return sum(contact.surface == "pack" for contact in self.contacts)
 
     @property
-    @derived("1", "dots that the firings of a period make", kind="column", dtype=np.int32)
+    @derived("1", "number of dots made in one period", kind="column", dtype=np.int32)
     def printed(self) -> int:
         """Number of dots printed in one period of the orbit."""
         return sum(dot.struck for dot in self.dots)
 
     @property
-    @derived("1", "firings of a period that make no dot", kind="column", dtype=np.int32)
+    @derived("1", "number of firings in one period that make no dot", kind="column", dtype=np.int32)
     def lost(self) -> int:
         """Number of firings in one period of the orbit that print no dot."""
         return len(self.dots) - self.printed
 
     @property
-    @derived("s", "from the firing to the touch of the pack", "firing", name="flight_time")
+    @derived("s", "time from the firing to the touch of the pack", "firing", name="flight_time")
     def flight_times(self) -> FloatArray:
         """Flight time of the dot of each firing, s; NaN for a lost dot."""
         return _numbers(dot.flight_time for dot in self.dots)

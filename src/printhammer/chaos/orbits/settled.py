@@ -51,7 +51,9 @@ class Settled(Declared):
     """Orbit to which a motion has settled, or the reason why it is undecided."""
 
     period: int | None = part("firings after which the orbit repeats; None if undecided")
-    states: FloatArray = part("displacement, m, and velocity, m/s, at its firings, shape (period, 2)")
+    states: FloatArray = part(
+        "displacement, m, and velocity, m/s, at the firings of the orbit, shape (period, 2)"
+    )
     multiplier: float = part(
         "largest absolute value of a Floquet multiplier; NaN if Newton's method was not used",
         default=math.nan,
@@ -140,7 +142,7 @@ def _by_states(points: FloatArray, scaled: FloatArray, period: int) -> Settled:
     early, late = _apart(scaled, period, period)
     shrinking = [bool(_shrinking(scaled, d, period)[0]) for d in _largest_divisors(period)]
     if late[0] > max(AGREES, early[0]) or any(shrinking):
-        why = "the states still move, and the orbit has no derivative by which it could be found"
+        why = "the states still move, and Newton's method needs a derivative that does not exist"
         return Settled(None, np.zeros((0, 2)), math.nan, why)
     return Settled(period, points[-period:, :2].copy())
 

@@ -70,26 +70,27 @@ class Image(Declared):
         'displacement, m, and velocity, m/s, at the end, shape (2,); NaN unless the status is "ok"'
     )
     jacobian: FloatArray = part(
-        "derivative of the state at the end with respect to that at the start, from the tangent flow, shape"
-        " (2, 2); NaN likewise"
+        "derivative of the state at the end with respect to the state at the start, from the tangent flow,"
+        ' shape (2, 2); NaN unless the status is "ok"'
     )
     status: str = part(
-        '"ok"; how the run ended otherwise; "in the pack" where the state at the start or the end has a'
-        ' memory; or "a current flows" where one does at the end'
+        '"ok"; the reason for an early end; "in the pack" if the state at the start or the end includes a'
+        ' memory; or "a current flows" at the end'
     )
     smooth: bool = part(
-        "False where the motion passes a touch without velocity, where the state has no derivative"
+        "whether the state has a derivative; False if the motion passes a touch without velocity"
     )
     contacts: tuple[tuple[str, float], ...] = part(
-        'surface, "pack" or "backstop", and time of touch since the start, s, of every contact that begins in'
-        " between, in order; empty where they were not asked for"
+        'surface, "pack" or "backstop", and time of touch since the start, s, of every contact that begins'
+        " in between, in order; empty if not requested"
     )
     margin: float = part(
-        "signed nearness of a grazing, in units of the way from backstop to pack",
-        more="of all local extrema of the displacement, how far the one nearest to the pack's front or to"
-        " the backstop's position lies beyond it in its own direction, so that it passes through 0 where a"
-        " contact appears, vanishes, parts or merges. An impact on a rigid backstop counts with the square of"
-        " its speed in units of the typical speed. NaN where there is none, or where it was not asked for",
+        "signed distance from a grazing, in units of the distance from backstop to pack",
+        more="overshoot of that local extremum of the displacement that is closest to the pack's front or to"
+        " the backstop, positive beyond the surface in the direction of the extremum, so that it passes"
+        " through 0 where a contact appears, vanishes, splits or merges. An impact on a rigid backstop"
+        " counts with the square of its speed in units of the typical speed. NaN without an extremum, or"
+        " if not requested",
     )
 
     @property

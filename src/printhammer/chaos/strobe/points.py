@@ -66,18 +66,18 @@ class Strobe(Result):
     hammer: Hammer = part("the hammer")
     drive: Drive = part("the drive")
     period: float = scalar("s", "time between firings")
-    phase: float = scalar("1", "part of the period between a firing and its point")
+    phase: float = scalar("1", "time from a firing to its point, as a fraction of the period")
     firing: IntArray = coordinate(
-        "1", "number of the firing", "firing", more="the very first one is number 1", dtype=np.int32
+        "1", "number of the firing", "firing", more="the very first firing is number 1", dtype=np.int32
     )
     t: FloatArray = column("s", "time", "firing")
-    x: FloatArray = column("m", "displacement", "firing", more="nan where the run ended before")
-    v: FloatArray = column("m/s", "velocity", "firing", more="nan where the run ended before")
+    x: FloatArray = column("m", "displacement", "firing", more="nan after the end of the run")
+    v: FloatArray = column("m/s", "velocity", "firing", more="nan after the end of the run")
     branch: IntArray = column(
         "1",
         "mode of motion",
         "firing",
-        more="a place in `printhammer.run.ensemble.MODE_NAMES`, -1 where the run ended before",
+        more="as an index of `printhammer.run.ensemble.MODE_NAMES`, -1 after the end of the run",
         dtype=np.int32,
         codes=MODE_NAMES,
     )
@@ -85,12 +85,12 @@ class Strobe(Result):
         "m",
         "latest local maximum inside the pack",
         "firing",
-        more="0 but on the unloading branch",
+        more="0 except on the unloading branch",
     )
     status: str = part("how the run ended")
     tolerance: float = part("tolerance of the integration")
     verdict: Verdict | None = part(
-        "what kind of motion it is, with the evidence", more="None where it was not asked for"
+        "classification of the motion, with the evidence", more="None if not requested"
     )
     current: FloatArray | None = column(
         "A", "current in the coil", "firing", more="None unless a voltage drives it", default=None
@@ -232,7 +232,7 @@ def strobes(
     """
     count, skipped = read_count(points, "points"), read_count(transient, "transient", least=0)
     if not 1 <= firings[0] < firings[1]:
-        raise InputError.of("firings", firings, "the first and the last firing to judge, ascending")
+        raise InputError.of("firings", firings, "the first and the last firing to classify, ascending")
     fired = max(count + skipped, firings[1] if verdict else 1)
     many = regimes_of(hammers, periods, drives, waveform=waveform, overlap=overlap, phase=phase)
     table = None if states is None else np.asarray(states, dtype=np.float64)

@@ -83,9 +83,9 @@ class Train(Declared):
     """Regime fired from an initial state on, without earlier firings."""
 
     regime: Regime = part("hammer and periodic drive")
-    drive: Drive = part("a sequence of pulses, or the endless force")
+    drive: Drive = part("a sequence of pulses, or a continuous periodic force")
     state: tuple[float, ...] | None = part(
-        "displacement, m, velocity, m/s, and what else belongs to the state at time 0, as for"
+        "displacement, m, velocity, m/s, and further components of the state at time 0, as for"
         " `printhammer.simulate`",
         more="None for the rest state",
         default=None,

@@ -48,34 +48,37 @@ _STOPPED: Final = "the run ended before firing"
 class Verdict(Declared):
     """Classification of the motion of a train, with the evidence."""
 
-    name: str = part('"period-1", "period-2", ..., "strange", "superstable" or "undecided"')
-    period: int | None = part("number of firings after which the states repeat")
+    name: str = part(
+        'name of the class: "period-1", "period-2", ..., "strange", "superstable" or "undecided"'
+    )
+    period: int | None = part("number of firings after which the states repeat; None without a period")
     distance: float = part(
         "largest distance of states `nearest` firings apart, in half-widths of the window",
-        more="NaN where the run ended before",
+        more="NaN if the run ended before",
     )
     nearest: int | None = part(
         "number of firings, at most 64, after which the states come closest to repeating",
-        more="the period where there is one",
+        more="the period, if there is one",
     )
-    exponent: float = part("largest exponent of the strobe map, per firing; NaN where it was not computed")
+    exponent: float = part("largest exponent of the strobe map, per firing; NaN if not computed")
     standard_error: float = part("standard error of the exponent")
-    first: int = part("first firing that was judged; the very first one is number 1")
-    last: int = part("last firing that was judged")
+    first: int = part("first firing used for the classification; the very first firing is number 1")
+    last: int = part("last firing used for the classification")
     tolerance: float = part("tolerance of the integration")
     reason: str = part('why the verdict is "undecided"; else empty', default="")
     multiplier: float = part(
         "largest absolute Floquet multiplier of the orbit by which Newton's method confirmed the period",
-        more="NaN where the states alone show it",
+        more="NaN if the states alone prove it",
         default=math.nan,
     )
     rests: int = part(
-        "number of rests on the backstop, in a cycle of a motion that repeats, else in the judged firings",
-        more="0 where the exponent was not computed, and no cycle is longer than 4 firings",
+        "number of rests on the backstop, in one cycle of a motion that repeats, else in the classified"
+        " firings",
+        more="0 if the exponent was not computed and no cycle is longer than 4 firings",
         default=0,
     )
     elsewhere: tuple[tuple[float, str], ...] = part(
-        "tolerances and verdicts of the same train there, of a periodic motion that comes to rest",
+        "finer tolerances and the classification at each, for a periodic motion that comes to rest",
         default=(),
     )
 
