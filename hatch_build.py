@@ -25,10 +25,14 @@ class LoweredModules(BuildHookInterface[Any]):
         sys.path.insert(0, str(Path(self.root, "src")))
         from numba import TypingError
 
+        from printhammer.drive.trains import PulseTrain, SineForce
+        from printhammer.hammer.hammer import load, shipped
         from printhammer.kernel.compile.bindings import bindings_of
         from printhammer.kernel.compile.modules import Module, every_template, laws_of
+        from printhammer.kernel.compile.specialise import specialise
         from printhammer.kernel.model.laws import LAW_FUNCTIONS, Laws
         from printhammer.parts import PARTS
+        from printhammer.run import problem
 
         folder = tempfile.TemporaryDirectory()
         atexit.register(folder.cleanup)
@@ -49,3 +53,7 @@ class LoweredModules(BuildHookInterface[Any]):
                 # A law of more constants than a lane has room for never runs in lanes.
                 with suppress(TypingError):
                     ship(laws_of(role, bindings, True))
+        for hammer in map(load, shipped()):
+            # A textbook oscillator has no pulse of its own, and is driven by a force.
+            drive = PulseTrain(hammer.waveform) if hammer.waveform else SineForce(1.0, 1.0)
+            ship(specialise(problem.laws_of(hammer, drive)).web_module())

@@ -131,7 +131,7 @@ def test_the_wheel_holds_every_file_of_the_package_and_no_other(wheel: Path) -> 
     shipped = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     modules = {name for name in shipped if name.startswith("printhammer/kernel/modules/")}
     assert shipped - modules == ours
-    assert {Path(name).name.partition("_")[0] for name in modules} == {*KINDS, *LAW_FUNCTIONS}
+    assert {Path(name).name.partition("_")[0] for name in modules} == {*KINDS, *LAW_FUNCTIONS, "web"}
     assert {"printhammer/py.typed", "printhammer/hammers/hendriks-1983.toml"} <= shipped
     assert any(re.fullmatch(r"printhammer/claims/.*\.toml", name) for name in shipped)
     assert any(re.fullmatch(r"printhammer/.*\.(html|jinja|j2)", name) for name in shipped)
@@ -167,7 +167,33 @@ assert "numba" not in sys.modules
 """
     assert output_of(elsewhere / "python", "-c", code, cwd=tmp_path) == ""
     kept = [path.suffix for path in (tmp_path / "empty").rglob("*") if path.is_file()]
-    assert set(kept) == {".code", ".json"}
+    assert set(kept) == {".code", ".json", ".digest"}
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_the_kernels_of_shipped_hammers_in_webassembly(
+    wheel: Path, elsewhere: Path, tmp_path: Path
+) -> None:
+    code = """
+import os, sys
+os.environ["NUMBA_CACHE_DIR"] = "empty"
+sys.modules["ziglang"] = None
+import printhammer as ph
+from printhammer.hammer.hammer import shipped
+from printhammer.run.problem import Problem
+for hammer in map(ph.load, shipped()):
+    drive = ph.PulseTrain(hammer.waveform) if hammer.waveform else ph.SineForce(1.0, 1.0)
+    kernel = Problem(hammer, drive, (0.0, 0.0), 0.0, 1e-9).kernel
+    assert kernel.web_module().content().startswith(b"\\0asm")
+try:
+    kernel.web_module(["run"]).content()
+except ph.InputError as error:
+    assert error.key == "page"
+else:
+    raise AssertionError
+"""
+    assert output_of(elsewhere / "python", "-c", code, cwd=tmp_path) == ""
+    assert wheel.stat().st_size <= 8_000_000
 
 
 @pytest.mark.slow

@@ -146,7 +146,7 @@ def assert_close(found: FloatArray, expected: FloatArray) -> None:
 def test_a_module_computes_what_machine_code_computes(name: str, tmp_path: Path) -> None:
     problem, end = problem_of(name)
     path = tmp_path / "kernel.wasm"
-    path.write_bytes(problem.kernel.web_module())
+    path.write_bytes(problem.kernel.web_module().content())
     host = Wasmtime(path.read_bytes())
     assert host.imports == []
     times = np.linspace(0.0, end, 401)

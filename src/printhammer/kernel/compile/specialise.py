@@ -8,7 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from printhammer.kernel.compile.bindings import bindings_of
-from printhammer.kernel.compile.modules import Entry, one_at_a_time, web_module_of
+from printhammer.kernel.compile.modules import Entry, WebModule, one_at_a_time, web_module_of
 from printhammer.kernel.compile.templates import TEMPLATES, VARIATIONAL, compile_law, execute_all
 from printhammer.kernel.variational.layout import changing, electric_row
 
@@ -70,15 +70,15 @@ class Kernel:
         """Whether an entry point is compiled in this process or has machine code on disk."""
         return name not in self._entries or self._entries[name].is_ready()
 
-    def web_module(self, names: Sequence[str] = ENTRIES, *others: Kernel) -> bytes:
-        """Return entry points as one module of WebAssembly, with all of `others`.
+    def web_module(self, names: Sequence[str] = ENTRIES, *others: Kernel) -> WebModule:
+        """Return the module of WebAssembly of entry points, and of all those of `others`.
 
-        It is called as :mod:`printhammer.kernel.compile.web.build` says. InputError if it has to be made and
-        the extra `page` is not installed.
+        It is called as :mod:`printhammer.kernel.compile.web.build` says. Its content ships for the laws of
+        shipped hammers; making it takes the extra `page`.
         """
         entries = [self._entries[name] for name in names]
         entries += [entry for other in others for entry in other._entries.values()]
-        return web_module_of(entries).content()
+        return web_module_of(entries)
 
     @functools.cached_property
     def namespace(self) -> dict[str, Any]:
