@@ -90,7 +90,7 @@ AXES: Final = {
 
 @dataclass(frozen=True)
 class AxisTables:
-    """Tables for ascending values of an axis, SI, with interpolation between them."""
+    """Compensation tables for ascending values of an axis, SI, with interpolation between the values."""
 
     axis: str
     values: tuple[float, ...]

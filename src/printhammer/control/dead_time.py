@@ -48,7 +48,7 @@ def header_text(
     temperature: FloatArray,
     tables: Mapping[str, FloatArray],
 ) -> str:
-    """Render a C header (C99) in millivolts, tenths of a degree Celsius, and nanoseconds.
+    """Render tables of times as a C header (C99), in mV, tenths of a degree Celsius, and nanoseconds.
 
     `tables` are times, s, by name, over rails, V, and temperatures, degC; NaN becomes 0.
     """
@@ -242,7 +242,7 @@ def dead_time(
     effort: Effort = DEFAULT,
     **_keywords: Unpack[InOneThread],
 ) -> DeadTime:
-    """Compute the time from switching on to impact, and the pulse width of equal impact speed.
+    """Compute the time to impact, and the pulse width of equal impact speed, by rail and temperature.
 
     Parameters
     ----------

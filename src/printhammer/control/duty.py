@@ -59,7 +59,7 @@ class DotHeat:
     heat: tuple[float, ...]
     """Heat of one dot at these temperatures, J."""
     feed: str
-    """One of `FEEDS`: the law by which the heat is extrapolated and interpolated."""
+    """Quantity that the driver keeps constant, from `FEEDS`; selects how the heat is interpolated."""
     on_time: float = 0.0
     """On-time of the driver per dot, s; 0 if unknown."""
     strike: str = "dot"
@@ -170,7 +170,7 @@ class ThermalDuty(Result, rows="ambient burst"):
 
     @property
     def strike(self) -> str:
-        """Noun for a dot of the hammer that the heat is of."""
+        """Noun for a dot of the hammer, see `Hammer.strike`."""
         return self.heat.strike
 
     def summary(self) -> Summary:

@@ -46,7 +46,7 @@ class Drive:
 
     @property
     def waveform(self) -> Waveform:
-        """Waveform of every firing."""
+        """Waveform of every firing; of a sequence, the waveform of the first firing."""
         return self._waveform
 
     @property
@@ -138,7 +138,7 @@ class Drive:
         return largest_sum(np.unique(np.add.outer(shortest.times, self._segments[:, 0])), shortest.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy scaled by `factor`."""
+        """Return a copy of the drive with all values scaled by `factor`."""
         return self._with_waveform(self._waveform.scaled(read_number(factor, "1", "factor")))
 
     def to_toml(self) -> str:

@@ -29,7 +29,7 @@ from printhammer.support.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True, eq=False)
 class Ragged:
-    """Rows of unequal length.
+    """Rows of unequal length, stored in one flat array.
 
     Attributes
     ----------
@@ -44,13 +44,13 @@ class Ragged:
 
     @classmethod
     def of(cls, rows: Sequence[npt.NDArray[Any]]) -> Self:
-        """Concatenate rows."""
+        """Concatenate a sequence of rows."""
         counts = np.array([len(row) for row in rows], dtype=np.int64)
         return cls(np.concatenate(rows) if rows else np.zeros(0), starts_of(counts))
 
     @classmethod
     def even(cls, table: npt.NDArray[Any]) -> Self:
-        """Convert a table, shape (rows, columns), to rows."""
+        """Convert a table, shape (rows, columns), to rows of equal length."""
         rows, columns = table.shape
         return cls(table.ravel(), columns * np.arange(rows + 1, dtype=np.int64))
 
@@ -62,7 +62,7 @@ class Ragged:
 
     @classmethod
     def empty(cls, rows: int) -> Self:
-        """Create a number of empty rows."""
+        """Create `Ragged` with a number of empty rows."""
         return cls(np.zeros(0), np.zeros(rows + 1, np.int64))
 
     def __len__(self) -> int:
@@ -149,7 +149,7 @@ class PulseTrains(Sequence[PulseTrain]):
         overlap: Overlap = "add",
         start: float | str = 0.0,
     ) -> Self:
-        """Create trains of equal length at constant rates, Hz, with the first firing at `start`, s."""
+        """Create pulse trains of equal length at constant rates, Hz, with the first firing at `start`, s."""
         grid = read_array(rates, "rates", "numbers, Hz", "Hz").reshape(-1)
         steps = np.arange(read_count(pulses, "pulses"), dtype=np.float64)
         with np.errstate(all="ignore"):
@@ -165,7 +165,7 @@ class PulseTrains(Sequence[PulseTrain]):
 
     @classmethod
     def of_parts(cls, parts: Sequence[PulseTrains]) -> Self:
-        """Concatenate one or more batches of trains."""
+        """Concatenate one or more batches of pulse trains into one batch."""
         places: dict[tuple[int, str], int] = {}
         pulses: list[PulseTrain] = []
         pulse_of = []
@@ -225,7 +225,7 @@ class PulseTrains(Sequence[PulseTrain]):
         return self._pulse_of
 
     def __len__(self) -> int:
-        """Return the number of trains."""
+        """Return the number of pulse trains."""
         return len(self._firings)
 
     @overload
@@ -233,7 +233,7 @@ class PulseTrains(Sequence[PulseTrain]):
     @overload
     def __getitem__(self, index: slice) -> Self: ...
     def __getitem__(self, index: int | slice) -> PulseTrain | Self:
-        """Return a train by index, or a slice as a batch of the same kind."""
+        """Return a pulse train by index, or the pulse trains of a slice as a batch."""
         if isinstance(index, slice):
             return self.take(np.arange(len(self))[index])
         place = range(len(self))[index]
@@ -242,7 +242,7 @@ class PulseTrains(Sequence[PulseTrain]):
         return pulse._with_checked_times(self._firings[place], None if np.isnan(rate) else rate)
 
     def take(self, which: IntArray) -> Self:
-        """Return the trains with the given indices."""
+        """Return the pulse trains with the given indices, as a batch."""
         result = type(self).__new__(type(self))
         result._place(self._pulses, self._pulse_of[which], self._firings.take(which), self._rates[which])
         return result

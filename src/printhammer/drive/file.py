@@ -64,7 +64,7 @@ _MAKERS: Final[dict[str, Callable[..., Drive]]] = {"train": PulseTrain, "times":
 
 
 def load_drive(path: str | Path, waveform: Waveform | None = None) -> Drive:
-    """Read a drive file.
+    """Read a drive from a drive file (TOML).
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ class PulseSequence(Drive):
         return largest_sum(np.unique(np.concatenate([some.ravel() for some in edges])), self.value)
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy scaled by `factor`; errors as for `Drive.scaled`."""
+        """Return a copy of the drive with all values scaled by `factor`; errors as for `Drive.scaled`."""
         number = read_number(factor, "1", "factor")
         scaled = {id(waveform): waveform.scaled(number) for waveform in self._waveforms}
         result = copy(self)

@@ -214,7 +214,7 @@ def _draw(
     folder: Path,
     written: list[Path],
 ) -> Drawing | None:
-    """Draw a figure into a folder; return None if the figure has no function."""
+    """Draw a figure into a folder; return None if no drawing function exists for its number."""
     from printhammer.figures import FIGURES, save
 
     if number not in FIGURES:

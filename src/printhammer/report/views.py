@@ -62,7 +62,7 @@ def rates_view(report: Report) -> dict[str, Any] | None:
 
 
 def panels_view(report: Report) -> list[dict[str, Any]]:
-    """Return the panels of Fig. 11: printed verdict, computed verdict, and frequency by chance."""
+    """Return the panels of Fig. 11: printed verdict, computed verdict, and frequency by random hammers."""
     verdicts: list[str] = []
     for result in report.results:
         if result.claim.name == "poincare" and result.value is not None:

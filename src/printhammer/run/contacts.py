@@ -42,7 +42,7 @@ class Contact(Declared):
 
 
 class Dot(Declared):
-    """Dot of one firing on the paper.
+    """Dot that one firing makes on the paper.
 
     The first pack contact after a firing makes its dot, see `printhammer.kernel.model.dots`; a firing without
     one is a lost dot.
@@ -180,7 +180,7 @@ def loading_works(
 
 
 def dots_of(times: FloatArray, contacts: Sequence[Contact], works: FloatArray, t_end: float) -> list[Dot]:
-    """Return the dots of all firings up to `t_end`, s."""
+    """Return the dots of all firings up to `t_end`, s, lost dots included."""
     owned: dict[int, list[int]] = {}
     for row, (contact, number) in enumerate(zip(contacts, contact_numbers(contacts), strict=True)):
         if number != NO_DOT and contact.firing is not None:

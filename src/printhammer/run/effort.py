@@ -24,37 +24,37 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class OfTolerance(TypedDict, total=False):
-    """The keyword `tolerance` of a public function."""
+    """Type of the keyword argument `tolerance` of a public function."""
 
     tolerance: float
 
 
 class OfThreads(TypedDict, total=False):
-    """The keyword `threads` of a public function."""
+    """Type of the keyword argument `threads` of a public function."""
 
     threads: int | None
 
 
 class OfProgress(TypedDict, total=False):
-    """The keyword `progress` of a public function."""
+    """Type of the keyword argument `progress` of a public function."""
 
     progress: Progress | None
 
 
 class InThreads(OfTolerance, OfThreads):
-    """Keywords of a public function without progress reports."""
+    """Types of the keyword arguments `tolerance` and `threads`, for functions without progress reports."""
 
 
 class InOneThread(OfTolerance, OfProgress):
-    """Keywords of a public function that works in the calling thread."""
+    """Types of the keyword arguments `tolerance` and `progress`, for functions that use a single thread."""
 
 
 class AtFixedTolerance(OfThreads, OfProgress):
-    """Keywords of a public function that chooses its tolerances itself."""
+    """Types of the keyword arguments `threads` and `progress`, for functions with fixed tolerances."""
 
 
 class Keywords(OfTolerance, OfThreads, OfProgress):
-    """The keywords `tolerance`, `threads` and `progress` of a public function."""
+    """Types of the keyword arguments `tolerance`, `threads` and `progress` of a public function."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Effort:
     threads: int | None = None
     """Number of threads; None for one per core."""
     progress: Progress | None = None
-    """Callback of the number of steps done and in total."""
+    """Callback that receives the number of steps done and the total number of steps."""
 
     def __post_init__(self) -> None:
         check_tolerance(self.tolerance)
@@ -84,7 +84,7 @@ class Effort:
 
     @property
     def running(self) -> AtFixedTolerance:
-        """Keywords `threads` and `progress` for `Ensemble.run`; the ensemble already has its tolerance."""
+        """Keyword arguments `threads` and `progress` for `Ensemble.run`; the ensemble sets the tolerance."""
         return {"threads": self.threads, "progress": self.progress}
 
     def at(self, tolerance: float) -> Effort:

@@ -139,7 +139,7 @@ _POINTS, _PIECES = 10, 8
 
 
 class Ledger(Declared):
-    """Energies of a run, J."""
+    """Energy ledger of a run, J: works, losses, and changes of kinetic and stored energy."""
 
     coil_work: float = scalar("J", "integral of (Fm(x, I) - Fm(x, 0)) v dt")
     drive_work: float = scalar("J", "work of a drive that is a force")

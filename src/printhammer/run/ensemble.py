@@ -258,7 +258,7 @@ class Ensemble:
 
     @cached_property
     def groups(self) -> list[Group]:
-        """Members, grouped by the laws of their parts."""
+        """Members of the ensemble, grouped by the laws of their hammers' parts."""
         fired = Fired(self.drives)
         hammers, hammer_of = self._own_hammers
         # The kernel of a member depends on its hammer and on the form of its drive.
@@ -327,7 +327,7 @@ class Ensemble:
         progress: Progress | None = None,
         engine: Engine = "auto",
     ) -> EnsembleResult:
-        """Integrate all members.
+        """Integrate all members; return the status of each run and the requested results.
 
         Parameters
         ----------

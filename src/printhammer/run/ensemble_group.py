@@ -111,7 +111,7 @@ class Group:
         )
 
     def fits_lanes(self) -> bool:
-        """Whether a kernel for lanes exists for these members."""
+        """Whether the vector-lane kernel supports these members."""
         from printhammer.kernel.compile.lanes import suits
 
         if self.lane_kinds is None or self.laws.circuit or not suits(self.laws):
@@ -125,7 +125,7 @@ class Group:
 
     @property
     def lane_kernel(self) -> Kernel:
-        """Compiled kernel for lanes."""
+        """Compiled vector-lane kernel for the laws of the group."""
         from printhammer.kernel.compile.lanes import specialise_lanes
 
         if self.lane_kinds is None:
@@ -316,7 +316,7 @@ class Job:
         self._one_by_one(self.order[first:last])
 
     def lane_piece(self, first: int, last: int) -> None:
-        """Integrate members of the group in lanes, in this thread."""
+        """Integrate members of the group in vector lanes, in this thread."""
         group = self.group
         which = self.order[first:last]
         left_over = np.empty(which.size, np.int64)

@@ -71,7 +71,7 @@ class Record(Declared):
 
     @property
     def status_name(self) -> str:
-        """Name of the status."""
+        """Name of the status, such as "ok" or "step limit"."""
         return STATUS_NAMES[self.status]
 
 
@@ -362,7 +362,7 @@ class Problem:
         return out
 
     def quadratures(self, record: Record, steps: Any, starts: FloatArray, ends: FloatArray) -> FloatArray:
-        """Return work of coil and drive force, losses in pack, backstop, damping [J], shape (n, 5)."""
+        """Integrate coil and drive work, and pack, backstop and damping loss, over intervals, J, (n, 5)."""
         out = np.empty((len(steps), 9 if self.laws.circuit else 5))
         self.kernel.quadratures(
             np.ascontiguousarray(steps, np.int64),

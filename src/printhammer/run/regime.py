@@ -2,7 +2,7 @@
 
 The k-th firing of a pulse train is at k times its period; a rate is converted to the period 1 / rate.
 
-`Window` is the window in which strobe points are drawn; distances are measured in its half-widths.
+`Window` is the window of strobe plots; distances between states are measured in its half-widths.
 """
 
 from __future__ import annotations
@@ -51,18 +51,18 @@ _PART: Final = 1.0 / 6.0  # Half-width of the paper's window relative to the way
 
 
 class Window(Declared):
-    """Rectangle in the plane of displacement and velocity."""
+    """Window of strobe plots: a rectangle in the plane of displacement and velocity."""
 
     x: tuple[float, float] = scalar("m", "least and largest displacement")
     v: tuple[float, float] = scalar("m/s", "least and largest velocity")
 
     @property
     def half_widths(self) -> FloatArray:
-        """Half-widths, m and m/s, shape (2,)."""
+        """Half-widths of the window, m and m/s, shape (2,)."""
         return 0.5 * np.array([self.x[1] - self.x[0], self.v[1] - self.v[0]])
 
     def inside(self, x: FloatArray, v: FloatArray) -> BoolArray:
-        """Whether states lie inside, shape (n,)."""
+        """Return a mask of the states inside the window, shape (n,)."""
         return (self.x[0] <= x) & (x <= self.x[1]) & (self.v[0] <= v) & (v <= self.v[1])
 
 
@@ -71,7 +71,7 @@ PAPER_WINDOW: Final = Window(PAPER_X, PAPER_V)
 
 
 def window_of(hammer: Hammer, drive: Drive) -> Window:
-    """Return the window of a hammer under a drive.
+    """Return the window of strobe plots for a hammer under a drive.
 
     The window is that of Fig. 11 if backstop and pack have the positions of the paper. For other hammers the
     half-widths are a sixth of the distance from backstop to pack, as in Fig. 11, and a sixth of the speed
@@ -286,7 +286,7 @@ class Regime(Declared):
 
     @property
     def window(self) -> Window:
-        """Window in which strobe points are plotted; its half-widths are the unit of distances."""
+        """Window of strobe plots; its half-widths are the unit of distances between states."""
         return window_of(self.hammer, self.train(1)[0])
 
     def value(self, name: str) -> float:

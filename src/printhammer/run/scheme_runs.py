@@ -100,7 +100,7 @@ class SchemeProblem(Problem):
     ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray, str]:
         """Return time, displacement, velocity, mode and memory at moments, s, and the status.
 
-        After a failure of the scheme they are NaN, and the mode is -1.
+        After a failure of the scheme, these values are NaN, and the mode is -1.
         """
         run = self.integrate(float(moments[-1]), moments)
         t, x, v, memory = np.full((4, moments.size), np.nan)
@@ -207,7 +207,7 @@ class SchemeProblem(Problem):
         starts: FloatArray,
         ends: FloatArray,
     ) -> FloatArray:
-        """Return work of coil and drive force, losses in pack, backstop, damping [J], shape (n, 5)."""
+        """Integrate coil and drive work, and pack, backstop and damping loss, over intervals, J, (n, 5)."""
         points, weights = _GAUSS
         half = 0.5 * (np.asarray(ends) - np.asarray(starts))
         times = (np.asarray(starts) + half)[:, None] + half[:, None] * points

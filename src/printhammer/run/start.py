@@ -150,7 +150,7 @@ def state_to_begin(
 ) -> tuple[float, float, float, float] | None:
     """Return displacement, velocity, branch and memory from which another run can continue.
 
-    None if no run can, since the pack has released the armature.
+    The result is None if no run can continue, since the pack has released the armature.
     """
     branch = HELD_BRANCHES.get(mode, mode)
     if mode == PACK_RELEASED:

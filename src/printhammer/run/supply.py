@@ -31,7 +31,7 @@ def waveforms_of(drive: Drive) -> tuple[Waveform, ...]:
 
 
 def supply_of(drive: Drive) -> Supply:
-    """Return the supply of a drive by voltage."""
+    """Return the supply of a voltage drive; all of its waveforms share one supply."""
     supplies = {waveform.supply() for waveform in waveforms_of(drive)}
     if len(supplies) > 1:
         raise InputError(

@@ -59,7 +59,7 @@ class Axis(Declared, eq=False):
 
     @property
     def counts(self) -> bool:
-        """Whether the values are integers."""
+        """Whether the values of the axis are counts, i.e. integers."""
         return self.target == "drive" and self.field in COUNTS
 
 

@@ -37,7 +37,7 @@ _PARTS: Final = 8  # Pieces of a block that kills its worker; arbitrary
 
 
 class _GoneError(Exception):
-    """The scheduler has lost a task."""
+    """Raised when the scheduler has lost a task."""
 
 
 def run_dask(

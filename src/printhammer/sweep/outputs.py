@@ -40,7 +40,7 @@ TIME: Final = "time"
 
 @dataclass(frozen=True)
 class Output:
-    """Output array: name, dimension after those of the members, type, unit, meaning."""
+    """Output array of a sweep: name, dimension after the member dimensions, type, unit, meaning."""
 
     name: str
     dim: str

@@ -79,7 +79,7 @@ class Blocks(Declared):
 
     @property
     def number(self) -> int:
-        """Number of blocks."""
+        """Total number of blocks."""
         return math.prod(self.counts)
 
     def indices(self) -> Iterator[tuple[int, ...]]:
@@ -94,7 +94,7 @@ class Blocks(Declared):
         )
 
     def members(self, index: Sequence[int]) -> range:
-        """Return the indices of the members of a block."""
+        """Return the member indices of a block, in the order of the members."""
         first = 0
         for i, length, chunk in zip(index, self.shape, self.chunks, strict=True):
             first = first * length + i * chunk
@@ -123,7 +123,7 @@ class Plan(Declared):
 
     @property
     def members(self) -> int:
-        """Number of members."""
+        """Number of members of the sweep."""
         return math.prod(self.shape)
 
     @cached_property
@@ -147,7 +147,7 @@ class Plan(Declared):
         return np.stack(columns, axis=1)
 
     def layout(self) -> Layout:
-        """Return the layout of the store."""
+        """Return the layout of the store: arrays, coordinates and attributes."""
         outputs = self.spec.outputs
         trailing = {"": (), FIRING: (FIRING,), TIME: (TIME,)}
         results = [

@@ -136,7 +136,7 @@ class OutputsTable(_Table):
 
 
 class SpecTable(_Table):
-    """Specification of a sweep."""
+    """Top-level table of a sweep spec."""
 
     format: Literal[1] = Field(description="version of the spec format")
     title: str = Field("", description="one-line description")

@@ -311,7 +311,7 @@ class Controller:
             pulse.switch(loop.touch + end, 0.0)
 
     def _landings(self, kind: Any, speed: FloatArray, front: FloatArray) -> list[FloatArray]:
-        """Interpolate release, start and width of the brake pulse for touches."""
+        """Interpolate, for touches, the release time and the start and width of the brake pulse, s."""
         below, share = between(self.fronts.table, kind, speed)
         nearer, farther = between_fronts(front)
         settings = []

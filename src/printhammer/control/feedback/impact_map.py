@@ -33,8 +33,8 @@ _FREE_SPEEDS: Final = np.linspace(0.6, 1.25, 14)
 _RETURNS: Final = (0.0, -0.4, -1.0)  # Return currents, as fractions of the largest current
 
 FORCES: Final = (0.95, 1.0, 1.05)
-"""Forces for which actions are computed, relative to the single pulse. In the order of actions, only the
-return current varies more slowly."""
+"""Forces for which actions are computed, as fractions of the single-pulse force. Actions are enumerated with
+the return current as the slowest index and the force as the next."""
 
 # Widths of the pushes that end before the touch, as fractions of the launch width
 _WIDTHS: Final = (0.85, 1.0, 1.2)
@@ -128,7 +128,7 @@ def force_map(plant: Plant) -> ForceMap:
 
 
 def released_forces(plant: Plant, forces: ForceMap, keys: list[tuple[int, float, float]]) -> FloatArray:
-    """Simulate the forces of touches by row, release, s, and return current, A; NaN for a failed run."""
+    """Simulate peak forces for triples of touch index, release, s, and return current, A; NaN if failed."""
     long = _WATCHED * plant.single.flight_time
     drives = [
         plant.driver.drive([first_pulse(int(forces.kind[row]), release, back, long, plant.driver)])

@@ -43,10 +43,10 @@ OFFSETS: Final = (-0.07, 0.0, 0.07)
 """Offsets of the front in the maps, away from the armature, as fractions of the stroke; evenly spaced."""
 
 STEPS: Final = 100
-"""Progress steps per distance."""
+"""Number of progress steps for each distance of the pack."""
 
 _MAPPING: Final = 70
-"""Progress steps per distance up to the completion of the impact map."""
+"""Number of progress steps, for each distance of the pack, up to the completion of the impact map."""
 
 MIDDLE: Final = 1  # Index of the nominal distance
 
@@ -172,7 +172,7 @@ class Policy:
         return np.asarray(cost / self.period)
 
     def ahead(self, kind: IntArray, late: FloatArray, speed: FloatArray, costs: FloatArray) -> FloatArray:
-        """Interpolate the cost-to-go of touches, the dot of the touch included."""
+        """Interpolate the cost-to-go of touches, including the cost of the dot made at the touch."""
         kinds, lates, speeds = np.broadcast_arrays(kind, late, speed)
         total = np.full(kinds.shape, NEVER)
         end = self._late[-1]

@@ -156,7 +156,7 @@ class LeastWork(Result, rows="node"):
 
     @property
     def contacts(self) -> Rows[Contact]:
-        """Pack contacts, in order."""
+        """Pack contacts of the burst, in order of touch."""
         touched = (contact for contact in self.motion.contacts if contact.surface == "pack")
         return Rows(touched, Contact)
 

@@ -248,7 +248,7 @@ def sequence(
 ) -> PulseSequence:
     """Assemble the drive of a pattern from a pulse shape of variable width.
 
-    `known` caches waveforms by width, brake width and brake offset; it is updated.
+    `known` is a cache of waveforms by width, brake width and brake offset; the cache is updated in place.
     """
     waveforms = []
     for width, braked, offset in zip(*(values.tolist() for values in pulses[3:]), strict=True):

@@ -142,7 +142,7 @@ def judge_table(
     """Compare a table with open loop on hammers that differ from its design.
 
     The patterns are those of the safe rate, long ones included, and random patterns. The dots of every hammer
-    are judged by the single pulse of the hammer that the table is made for.
+    are compared with the single-pulse dot of the hammer that the table is made for.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def _growth(driven: Sequence[Hammer], rate: float, strategy: Strategy, effort: E
 
 
 def _sets(seed: int) -> dict[str, tuple[Sequence[tuple[int, ...]], int | Sequence[int]]]:
-    """Return the patterns of each set in `SETS`, with the index of the first judged slot."""
+    """Return the patterns of each set in `SETS`, with the index of the first evaluated slot."""
     long = {kind: [each for each in long_patterns() if each.kind == kind] for kind in KINDS}
     judged = {
         kind: ([each.slots for each in some], [each.judged_from for each in some])

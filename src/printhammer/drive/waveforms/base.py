@@ -103,7 +103,7 @@ class Waveform(BaseModel):
 
     @abstractmethod
     def scaled(self, factor: float) -> Self:
-        """Return a copy scaled by `factor`."""
+        """Return a copy of the waveform with its values scaled by `factor`."""
 
     def value(self, tau: npt.ArrayLike) -> FloatArray:
         """Value, A or N, at times tau since the firing, s; right-continuous, zero outside the support."""
@@ -111,7 +111,7 @@ class Waveform(BaseModel):
 
     @property
     def peak(self) -> float:
-        """Largest absolute value, A or N."""
+        """Largest absolute value of the waveform, A or N."""
         return largest(self.segments())
 
     @property

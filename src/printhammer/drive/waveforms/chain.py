@@ -72,7 +72,7 @@ class Chain(Waveform):
         return table(rows[:-1], rows[-1][0])
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy scaled by `factor`."""
+        """Return a copy with all parts scaled by `factor`."""
         return type(self)(parts=tuple((offset, part.scaled(factor)) for offset, part in self.parts))
 
 

@@ -34,7 +34,7 @@ DIODE = 0.7
 
 
 class _Driver(Waveform):
-    """Supply switched on for a time, and the path of the current afterwards."""
+    """Base class of drivers: supply switched on for a time, and the path of the current afterwards."""
 
     quantity: QuantityName = "voltage"
     voltage: float = measured("V", "V", "voltage of the supply", gt=0.0)
@@ -261,7 +261,7 @@ class Switched(Waveform):
         return switched_table(self.at, self.levels, self.edge, self.initial)
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy scaled by `factor`."""
+        """Return a copy with all levels scaled by `factor`."""
         levels = tuple(factor * level for level in self.levels)
         return self.model_copy(update={"levels": levels, "initial": factor * self.initial})
 

@@ -116,7 +116,7 @@ def read_csv(path: Path) -> Samples:
 
 
 def _held(times: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Hold each level until the next row: insert it again, by the length of an edge, before that row."""
+    """Hold each level until the next row: insert a copy of the level an edge length before that row."""
     before = times[1:] - min(_EDGE, 0.5 * float(np.diff(times).min()))
     order = np.argsort(times := np.concatenate([times, before]))
     return times[order], np.concatenate([values, values[:-1]])[order]
@@ -196,7 +196,7 @@ class Sampled(Waveform):
         return table(rows, float(t[-1]))
 
     def scaled(self, factor: float) -> Self:
-        """Return a copy scaled by `factor`."""
+        """Return a copy with all samples scaled by `factor`."""
         return self.from_samples(
             self.times, self.values * factor, quantity=self.quantity, interpolation=self.interpolation
         )

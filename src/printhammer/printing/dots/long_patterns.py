@@ -33,7 +33,7 @@ class LongPattern(NamedTuple):
 
 
 def row_of_dots(step: int = 1) -> tuple[int, ...]:
-    """Return the slots of a row of `ROW` slots with a dot in every `step`-th one."""
+    """Return the slots with a dot in a row of `ROW` slots, of which every `step`-th slot has a dot."""
     return tuple(range(0, ROW, step))
 
 

@@ -141,7 +141,7 @@ def simulate_pieces(
 
 
 def _joined(first: Contact, then: Contact) -> Contact:
-    """Join the two segments of one contact."""
+    """Merge the two parts of a contact that was split between segments."""
     higher = then if then.depth > first.depth else first
     return replace(
         first,

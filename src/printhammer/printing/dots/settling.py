@@ -57,12 +57,12 @@ class Rebound:
 
     @property
     def duration(self) -> float:
-        """Duration, s."""
+        """Duration of the rebound, s."""
         return self.end - self.start
 
 
 class Settling(Declared):
-    """Settling after a single pulse."""
+    """Settling after a single pulse: settle-out time, rebounds, load on the backstop, coil work."""
 
     settle_out: float | None = scalar(
         "s",
@@ -111,7 +111,7 @@ def settle(hammer: Hammer, waveform: Waveform | None = None, *, tolerance: float
 
 
 def undisturbed_rate(hammer: Hammer) -> float:
-    """Return a rate, Hz, up to which each pulse of a hammer finds it exactly at rest; 0 if there is none.
+    """Return a rate, Hz, up to which each pulse finds the armature exactly at rest; 0 if there is none.
 
     A device with a rigid backstop and a driver that ends its current is at rest to the last bit some time
     after a pulse. A pattern of pulses further apart is a sequence of equal dots.

@@ -92,10 +92,11 @@ def slot_times(slots: Sequence[int] | IntArray, rate: float, first: float = FIRS
 class Strategy(Protocol):
     """A drive strategy: a function that returns a drive for each dot pattern.
 
-    It is called with the hammer to drive, which may differ from the hammer that the strategy was designed
-    for, the patterns as indices of the slots with a dot, and the slot rate, Hz. Each drive has one firing for
-    each requested dot, in order; slot 0 is at `FIRST_SLOT` of `printhammer.printing.dots.strategy`, so that a
-    dot may be fired ahead of its slot. The drive of a pattern must not depend on the other patterns.
+    A strategy is called with the hammer to drive, which may differ from the hammer that the strategy was
+    designed for, the patterns as indices of the slots with a dot, and the slot rate, Hz. Each drive has one
+    firing for each requested dot, in order; slot 0 is at `FIRST_SLOT` of
+    `printhammer.printing.dots.strategy`, so that a dot may be fired ahead of its slot. The drive of a pattern
+    must not depend on the other patterns.
     """
 
     def __call__(

@@ -280,7 +280,7 @@ class Pattern(Declared):
 
     @property
     def wires(self) -> int:
-        """Number of wires."""
+        """Number of wires of the head."""
         return int(self.dots.shape[1])
 
     @property
