@@ -16,7 +16,8 @@ temperature, whereas a real winding is hotter inside.
 
 Heat of one dot: the resistance of copper rises by 0.393 % per kelvin of its value at 20 degC. A pulse on a
 rail that is long compared with L / R draws less current through a warm winding and heats it less; a driver
-that regulates the current heats it more; a driver that regulates the energy of a dot heats it the same.
+that regulates the current heats it more; a driver that regulates the energy of a dot heats a warm and a cold
+winding alike.
 """
 
 from __future__ import annotations

@@ -303,7 +303,7 @@ def errors_of(
 ) -> tuple[FloatArray, BoolArray]:
     """Return the errors of estimated impact times, s, and a mask of the estimates that are not flagged.
 
-    The dots cycle through the records, which are those of `unit_record`.
+    The dots cycle through the records, which `unit_record` simulates.
     """
     errors, believed = [], []
     for number in range(dots):

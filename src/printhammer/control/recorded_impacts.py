@@ -41,8 +41,8 @@ _UNEVEN: Final = 0.01
 class RecordedImpacts(Result, rows="record"):
     """Impact times in records of one single shot each.
 
-    The uncertainty is that of the estimator, from 20 simulated units of `Variability.of(hammer)` with the
-    noise of the record; an estimate that is no better than the nominal flight time has the flag "vague".
+    The uncertainty is the RMS error of the estimator on 20 simulated units of `Variability.of(hammer)` with
+    the noise of the record; an estimate that is no better than the nominal flight time has the flag "vague".
     """
 
     hammer: Hammer = part("nominal hammer")
@@ -104,7 +104,8 @@ def recorded_impacts(
     delay : float or str, optional
         Delay of the probe, s.
     bandwidth : float or str, optional
-        Bandwidth of the probe, Hz; by default that of a comment ``# bandwidth: 200 kHz``, else unlimited.
+        Bandwidth of the probe, Hz; by default the value in a comment ``# bandwidth: 200 kHz`` of the record,
+        else unlimited.
     columns : str, optional
         Contents of the columns of all tables, such as "time=1, current=2*-10 A/V"; by default as described in
         a file beside each table, else by its heading; see `printhammer.support.tables.columns`.

@@ -60,8 +60,8 @@ def coil_power(hammer: Hammer, x: FloatArray, v: FloatArray, magnet: FloatArray)
 def coil_work_of(problem: Problem, record: Record) -> CoilWork:
     """Integrate the coil power along a run, separately over intervals of positive and negative power.
 
-    The quadrature is that of the ledger. Steps in which the power changes sign are split there, so that every
-    integrand is smooth.
+    The quadrature is the same as for the ledger. Steps in which the power changes sign are split there, so
+    that every integrand is smooth.
     """
     start, end = float(record.nodes[0, 0]), float(record.nodes[-1, 0])
     resistance = problem.hammer.coil_resistance

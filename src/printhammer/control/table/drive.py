@@ -126,7 +126,7 @@ JUMP: Final = 8e-6
 class Settings(NamedTuple):
     """Entries of a compensation table at one rate: arrays of shape (entries,), by history number.
 
-    Meanings and units are those of the table's columns.
+    Meanings and units are as in the columns of `CompensationTable`.
     """
 
     advance: FloatArray
@@ -263,7 +263,8 @@ def sequence(
 Driver = Literal["own", "switch", "bridge"]
 DRIVERS: Final = get_args(Driver)
 """Drivers: the hammer's own pulse, with the rise of its supply; a fast unipolar switch, whose current rises
-as fast as that of the hammer falls; an H-bridge, which switches off against the reversed rail."""
+as fast as the current of the hammer's own pulse falls; an H-bridge, which switches off against the reversed
+rail."""
 
 # Decay time constant against the reversed rail over that of the rise: the current falls as 2 exp(-t) - 1 and
 # is zero at ln 2; an exponential decay with this constant carries the same charge.

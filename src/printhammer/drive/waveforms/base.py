@@ -106,7 +106,7 @@ class Waveform(BaseModel):
         """Return a copy of the waveform with its values scaled by `factor`."""
 
     def value(self, tau: npt.ArrayLike) -> FloatArray:
-        """Value, A or N, at times tau since the firing, s; right-continuous, zero outside the support."""
+        """Return values, A or N, at times tau after firing, s; right-continuous, 0 outside the support."""
         return evaluate(self.segments(), tau)
 
     @property
