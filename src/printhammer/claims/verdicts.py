@@ -101,7 +101,7 @@ def poincare(context: Context, claim: Claim) -> Measured:
     shown = []
     for verdicts in zip(*by_variant.values(), strict=True):
         kinds = list(dict.fromkeys(verdict.name for verdict in verdicts))
-        # A verdict that differs between the variants counts as undecided and never equals the printed one.
+        # Classifications that differ between the variants, joined by "or", never equal the printed one.
         shown.append(" or ".join(kinds))
     right = [name for name, kind, band in zip(names, shown, printed, strict=True) if kind == band]
     wrong = [
@@ -165,7 +165,7 @@ def no_period_doubling_cascade(context: Context, claim: Claim) -> Measured:
     first, last, step = (
         settings[name] for name in ("first_strobe_time_s", "last_strobe_time_s", "strobe_time_step_s")
     )
-    # Rounded to the numbers that one would write.
+    # Rounding removes the errors of the multiplication: the periods equal decimal numbers.
     periods = [round(first - step * k, 12) for k in range(round((first - last) / step) + 1)]
     judged = scan(context.hammer, periods, tolerance=context.tolerance, exponents=False)
     names = [_APERIODIC if verdict.period is None else verdict.name for verdict in judged]

@@ -144,7 +144,7 @@ class _Maps:
             ends[_with_memory(strobes)[:, 0]] = np.nan
             images[able] = ends / self.scales[own]
             if strobes.electric is not None and self.current is not None:
-                # The current forgets its past faster than the armature: it is updated from step to step.
+                # The current decays faster than the motion: an update after each Newton step suffices.
                 middle = np.flatnonzero(able)[::count] // count
                 self.current[rows[middle]] = strobes.electric[::count, 0]
         groups = np.asarray(images.reshape(-1, count, 2))

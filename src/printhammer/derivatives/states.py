@@ -26,7 +26,7 @@ from printhammer.run.problem import TOLERANCE, Problem, check_tolerance
 from printhammer.run.start import initial_state, state_beyond
 from printhammer.support.arrays import FloatArray
 
-_NODES: Final = 4096  # Nodes of a record in one stretch, which bounds the memory; arbitrary
+_NODES: Final = 4096  # Number of nodes of a record processed at once, which bounds the memory; arbitrary
 _WARM_UP: Final = 100
 """Number of firings during which perturbations align with the growth directions before averaging."""
 _FEWEST: Final = 8

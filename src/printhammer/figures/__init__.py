@@ -84,7 +84,7 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             "forces.force_loops",
             "A single pulse: force and displacement",
             "Total force against displacement over one cycle. Clockwise loops are energy given to the"
-            " armature, counter-clockwise loops energy lost; the insert shows the loops of settle-out.",
+            " armature, counter-clockwise loops energy lost; the inset shows the loops of settle-out.",
         ),
         PaperFigure(
             6,

@@ -113,22 +113,22 @@ VIEWS: Final = get_args(View)
 ZOOM_SHAPE: Final = 3.5
 """Width of the region of largest error, in units of the height of the column of wires."""
 
-_WIDTH: Final = 7.6  # Width of the figure, in
-_SIDE: Final = 0.2  # Margin at either side, in
-_LABEL: Final = 0.24  # Height of a heading, in
-_GAP: Final = 0.1  # Gap between panels, in
-_BESIDE: Final = 0.15  # Gap between panels side by side, in
+_WIDTH: Final = 7.6  # Width of the figure, inches
+_SIDE: Final = 0.2  # Margin at either side, inches
+_LABEL: Final = 0.24  # Height of a heading, inches
+_GAP: Final = 0.1  # Gap between panels, inches
+_BESIDE: Final = 0.15  # Gap between panels side by side, inches
 _UPRIGHT: Final = 0.5  # Ratio of height to width above which panels are side by side; arbitrary
-_BAR: Final = 1.5  # Length of the colour bar, in
+_BAR: Final = 1.5  # Length of the colour bar, inches
 _LEAST_MARK: Final = 1.8  # Smallest size of a mark, points
 _NEUTRAL: Final = "#c6ccd1"
-_TALLEST: Final = 4.5  # Largest height of a panel, in
-_LARGEST: Final = 0.1  # Largest distance between slots in the figure, in
-_FOOT: Final = 0.62  # Height of the text at the foot, in
+_TALLEST: Final = 4.5  # Largest height of a panel, inches
+_LARGEST: Final = 0.1  # Largest distance between slots in the figure, inches
+_FOOT: Final = 0.62  # Height of the text at the foot, inches
 _INCH: Final = 25.4e-3  # An inch, m
 _FINENESS: Final = 10  # Pixels per slot of a page
 _ACROSS: Final = 2000  # Largest number of pixels across
-_ZOOM_FINENESS: Final = 50  # Pixels per slot of the worst place
+_ZOOM_FINENESS: Final = 50  # Pixels per slot of the region of largest error
 _SHEET_FINENESS: Final = 16  # Pixels per slot of a sheet at true size
 _MICRONS: Final = Scale("Placement error", "m", "um")
 
@@ -153,7 +153,7 @@ def plot(page: Page, view: View = "page") -> Figure:
     if view != "page":
         raise InputError.of("view", view, f"one of {', '.join(VIEWS)}")
     sheet, place = whole_sheet(page), zoomed_sheet(page)
-    # Side by side if the paper is upright, else one below the other.
+    # Panels are side by side if the paper is upright, else one below the other.
     beside = sheet.height > _UPRIGHT * sheet.width
     wide = _WIDTH - 2.0 * _SIDE
     each = (wide - 2.0 * _BESIDE) / 3.0 if beside else wide

@@ -80,6 +80,6 @@ def _attach(figure: Figure) -> None:
     from matplotlib import get_backend
     from matplotlib.backends.registry import BackendFilter, backend_registry
 
-    registry: Any = backend_registry  # without types of its own
+    registry: Any = backend_registry  # matplotlib declares no types here
     if get_backend().lower() in registry.list_builtin(BackendFilter.INTERACTIVE):
         pyplot.figure(figure)

@@ -121,7 +121,7 @@ def interpolated(at: npt.ArrayLike, values: npt.ArrayLike, times: FloatArray) ->
     result = samples[left] + share * (samples[right] - samples[left])
     exact = known[right] == times
     result[exact] = samples[right[exact]]
-    # Room for the last bit of times that are meant to be the same.
+    # Tolerance for rounding: times at the ends of the samples are not beyond them.
     room = 1e-12 * max(abs(known[0]), abs(known[-1]))
     result[(times < known[0] - room) | (times > known[-1] + room)] = np.nan
     return result

@@ -226,7 +226,7 @@ def _common_times(records: list[RateRecord]) -> FloatArray:
     start = min(float(record.times[0]) for record in records)
     end = max(float(record.times[-1]) for record in records)
     closest = min(float(np.median(np.diff(record.times))) for record in records)
-    # Allow for rounding, so that even samples define their own grid.
+    # Allow for rounding, so that evenly spaced samples are their own grid.
     count = int(min(np.ceil((end - start) / closest * (1.0 - 1e-9)), MOST_TIMES - 1)) + 1
     return np.linspace(start, end, count)
 
@@ -279,7 +279,7 @@ def _opened(path: Path) -> Any:
 
     if path.suffix.lower() == ".zarr":
         need_for(path)
-        # Consolidated metadata may be missing; the metadata of each array always exist.
+        # Consolidated metadata may be missing; each array always has metadata.
         options: dict[str, Any] = {"engine": "zarr", "consolidated": False}
     elif _magic(path).startswith(_CLASSIC):
         options = {"engine": "scipy"}

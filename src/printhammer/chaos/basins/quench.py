@@ -300,7 +300,7 @@ def _piece(
     begin, number = 0.0, 1
     every: list[Drive]
     if drives[0].pulses[0].replaces:
-        # Of a driver's pulses only the latest acts, so no earlier pulse may be under way.
+        # Each pulse of a driver replaces the one before: no pulse may be active before the first firing.
         every = [PulseSequence(drive.pulses, [0.0, gap]) for gap in gaps.tolist() for drive in drives]
     else:
         begin, number = drives[0].begin, _SECOND
@@ -322,7 +322,7 @@ def _piece(
     turned, times = _highest(grid, x.astype(np.float64), after)
     lost = np.flatnonzero(result.ok & ~second & np.isfinite(turned))
     if lost.size:
-        # A run of a display is too coarse for a peak, and so is a parabola next to the end of a pulse.
+        # Repeat with a finer tolerance and grid: the first run and its parabola locate a peak too coarsely.
         offsets = (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, 2 * _FINE + 1)
         moments = np.clip(times[lost, np.newaxis] + offsets, after[lost, np.newaxis], ends[lost, np.newaxis])
         strobes = [np.unique(row) for row in moments]

@@ -110,7 +110,7 @@ def carry(
         run([rows[k] for rows in long], np.array(begun))
     open_ = {(number, 0) for number, strand in enumerate(strands) if strand.before >= 0}
     while open_:
-        # Every open joint is advanced by one train, all joints in parallel.
+        # Run one more train after each joint that is still open; the trains of all joints run in parallel.
         order = sorted(open_)
         rows = [strands[number].rows[place] for number, place in order]
         ended = [
@@ -268,7 +268,7 @@ class DiagramBuilder:
         fronts = np.array([math.inf if r.hammer.front is None else r.hammer.front for r in regimes])
         scales = self.table.scales[list(rows)]
         cycles, distances = cycles_of(columns, fronts, scales)
-        # A motion that rests on its backstop is periodic to the last bit if time is kept within the period.
+        # If time is counted within the period, motions with rests on the backstop repeat to the last bit.
         able = np.array([is_memoryless(regime) for regime in regimes])
         open_rows = np.flatnonzero(able & (cycles == 0) & (columns.status == OK))
         if open_rows.size:
@@ -310,7 +310,7 @@ class DiagramBuilder:
             return
         regimes = [table.regimes[row] for row in rows]
         fronts, scales = np.full(len(rows), math.inf), table.scales[rows]
-        # From rest to rest, then once more for a second cycle.
+        # The transient covers the longest cycle, and the firings after it more than one cycle.
         transient = int(table.cycles[rows].max())
         for share in FINER:
             finer = self.effort.at(share * self.effort.tolerance)

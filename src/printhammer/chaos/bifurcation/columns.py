@@ -138,7 +138,7 @@ def _run(
     ensemble = Ensemble(
         [regime.hammer for regime in regimes],
         [drive for drive, _times in trains],
-        # One period is added, so that no state depends on the end of the run.
+        # The run ends one period after the last firing, so that its end does not affect the last state.
         [float(times[-1]) + regime.period for regime, (_drive, times) in zip(regimes, trains, strict=True)],
         states=None if rest else states[:, places],
         starts=[float(times[0]) for _drive, times in trains],
@@ -271,7 +271,7 @@ def cycles_of(columns: Columns, fronts: FloatArray, scales: FloatArray) -> tuple
     distances = np.full(len(states), np.nan)
     left = np.flatnonzero(np.isfinite(states).all(axis=(1, 2)))
     for q in range(1, min(LARGEST_PERIOD, states.shape[1] // 2) + 1):
-        # If all states agree, the last ones do, which is quickly tested.
+        # Compare the last two states first: a cheap test that excludes most trains.
         near = left[(np.abs(states[left, -1] - states[left, -1 - q]) <= AGREEMENT).all(axis=1)]
         if not near.size:
             continue

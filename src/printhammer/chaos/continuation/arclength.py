@@ -173,7 +173,7 @@ def follow(
         halves.append((nodes, stop))
         if stop.reason == "closed":
             if sign < 0.0:
-                # The way back round is the same curve.
+                # Traced in the other direction, a closed curve is the same: reverse its nodes.
                 whole = _reversed([begin, *nodes])
                 return Curve(whole, (stop, stop))
             return Curve([begin, *nodes], (stop, stop))
@@ -218,7 +218,7 @@ def _half(
             return nodes, Stop("closed", start.parameter, start.state, sentence)
         stop = watch(here, ahead) if watch is not None else None
         if stop is not None and stop.node is here and 0.5 * length >= steps.smallest:
-            # The step leads beyond the end, which may lie anywhere in it.
+            # The end of the curve lies somewhere within the last step: approach it with half the step.
             length *= 0.5
             continue
         if stop is None and reached is not None:

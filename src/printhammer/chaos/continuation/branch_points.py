@@ -150,7 +150,7 @@ def points_of(
         "branching": crossing_test,
     }
     every: list[BranchPoint] = []
-    # At the period doubling that an orbit is born from its curve turns back, which is not a fold.
+    # A branch that begins at a period doubling turns back in the parameter there, which is not a fold.
     places = (0, len(curve.nodes) - 2)
     births = [place for place, stop in zip(places, curve.stops, strict=True) if stop.reason == BIRTH]
     for after, (here, ahead) in enumerate(itertools.pairwise(curve.nodes)):

@@ -283,7 +283,7 @@ class Tracer:
                 return self.merged(shorter, here, ahead) if shorter else None
             if born.node is None:
                 return born
-            # A stop over half the period is that of the orbit's whole period.
+            # The event was located for half the period; the branch stores values of the whole period.
             value = whole(born.node.state, born.node.parameter)
             last = replace(born.node, value=value) if not value.trouble else here
             return replace(born, node=last)

@@ -143,7 +143,7 @@ def points_along(
             for (name, passages), test in tests.items()
             if test(here) * test(ahead) < 0.0 and max(abs(test(here)), abs(test(ahead))) > _NOISE
         ]
-        # The effect of one passage is also that of several passages.
+        # Tests for several passages also change sign at a point of one passage: report the fewest passages.
         first = {name: passages for name, passages, _ in reversed(named)}
         for name, passages, test in named:
             if passages == first[name]:

@@ -160,7 +160,7 @@ def _of_file(opened: Reopened, event: int | str | None, regime: Regime) -> Start
             key="branch",
         )
     if "branch" in dataset["event_kind"].dims:
-        # Of several branches the first is used: the branch that was asked for.
+        # If the file has several branches, events are selected from the first branch only.
         dataset = dataset.isel(branch=0)
     kinds = [EVENTS[code] if code >= 0 else "" for code in dataset["event_kind"].values]
     located = [bool(value == 1) for value in dataset["event_located"].values]

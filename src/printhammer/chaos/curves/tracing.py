@@ -142,7 +142,7 @@ class CurveTracer:
         points.sort(key=lambda point: point.after)
         for end, inner in ((0, 1), (-1, -2)):
             if stops[end].reason == "resonance" and len(nodes) > 1:
-                # The points were found together with the node beyond.
+                # The last node lies beyond the resonance: move it onto the resonance.
                 node = self.resonance(pieces[end][0], nodes[inner], nodes[end])
                 nodes[end] = pieces[end][1][end] = node
         if not curve.closed:

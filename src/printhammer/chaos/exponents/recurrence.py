@@ -124,7 +124,7 @@ def recurrence(
     """
     points = points_of(states, {})
     rows, units = rows_of(points, scales, MOST)
-    # After a train has settled only rounding noise differs.
+    # States of a settled train differ only by rounding, which the threshold must exceed.
     floor = AGREEMENT if isinstance(points, Strobe) and scales is None else 0.0
     count = len(rows)
     apart, least = read_count(theiler, "theiler"), read_count(shortest, "shortest")

@@ -61,7 +61,7 @@ CYCLES: Final = 5
 FOLLOWS: Final = 0.7
 """Mean distance of images of neighbours, relative to any two, below which a series is deterministic."""
 
-_CUT: Final = 10  # The displacement is computed up to the length divided by this (Gottwald and Melbourne)
+_CUT: Final = 10  # Ratio of the series length to the largest lag of the displacement (Gottwald and Melbourne)
 _PASSES: Final = 4  # Smallest number of cycles in a series for a cycle to be considered
 _TOGETHER: Final = 1 << 20
 """Number of complex numbers processed in one batch."""
@@ -208,7 +208,7 @@ def zero_one(
         correlations = np.concatenate(
             [_correlations(_displacements(_paths(rest, some), least)) for some in pieces]
         )
-        # The lower of the two middle values, so that an angle has it.
+        # The lower median, unlike the mean of the two middle values, belongs to one of the angles.
         shown = int(np.argsort(correlations, kind="stable")[(many - 1) // 2])
         path = _paths(rest, chosen[shown : shown + 1])
         displacement = _displacements(path, least)[0]
@@ -316,7 +316,7 @@ def mean_square_displacements(paths: npt.NDArray[np.complex128], cut: int) -> Fl
     """
     many, count = paths.shape
     first = count - cut
-    # |a - b|^2 = |a|^2 + |b|^2 - 2 Re a* b, and the sum of the last is a correlation.
+    # |a - b|^2 = |a|^2 + |b|^2 - 2 Re a* b, and the sum of the last term is a correlation.
     size = 1 << (2 * count - 1).bit_length()
     head = np.fft.fft(paths[:, :first], size)
     crossed = np.fft.ifft(head.conj() * np.fft.fft(paths, size))[:, 1 : cut + 1].real

@@ -284,7 +284,7 @@ def _has_gap(row: list[FloatArray], k: int, spacing: float) -> bool:
     here, there = row[k], row[k + 1]
     step = float(np.hypot(*(there - here)))
     if not math.isfinite(step):
-        # Points at the end of a curve are tested against their neighbours and the end.
+        # A point is inserted between a finite and a non-finite point, to come closer to the end of the curve.
         return bool(np.isfinite(here).any() != np.isfinite(there).any())
     if step > spacing:
         return True

@@ -93,7 +93,7 @@ def settled(regime: Regime, points: FloatArray, period: int, scales: FloatArray)
     for count in divisors:
         if count < period and _apart(scaled, count, period)[1][0] > NEAR:
             continue
-        # If the states alternate about the orbit, their mean is closer to it than any of them.
+        # If the states alternate about the orbit, their mean is closer to the orbit than any single state.
         guess = states[-period:].reshape(-1, count, 2).mean(axis=0)
         closing = close_orbits(
             maps, guess[np.newaxis], np.ones((1, count), np.int64), plane, goal=1e-13, enough=1e-9,

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 SHARE: Final = 0.05
 """Range of drive periods over which a branch is followed, on either side, as a fraction of the period."""
 
-_PARTS: Final = 5.0  # As in `printhammer.chaos.continuation.tracer`
+_PARTS: Final = 5.0  # Parameter range by its scale, as in `printhammer.chaos.continuation.tracer`
 _STEPS: Final = Steps(most=150, precision=1e-10)
 
 
@@ -353,7 +353,7 @@ class Search:
         for orbit, _hits in described:
             by_phase.setdefault(orbit.phase, []).append(orbit)
         for phase, every in by_phase.items():
-            # Pairs of the first orbits have been tried; they come first.
+            # The pairs of the first orbits, which head the list, have been tried already.
             old = sum(orbit.phase == phase for orbit in first)
             if old == len(every):
                 continue

@@ -207,7 +207,7 @@ def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, Flo
     f_low, f_high = before[rows].copy(), after[rows].copy()
     time, kept = high.copy(), np.zeros(len(rows))
     table = problem.resample(record, time)
-    # Regula falsi with the Illinois rule: the end that stays counts half.
+    # Regula falsi with the Illinois rule: halve the function value at an end that is retained twice.
     for _ in range(_TURN_STEPS):
         open_ = (np.abs(table[:, 1]) > _STILL * problem.scales[1]) & (high - low > 4.0 * np.spacing(high))
         if not open_.any():
@@ -226,8 +226,8 @@ def turns(problem: Problem, record: Record) -> tuple[FloatArray, FloatArray, Flo
     return time, table[:, 0], sign
 
 
-_BEYOND: Final = 0.01  # Time beyond the end that a run covers, as a fraction of the period
-# Distance of an impact from the section that counts as on it, fraction of the period
+_BEYOND: Final = 0.01  # Time by which a run extends beyond the last section, as a fraction of the period
+# Time between an impact and the section below which they coincide, as a fraction of the period
 _ON_IMPACT: Final = 1e-3
 
 

@@ -126,7 +126,7 @@ def largest_multiplier(train: Train, states: States, period: int, tolerance: flo
 
     if _in_pack(train, states, -1) or not train.regime.is_planar:
         return np.inf
-    # The remainder of earlier pulses is left out: it is the same for all neighbouring motions.
+    # The tails of earlier pulses are omitted: they are the same for all neighbouring motions.
     tangent = tangent_map(
         train.hammer,
         train.regime.pulses(period),

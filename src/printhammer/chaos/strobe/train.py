@@ -339,7 +339,7 @@ def exponents_onward(
     The exponents are averaged over `points` firings, after a hundred firings.
     """
     window = _BEFORE + 1, _BEFORE + points
-    # The remainder of earlier pulses is left out: it is the same for all neighbouring motions.
+    # The tails of earlier pulses are omitted: they are the same for all neighbouring motions.
     trains = [Train(regime, regime.pulses(window[1] + 2), state) for regime, state in begun]
     return exponents_of(trains, window, effort)
 

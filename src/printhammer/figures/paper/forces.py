@@ -128,7 +128,7 @@ def force_loops(hammer: Hammer, *, duration: float | str | None = None) -> Figur
     curve(ax, way.shown(x), force.shown(total), "force", BLUE, lw=1.0)
     touches = [c.t_in for c in motion.contacts if c.surface == "backstop" and not c.initial and c.peak_force]
     settling = touches[1] if len(touches) > 1 else math.inf
-    # Settle-out oscillates on nearly one line: its arrows are in the insert.
+    # Settle-out oscillates along nearly one line, so that its arrows are drawn in the inset.
     cycle = times < settling
     arrows(ax, way.shown(x[cycle]), force.shown(total[cycle]), 10, BLUE, 8.0)
     _annotate(ax, motion, times >= settling, x, total, way, force)
@@ -152,7 +152,7 @@ def _annotate(
     if late.any():
         left, bottom, width, height = box = _place(points)
         _insert(ax, box, motion, way.shown(x[late]), force.shown(total[late]), way, force)
-        # The area of the insert, including its tick labels, is occupied.
+        # No label may cover the inset and its tick labels.
         covered = np.meshgrid(
             np.linspace(left - 0.07, left + width, 30), np.linspace(bottom - 0.07, bottom + height + 0.05, 30)
         )
