@@ -1,11 +1,11 @@
 """Measure how fast hammers print with a compensation table: safe rates beside open loop, also perturbed.
 
-Run it with ``.venv/bin/python docs/measure/tables.py``. For the shipped hammer and five of its family it
+Run it with ``.venv/bin/python docs/measure/tables.py``. For the shipped hammer and two of its family it
 tunes a table over all rates and makes a row, with ``--perturbed`` one for each hammer that differs. It
 takes some ten minutes on two cores, ``--perturbed`` some five more for each hammer.
 
 ``--history N`` and ``--robust`` are as for ``printhammer tune``. ``--hammer`` takes a name or a file instead
-of the six, and may be repeated. ``--keep FOLDER`` keeps the tables, and takes those that are there already.
+of the three, and may be repeated. ``--keep FOLDER`` keeps the tables, and takes those that are there already.
 """
 
 import argparse
@@ -24,8 +24,8 @@ from printhammer.printing.dots.nominal import nominal
 from printhammer.printing.rates.safe_rate import SafeRate
 from printhammer.printing.rates.variability import Perturbation, perturbed
 
-OTHERS = (1, 5, 9, 13, 17)
-"""Places of the five hammers in the family."""
+OTHERS = (5, 17)
+"""Places of the two hammers in the family."""
 
 TOLERANCE = 5e-7
 """That for pictures."""
@@ -49,7 +49,7 @@ def finite(value: float) -> float | str:
 
 
 def hammers(names: list[str]) -> Iterator[ph.Hammer]:
-    """Return the hammers of these names, or the six."""
+    """Return the hammers of these names, or the three."""
     if names:
         yield from (ph.load(name) for name in names)
         return
