@@ -102,8 +102,13 @@ def write(
         print(f"{path.relative_to(ROOT)} is of other settings, {kept.settings}: kept")
         return
     script = Path(sys.argv[0]).resolve().relative_to(ROOT).as_posix()
+    options = sys.argv[1:]
+    if "--keep" in options:
+        # A folder of one machine, which changes no number.
+        at = options.index("--keep")
+        options = options[:at] + options[at + 2 :]
     table = Measured(
-        command=shlex.join([script, *sys.argv[1:]]),
+        command=shlex.join([script, *options]),
         hammers={hammer: hammer_fingerprint(hammer) for hammer in hammers},
         rooms=sorted(rooms),
         code=code_fingerprint(rooms),

@@ -5,12 +5,13 @@ number of synthetic laboratories, whose seeds are 0 to N - 1.
 """
 
 import argparse
+import contextlib
 import math
 import re
 import shlex
-import subprocess
-import sys
 import tempfile
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.stats import beta
 from studies.recovery import true_value
 
 import printhammer as ph
+from printhammer.cli.main import main as main_of_program
 from printhammer.identify.result import CONFIDENCE, student
 
 PAGE = ROOT / "docs" / "howto" / "fitting.md"
@@ -36,16 +38,13 @@ def recipe() -> list[list[str]]:
 
 
 def run(arguments: list[str], folder: str) -> None:
-    """Run a command of the program in a folder, silently."""
-    done = subprocess.run(
-        [sys.executable, "-m", "printhammer", *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if done.returncode:
-        raise RuntimeError(f"{shlex.join(arguments)}: {done.stderr}")
+    """Run a command of the program in a folder, silently and in this process."""
+    with contextlib.chdir(folder), redirect_stdout(StringIO()), redirect_stderr(StringIO()) as said:
+        try:
+            main_of_program(arguments)
+        except SystemExit as end:
+            if end.code:
+                raise RuntimeError(f"{shlex.join(arguments)}: {said.getvalue()}") from None
 
 
 def laboratory(hammer: ph.Hammer, seed: int, commands: list[list[str]]) -> ph.Hammer:

@@ -5,7 +5,8 @@ and finds its safe rate as the ticks get longer; and tables at 1.5 times the ope
 dot on the nominal hammer, and whose dots within limits on hammers drawn from the variability of a production,
 it counts. It takes some ten minutes on one core.
 
-``--units N`` draws another number; ``--curves FILE`` only draws the measured table.
+``--units N`` draws another number; ``--keep FOLDER`` is as for ``tables.py``; ``--curves FILE`` only draws the
+measured table.
 """
 
 import argparse
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from measured import MOTION, Cell, Column, read, write
+from tables import tuned
 
 import printhammer as ph
 from printhammer.control.table.compensation import CompensationTable
@@ -59,9 +61,9 @@ def worst(trial: Trial) -> float:
     return float(np.fmax(force, arrival).max())
 
 
-def measure(hammer: ph.Hammer, units: list[ph.Hammer], rate: float) -> list[list[Cell]]:
+def measure(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, kept: Path | None) -> list[list[Cell]]:
     """Return a row a tick."""
-    whole, rows = ph.tune(hammer, history=1), []
+    (whole, _time), rows = tuned(hammer, 1, robust=False, kept=kept), []
     tables = {driver: ph.tune(hammer, rate=rate, driver=driver) for driver in ("own", "switch")}
     for tick in TICKS:
         ticked = {name: table if tick is None else table.quantised(tick) for name, table in tables.items()}
@@ -115,6 +117,7 @@ def main() -> None:
     parser.add_argument("--units", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--curves", type=Path)
+    parser.add_argument("--keep", type=Path)
     asked = parser.parse_args()
     if asked.curves is not None:
         curves(asked.curves)
@@ -122,7 +125,7 @@ def main() -> None:
     hammer = ph.load("hendriks-1983")
     safe = ph.safe_rate(hammer).rate
     rate = SHARE * safe
-    rows = measure(hammer, Variability().draw(hammer, asked.units, asked.seed), rate)
+    rows = measure(hammer, Variability().draw(hammer, asked.units, asked.seed), rate, asked.keep)
     heads = [
         Column(name="tick"),
         Column(name="safe rate", unit="Hz", format="g"),

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from measured import MOTION, Cell, Column, write
+from tables import tuned
 
 import printhammer as ph
 from printhammer.control.feedback.closed_loop import FeedbackStrategy
@@ -83,6 +84,7 @@ def main() -> None:
     parser.add_argument("hammer", nargs="?", default="hendriks-1983")
     parser.add_argument("--rate", action="append", dest="rates")
     parser.add_argument("--picture", type=Path)
+    parser.add_argument("--keep", type=Path, help="folder of tables over all rates, as for tables.py")
     given = parser.parse_args()
     hammer = ph.load(given.hammer)
     controller = Controller(hammer, driver_of(hammer))
@@ -107,7 +109,7 @@ def main() -> None:
     ]
     settings = {"rates": given.rates or RATES, "text": TEXT}
     write("ways-pages", columns, rows, settings, ROOMS, (hammer.name,))
-    table = ph.tune(hammer, history=1)
+    table, _time = tuned(hammer, 1, robust=False, kept=given.keep)
     found = ph.feedback(
         hammer,
         table.rates[-1],

@@ -174,7 +174,7 @@ def test_forty_laboratories() -> None:
     No constant misses its 95 % interval more often than chance allows; all together hold it in 92 to 98 %.
     """
     labs = 40
-    counts = count_all([recover(HAMMER, seed) for seed in range(labs)])
+    counts = count_all([laboratory(seed) for seed in range(labs)])
     allowed = binom.isf(CHANCE, labs, 0.05)
     assert {key: n for key, n in counts.items() if labs - n > allowed} == {}
     assert 0.92 < sum(counts.values()) / (labs * len(counts)) < 0.98
