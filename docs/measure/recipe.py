@@ -11,6 +11,7 @@ import re
 import shlex
 import tempfile
 from contextlib import redirect_stderr, redirect_stdout
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
@@ -20,7 +21,6 @@ from scipy.stats import beta
 from studies.recovery import true_value
 
 import printhammer as ph
-from printhammer.cli.main import main as main_of_program
 from printhammer.identify.result import CONFIDENCE, student
 
 PAGE = ROOT / "docs" / "howto" / "fitting.md"
@@ -41,7 +41,7 @@ def run(arguments: list[str], folder: str) -> None:
     """Run a command of the program in a folder, silently and in this process."""
     with contextlib.chdir(folder), redirect_stdout(StringIO()), redirect_stderr(StringIO()) as said:
         try:
-            main_of_program(arguments)
+            import_module("printhammer.cli.main").main(arguments)
         except SystemExit as end:
             if end.code:
                 raise RuntimeError(f"{shlex.join(arguments)}: {said.getvalue()}") from None
