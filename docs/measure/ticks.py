@@ -5,8 +5,8 @@ and finds its safe rate as the ticks get longer; and tables at 1.5 times the ope
 dot on the nominal hammer, and whose dots within limits on hammers drawn from the variability of a production,
 it counts. It takes some ten minutes on one core.
 
-``--units N`` draws another number; ``--keep FOLDER`` is as for ``tables.py``; ``--curves FILE`` only draws the
-measured table.
+``--units N`` draws another number; ``--keep FOLDER`` is as for ``tables.py``; ``--curves FILE`` only draws
+the measured table.
 """
 
 import argparse
