@@ -163,10 +163,10 @@ def scales_of(
     """Return a typical displacement [m] and speed [m/s] of a hammer, the units of tolerances.
 
     The displacement is the distance from backstop to pack. If backstop or pack is missing, the displacement
-    is the larger of two: the distance that the forces would move the mass in one period of the drive or of
-    the hammer, and the distance of the initial state from the origin. The speed is the one that the largest
-    force imparts to the mass over that displacement. `static` is the static force of the hammer, computed if
-    not passed.
+    is the largest of three: the distance that the forces would move the mass in one period (of the drive or
+    of the hammer, over 2 pi), the distance of the initial state from the origin, and the distance covered in
+    that time at the initial velocity. The speed is the one that the largest force imparts to the mass over
+    that displacement. `static` is the static force of the hammer, computed if not passed.
     """
     if static is None:
         static = StaticForce(hammer)
@@ -280,7 +280,7 @@ class Problem:
 
     @property
     def linkage_scale(self) -> float:
-        """Flux linkage of the coil at a typical current, Wb, by which errors are normalised."""
+        """Flux linkage of the coil at a typical current, Wb: the scale of thresholds for a coil at rest."""
         return float(self.constants[layout.LINKAGE_SCALE])
 
     def room(self, count: int) -> FloatArray:

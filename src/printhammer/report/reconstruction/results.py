@@ -180,9 +180,9 @@ class FamilyPanels(_Table):
 
 
 class Change(_Table):
-    """Frequency with which two integrators classify the same panel of Fig. 11 differently."""
+    """Frequency with which two computations classify the same panel of Fig. 11 differently."""
 
-    first: str = Field(description="the first integrator")
+    first: str = Field(description="the first computation, such as 'exact'")
     second: str = Field(description="the other")
     panels: _Some = Field(description="the number of panels")
     differ: _Count = Field(description="the number of panels with another verdict")
@@ -191,10 +191,10 @@ class Change(_Table):
         description="two standard errors of that fraction, with the panels of a hammer as one sample"
     )
     periodic_to_strange: _Count = Field(
-        description="the number of panels periodic with the first integrator, strange with the second"
+        description="the number of panels periodic in the first computation, strange in the second"
     )
     strange_to_periodic: _Count = Field(
-        description="the number of panels strange with the first integrator, periodic with the second"
+        description="the number of panels strange in the first computation, periodic in the second"
     )
 
 
