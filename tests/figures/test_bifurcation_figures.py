@@ -113,7 +113,7 @@ def test_the_quench_map_shows_lost_and_printed_dots(hammer: "ph.Hammer") -> None
     legend = ax.get_legend()
     assert [text.get_text() for text in legend.get_texts()] == [
         "width of the first pulse",
-        "the two cases of Fig. 6",
+        "two cases of the paper's Fig. 6",
     ]
     # White signs, on the map and in the legend.
     assert {marks.get_color(), *(line.get_color() for line in legend.get_lines())} == {"white"}

@@ -121,7 +121,7 @@ def test_a_chart_is_drawn(branch: Branch) -> None:
         np.testing.assert_array_equal(line.get_ydata(), np.where(curve.limits, curve.second, np.nan))
     assert len(figure.axes[0].collections) == 1
     told = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert {"from rest: period 1", "fold", "period doubling", "the hammer's own"} <= set(told)
+    assert {"from rest: period 1", "fold", "period doubling", "value of the hammer"} <= set(told)
 
 
 def test_a_curve_is_drawn_with_and_without_attractors(branch: Branch) -> None:

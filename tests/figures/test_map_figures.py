@@ -198,7 +198,7 @@ def test_maps_side_by_side(chart: xr.Dataset) -> None:
 
 def test_maps_without_a_common_rate_are_still_drawn(chart: xr.Dataset) -> None:
     drawn = compare_maps(chart, chart.isel(rate=[0, 1]).assign_coords(rate=[501.0, 602.0]))
-    assert "No rate is in both maps" in drawn.get_suptitle()
+    assert "The maps have no rate in common" in drawn.get_suptitle()
 
 
 def test_a_map_of_which_nothing_is_known_is_grey(hammer: "ph.Hammer", chart: xr.Dataset) -> None:

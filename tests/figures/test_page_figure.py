@@ -109,7 +109,7 @@ def test_the_page_shows_every_dot_and_every_lost_one(page: Page) -> None:
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert any(title.startswith("Printed at 1500 Hz, open loop") for title in titles)
     assert {"Wanted", "Difference"} <= set(titles)
-    assert any("The worst place: print line" in title for title in titles)
+    assert any("Region of largest error: print line" in title for title in titles)
     assert any(summary(page) == text.get_text() for text in figure.texts)
 
 

@@ -230,7 +230,7 @@ def test_what_a_class_declares(falls: Result, tmp_path: Path) -> None:
         assert kept.attrs["air"] == '{"density": null, "kind": "none"}'
     with refused(None, file="falls.zarr"):
         falls.save(tmp_path / "falls.zarr")
-    with pytest.raises(AttributeError, match="no picture of Falls"):
+    with pytest.raises(AttributeError, match="Falls has no figure"):
         falls.plot()
 
 

@@ -123,9 +123,9 @@ FIGURES: Final[dict[int, PaperFigure]] = {
             11,
             "poincare.poincare",
             "Poincaré plots",
-            "Displacement and velocity at the first 200 firings of trains, a panel for each strobe time, with"
-            " the verdict on firings 1001 to 2000, and that of the paper if it differs. Vertical line:"
-            " backstop; orange circles: the last points of a train with a period of up to 8 firings.",
+            "Displacement and velocity at the first 200 firings of trains, a panel for each strobe time,"
+            " with the classification of firings 1001 to 2000, and with the paper's if different. Vertical"
+            " line: backstop; orange circles: the last points of a train with a period of up to 8 firings.",
         ),
     )
 }

@@ -186,5 +186,5 @@ def _quantiles(ax: Axes, fit: Fit) -> None:
     ax.set(xlim=(-end, end), ylim=(-end, end))
     ax.set_aspect("equal")
     ax.set_xlabel("Normal quantile")
-    ax.set_ylabel("Residual / its deviation")
+    ax.set_ylabel("Residual / standard deviation")
     ax.tick_params(top=True, right=True)

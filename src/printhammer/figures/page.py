@@ -238,7 +238,9 @@ def _printed_title(page: Page) -> str:
 def _zoom_title(page: Page) -> str:
     line, first = page.worst_place(zoom_slots(page))
     last = min(first + zoom_slots(page), page.pattern.slots)
-    return f"The worst place: print line {line + 1}, slots {first + 1} to {last} (rings: requested dots)"
+    return (
+        f"Region of largest error: print line {line + 1}, slots {first + 1} to {last} (rings: requested dots)"
+    )
 
 
 def _dots(page: Page) -> tuple[FloatArray, FloatArray, FloatArray]:

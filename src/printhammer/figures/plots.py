@@ -62,7 +62,7 @@ def plot(result: object, picture: str = "", **options: Any) -> Figure:
     """
     name = ".".join(filter(None, (type(result).__name__, picture)))
     if name not in PLOTS:
-        raise AttributeError(f"no picture of {name} is known")
+        raise AttributeError(f"the result {name} has no figure")
     module, _, function = PLOTS[name].rpartition(".")
     drawn: Figure = getattr(import_module(f"{__package__}.{module}"), function)(result, **options)
     _attach(drawn)

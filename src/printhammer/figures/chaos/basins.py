@@ -216,7 +216,7 @@ def plot_quench(quenches: QuenchMap) -> Figure:
         )
         shown = [delay for delay in DELAYS if quenches.gaps[0] <= delay <= quenches.gaps[-1]]
         level = np.full(len(shown), float(up.shown(width)))
-        crosses = {"marker": "x", "mew": 1.4, "label": "the two cases of Fig. 6", "gid": "Fig. 6"}
+        crosses = {"marker": "x", "mew": 1.4, "label": "two cases of the paper's Fig. 6", "gid": "Fig. 6"}
         if shown:
             dots(ax, across.shown(shown), level, 6.0, "white", **crosses)
         # White on grey, since the marks on the map are white.

@@ -72,7 +72,7 @@ def plot_chart(chart: StabilityChart) -> Figure:
     own = chart.regime.value(chart.names[1]) * factors[1]
     dotted: dict[str, Any] = {"color": style.MUTED, "lw": style.HAIR, "ls": (0, (1, 2))}
     ax.axhline(own, zorder=1.0, gid="own", **dotted)
-    handles.append(Line2D([], [], label="the hammer's own", **dotted))
+    handles.append(Line2D([], [], label="value of the hammer", **dotted))
     ax.set_xlim(*(factors[0] * end for end in chart.bounds[0]))
     ax.set_ylim(*(factors[1] * end for end in chart.bounds[1]))
     ax.set_xlabel(headings[0])

@@ -73,7 +73,7 @@ def plot(spectrum: Lyapunov) -> Figure:
     heading(upper, _title(spectrum))
     remarks = [] if spectrum.ok else [f"The run ended early: {spectrum.status}."]
     if not spectrum.smooth:
-        remarks.append("The motion passes a touch without velocity, where it has no derivative.")
+        remarks.append("The armature touches a surface at zero velocity, where the motion has no derivative.")
     sign(figure, spectrum.hammer, *remarks)
     return figure
 
@@ -232,9 +232,9 @@ def plot_finite_time(finite: FiniteTime) -> Figure:
     for length, row in zip(finite.lengths, finite.values, strict=True):
         ax.hist(row, bins, density=True, histtype="step", lw=1.1, label=f"{length} firings")
     ax.axvline(float(finite.lyapunov.exponents[0]), color=INK, lw=0.9)
-    ax.set(xlabel="Exponent of a stretch  [1/firing]", ylabel="Density")
+    ax.set(xlabel="Exponent of a segment  [1/firing]", ylabel="Density")
     ax.legend(frameon=False)
-    heading(ax, "Finite-time exponents, and that of the whole train")
+    heading(ax, "Finite-time exponents; line: exponent of the whole train")
     sign(figure, finite.lyapunov.hammer)
     return figure
 
@@ -272,7 +272,7 @@ def plot_recurrence(recurrence: Recurrence) -> Figure:
         interpolation="antialiased",
         interpolation_stage="rgba",
     )
-    ax.set(xlabel="Number of the state", ylabel="Number of the state")
+    ax.set(xlabel="Index of the state", ylabel="Index of the state")
     ax.tick_params(axis="both", top=True, right=True)
     lines = [f"threshold  {recurrence.threshold:.3g}"]
     lines += [f"{_NAMES[name]}  {_shown(value)}" for name, value in recurrence.quantities.items()]

@@ -73,7 +73,9 @@ def plot_orbit(orbit: Orbit) -> Figure:
     Marks show the states at the firings.
     """
     if not orbit.ok:
-        raise InputError(f"orbit: expected one that there is, not {orbit.name}: {orbit.status}", key="orbit")
+        raise InputError(
+            f"orbit: expected an orbit that was found, not {orbit.name}: {orbit.status}", key="orbit"
+        )
     figure = new_figure(3.4, width=1.35 * style.WIDTH)
     left, right = figure.subplots(1, 2)
     motion = orbit.motion()

@@ -62,7 +62,7 @@ def plot(
             ax.set_xlabel("change in % for 1 % of the constant", fontsize=style.SMALL)
     remarks = [] if table.ok else [f"The run ended early: {table.status}."]
     if not table.smooth:
-        remarks.append("The motion passes a touch without velocity: what follows has no derivative.")
+        remarks.append("The armature touches a surface at zero velocity: the later motion has no derivative.")
     sign(figure, table.hammer, *remarks)
     return figure
 
@@ -74,7 +74,7 @@ def _dot(table: Sensitivities, dot: int | None, quantities: Sequence[str]) -> in
         return 0
     if dot is None:
         if not struck:
-            raise InputError("all dots are lost", key="dot", expected="one that struck")
+            raise InputError("all dots are lost", key="dot", expected="at least one printed dot")
         return struck[0]
     if not 0 <= dot < len(table.dots):
         raise InputError.of("dot", dot, f"a number from 0 to {len(table.dots) - 1}", written=str(dot))

@@ -186,7 +186,7 @@ def plot_learning(learning: Learning) -> Figure:
     ax.margins(x=0.03)
     right = ax.secondary_yaxis("right")
     right.set_yticks(range(stages), [f"{share:.0f} %" for share in shares])
-    ax.set_xlabel("Place on the paper  [mm]")
+    ax.set_xlabel("Position on the paper  [mm]")
     heading(ax, f"Dots after a number of test dots, at {learning.rate:.6g} Hz")
     heading(ax, "within limits", loc="right")
     sign(figure, learning.hammer)

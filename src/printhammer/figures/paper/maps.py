@@ -328,7 +328,7 @@ def _difference(ax: Axes, scales: map_marks.Scales, computed: xr.Dataset, measur
     known = np.isfinite(difference)
     if not known.any():
         ax.set_xticks([])
-        return "No rate is in both maps; nothing is known of their difference."
+        return "The maps have no rate in common, so that no difference can be drawn."
     style: dict[str, Any] = {"color": BLUE, "lw": 0.8, "marker": "o", "ms": 2.6 if known.sum() < 80 else 0.0}
     ax.plot(way.shown(difference[known]), scales.rate.shown(rates[known]), gid="difference", **style)
     ax.set_xlim(0.0, 1.08 * max(float(way.shown(difference[known].max())), 1e-12))

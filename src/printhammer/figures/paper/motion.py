@@ -110,12 +110,14 @@ def _heading(train: BuzzTrain) -> str:
     force = f"{train.weakest:.2f} to {max(train.forces):.2f}" if train.count > 1 else f"{train.weakest:.2f}"
     dots = "1 dot" if train.count == 1 else f"{train.count} dots"
     return (
-        f"{how}: {dots} of {force} of the single-pulse force" if train.count else f"{how}: no dot that counts"
+        f"{how}: {dots} of {force} of the single-pulse force"
+        if train.count
+        else f"{how}: no dot in the force range"
     )
 
 
 def _number(figure: Figure, motion: Motion, train: BuzzTrain, until: float) -> None:
-    """Write the peak force, relative to the single pulse, at each dot that counts."""
+    """Write the peak force, relative to the single pulse, at each dot in the force range."""
     panel = figure.axes[0]
     time, way = scale("time", until), scale("displacement", float(max(motion.maxima[1], default=0.0)))
     forces = dict(enumerate(train.forces, train.first))

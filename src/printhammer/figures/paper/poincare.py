@@ -94,7 +94,9 @@ def poincare(
         figure.legend(
             handles=[circles], loc="outside lower left", fontsize=SMALL, frameon=False, handletextpad=0.2
         )
-    by_scheme = [f"As {scheme} computes it on the schedule of 1983, short step: {reading}."] if scheme else []
+    by_scheme = (
+        [f"Computed by {scheme}, step sizes of 1983, rule for short steps: {reading}."] if scheme else []
+    )
     early = (
         f"The run at {shown_period(strobe.period)} ended early: {strobe.status}."
         for strobe in shown
