@@ -79,7 +79,7 @@ class Section(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the section: touched surface, name of the hammer, and firing period."""
         return f"touches of the {self.surface} by {self.hammer.name}, fired every {self.period:.9g} s"
 
     @property
@@ -290,7 +290,7 @@ class ImpactTrain(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the result: "impact train"."""
         return "impact train"
 
     @property
@@ -311,7 +311,7 @@ class ImpactTrain(Result):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the section from which the times come."""
+        """Provenance of the Poincaré section from which the impact times were taken."""
         return provenance() if self.source is None else self.source.provenance
 
     def notes(self) -> dict[str, Any]:

@@ -29,7 +29,7 @@ def test_means_and_scatter_of_stretches(train: Lyapunov) -> None:
     np.testing.assert_allclose(found.values[1][0], train.factors[:4, 0].mean(), rtol=1e-12)
     assert (np.diff(found.quantiles, axis=1) >= 0.0).all()
     assert found.to_dataset()["quantile"].dims == ("length", "level")
-    assert found.plot().axes[0].get_xlabel().startswith("Exponent of a segment")
+    assert found.plot().axes[0].get_xlabel().startswith("Finite-time exponent")
 
 
 @pytest.mark.parametrize(

@@ -217,7 +217,7 @@ class Basins(Result, rows="v x"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the basins, with the name of the hammer and the firing period."""
         return f"basins of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def summary(self, box: int | None = None) -> Summary:

@@ -91,7 +91,7 @@ class QuenchMap(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the quench map, with the name of the hammer."""
         return f"quench map of {self.hammer.name}"
 
     def summary(self) -> Summary:

@@ -203,7 +203,7 @@ class DiagramBuilder:
         return list(range(first, len(self.values)))
 
     def rows(self, places: Sequence[int], way: int) -> list[int]:
-        """Return the row indices of the trains at some values, by index, in one direction."""
+        """Return the table rows of the trains, in one direction, at the parameter values of given indices."""
         return [len(self.ways) * place + way for place in places]
 
     def base(self, grid: FloatArray) -> None:

@@ -199,7 +199,7 @@ class Bifurcation(Result, rows="direction column"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the diagram, with the name of the hammer and the parameter."""
         return f"bifurcation diagram of {self.regime.hammer.name} in {self.parameter}"
 
     def summary(self) -> Summary:

@@ -254,7 +254,7 @@ class Branch(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the branch: orbit period, name of the hammer, and parameter."""
         kind = f"{self.symmetry} period" if self.symmetry else "period"
         return f"{kind}-{self.firings} orbits of {self.regime.hammer.name} along {self.parameter}"
 

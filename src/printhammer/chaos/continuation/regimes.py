@@ -65,7 +65,7 @@ class Branches(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the branches, with the name of their parameter."""
         return f"branches of periodic orbits along {self.found[0].parameter if self.found else ''}"
 
     def summary(self) -> Summary:

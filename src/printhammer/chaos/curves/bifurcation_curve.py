@@ -114,7 +114,7 @@ class BifurcationCurve(Result, rows="point"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the curve: kind of the bifurcation, orbit period, and name of the hammer."""
         return f"{self.kind} of period-{self.firings} orbits of {self.regime.hammer.name}"
 
     def summary(self) -> Summary:
@@ -168,7 +168,7 @@ class BifurcationCurve(Result, rows="point"):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Provenance of the curve."""
+        """Provenance of the curve: hammer, waveform, tolerance, versions."""
         regime = self.regime
         return provenance(
             hammer=regime.hammer,

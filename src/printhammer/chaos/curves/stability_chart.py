@@ -83,7 +83,7 @@ class StabilityChart(Result):
         return f"stability of the period-{self.firings} orbit of {self.regime.hammer.name}"
 
     def summary(self) -> Summary:
-        """Summarise the chart in one line."""
+        """Summarise the numbers of curves by kind, and the fraction of trains that settle."""
         return Summary([self.message])
 
     @property

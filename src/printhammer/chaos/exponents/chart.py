@@ -78,7 +78,7 @@ class LyapunovChart(Result, rows="period"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the chart of exponents, with the name of the hammer."""
         return f"Lyapunov exponents of {self.hammer.name}"
 
     def summary(self) -> Summary:
@@ -226,7 +226,7 @@ class FiniteTime(Result, rows="length"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the finite-time exponents, with the name of the hammer."""
         return f"finite-time exponents of {self.lyapunov.hammer.name}"
 
 

@@ -67,7 +67,7 @@ class CorrelationDimension(Result, rows="radius"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the correlation dimension, with the number of states."""
         return f"correlation dimension of {self.states} states"
 
     @property

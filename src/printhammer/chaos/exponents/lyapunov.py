@@ -110,7 +110,7 @@ class Lyapunov(Result, rows="firing exponent"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the exponents, with the name of the hammer and the firing period."""
         return f"Lyapunov exponents of {self.hammer.name}, fired every {self.period:.9g} s"
 
     def summary(self) -> Summary:

@@ -66,7 +66,7 @@ class Recurrence(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the result: "recurrence plot"."""
         return "recurrence plot"
 
     @property

@@ -103,7 +103,7 @@ class ZeroOne(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the result: "0-1 test for chaos"."""
         return "0-1 test for chaos"
 
     @property

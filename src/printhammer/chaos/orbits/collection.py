@@ -92,7 +92,7 @@ class Orbits(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the orbits, with the name of the hammer and the firing period."""
         return f"periodic orbits of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     def summary(self) -> Summary:

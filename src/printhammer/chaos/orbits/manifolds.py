@@ -76,7 +76,7 @@ class Manifolds(Result, rows="point"):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the manifolds, with the name of the saddle and of the hammer."""
         return f"manifolds of the {self.orbit.name} of {self.orbit.regime.hammer.name}"
 
     def points(self, number: int) -> FloatArray:

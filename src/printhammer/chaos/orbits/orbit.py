@@ -131,7 +131,7 @@ class Orbit(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the orbit: name of the orbit and of the hammer, and firing period."""
         return f"{self.name} of {self.regime.hammer.name}, every {self.regime.period:.9g} s"
 
     @property

@@ -98,7 +98,7 @@ class Strobe(Result):
 
     @property
     def title(self) -> str:
-        """Title of the result, in one line."""
+        """Title of the strobe points, with the name of the hammer and the firing period."""
         return f"strobe points of {self.hammer.name}, every {self.period:.9g} s"
 
     def summary(self) -> Summary:

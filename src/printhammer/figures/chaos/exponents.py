@@ -232,7 +232,7 @@ def plot_finite_time(finite: FiniteTime) -> Figure:
     for length, row in zip(finite.lengths, finite.values, strict=True):
         ax.hist(row, bins, density=True, histtype="step", lw=1.1, label=f"{length} firings")
     ax.axvline(float(finite.lyapunov.exponents[0]), color=INK, lw=0.9)
-    ax.set(xlabel="Exponent of a segment  [1/firing]", ylabel="Density")
+    ax.set(xlabel="Finite-time exponent  [1/firing]", ylabel="Density")
     ax.legend(frameon=False)
     heading(ax, "Finite-time exponents; line: exponent of the whole train")
     sign(figure, finite.lyapunov.hammer)

@@ -115,7 +115,7 @@ def styled(function: Callable[_P, Figure]) -> Callable[_P, Figure]:
 
 
 def _name_strikes(figure: Figure, strike: str) -> None:
-    """Replace the noun "dot" in all texts of a figure."""
+    """Replace the noun "dot" in all texts of a figure by the noun for the impacts of its hammer."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):
