@@ -2,10 +2,11 @@
 Three backstops
 ===============
 
-The paper knows two ways to settle out: a hard backstop, with many rebounds of
-falling height, and an elastomer, with few. A third description, a rigid surface
-with a coefficient of restitution, is what is often adopted when the source of the
-loss is not known. Each is a part; the kernel is compiled once for each.
+The paper describes two kinds of backstop: a hard backstop, on which the hammer
+settles out with many rebounds of decreasing height, and an elastomer, with few
+rebounds. A third model, a rigid surface with a coefficient of restitution, is often
+used if the source of the loss is unknown. Each backstop is a part; the kernel is
+compiled once for each.
 """
 
 import matplotlib.pyplot as plt
@@ -15,9 +16,9 @@ import printhammer as ph
 hard = ph.load("hendriks-1983")
 
 # %%
-# The settle-out begins when the armature comes back from the paper. Its state at
-# that moment is taken from a single pulse, and the three hammers start from there,
-# without current.
+# The settle-out begins when the armature returns from the paper. Its state at this
+# instant is computed from a single pulse, and the three hammers start from this
+# state, without current.
 
 pulse = ph.simulate(hard, ph.PulseTrain(hard.waveform))
 printing = next(c for c in pulse.contacts if c.surface == "pack")
@@ -25,11 +26,11 @@ state = (hard.front, printing.v_out)
 print(f"return speed {-printing.v_out:.3f} m/s")
 
 # %%
-# The rigid backstop gets the restitution of the first rebound from the hard one.
-# The elastomer is a viscoelastic Hertz contact; it must be stiff enough to hold the
-# pull of this magnet, which grows as the armature moves behind the backstop
-# position. One of 8e7 N/m^1.5, which deforms by 25 um at 10 N, is not, and the
-# program says so.
+# The rigid backstop has the restitution of the first rebound from the hard backstop.
+# The elastomer is a viscoelastic Hertz contact; it must be stiff enough to withstand
+# the pull of this magnet, which grows as the armature moves behind the backstop
+# position. An elastomer of 8e7 N/m^1.5, which deforms by 25 um at 10 N, is too soft,
+# and the program reports this.
 
 first = next(c for c in pulse.contacts if c.surface == "backstop" and not c.initial)
 restitution = -first.v_out / first.v_in
@@ -52,7 +53,7 @@ except ph.InputError as error:
     print(error)
 
 # %%
-# A drive whose only firing comes after the end of the run leaves the hammer alone.
+# A drive whose only firing is after the end of the run applies no pulse.
 
 never = ph.PulseTrain(hard.waveform, at=["1 s"])
 hammers = {"hard": hard, "rigid": rigid, "elastomer": elastomer}
@@ -70,10 +71,9 @@ axes[0].set_title("Settle-out on three backstops")
 axes[-1].set_xlabel("time since the return from the paper (µs)")
 
 # %%
-# On the rigid surface the bounces accumulate at a point in time: infinitely many in
-# a finite time, after which the armature rests. The run counts the ones that it can
-# resolve and goes on. A rigid contact has neither depth nor a finite force; its
-# peak force is None.
+# On the rigid surface, infinitely many bounces occur in a finite time, after which
+# the armature rests. The run counts the bounces that it can resolve and continues. A
+# rigid contact has neither depth nor a finite force; its peak force is None.
 
 for name, motion in motions.items():
     touches = [c for c in motion.contacts if c.surface == "backstop"]

@@ -1,11 +1,12 @@
 """
-The paper's hammer behind a rail
-================================
+The paper's hammer with a rail driver
+=====================================
 
-The paper gives the current of its pulse; a driver gives a voltage. With a resistance,
-a constant inductance and a rail that is switched on for a time, the circuit makes the
-same current within some percent of its peak: the higher the rail, the better, since
-the back-EMF of the armature, some volts, then counts for less.
+The paper prescribes the current of its pulse; a driver applies a voltage. With a
+resistance, a constant inductance and a rail that is switched on for a time, the
+circuit reproduces the current within some per cent of its peak. The agreement
+improves with the rail voltage, since the back-EMF of the armature, some volts, is
+then a smaller fraction of it.
 """
 
 import matplotlib.pyplot as plt
@@ -21,7 +22,7 @@ wanted = pulse.value(t)
 
 
 def behind(voltage, logarithms):
-    """The hammer behind a rail: resistance, inductance, on-time, decay resistor."""
+    """Return the hammer with a rail driver, for logarithms of the fitted constants."""
     resistance, inductance, width, decay = np.exp(logarithms)
     return hammer.replace(
         {
@@ -38,19 +39,19 @@ def behind(voltage, logarithms):
 
 
 def current(device):
-    """The current of one pulse, A."""
+    """Return the current of one pulse, A."""
     return ph.simulate(
         device, ph.PulseTrain(device.waveform), duration=500e-6
     ).driven_at(t)
 
 
 # %%
-# Resistance, inductance, on-time and the resistor through which the current decays
-# are fitted: first in the mean, then toward the largest deviation.
+# Resistance, inductance, on-time and the decay resistor are fitted: first to the mean
+# square deviation, then to the largest deviation.
 
 
 def fitted(voltage):
-    """The hammer behind a rail with the best current, and its largest deviation."""
+    """Return the hammer with the best rail driver, and its largest current error."""
 
     def deviation(logarithms):
         return (current(behind(voltage, logarithms)) - wanted) / wanted.max()
@@ -72,7 +73,8 @@ for voltage, (device, worst) in devices.items():
     )
 
 # %%
-# What the circuit makes of it, and where the rest of the supply's energy goes.
+# The next lines compare the dots, and show how the energy of the supply is
+# distributed.
 
 device, _worst = devices[100.0]
 motion = ph.simulate(

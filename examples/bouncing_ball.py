@@ -2,9 +2,9 @@
 A bouncing ball
 ===============
 
-A hammer needs neither magnet nor pack. A mass, a constant force as its spring and a
-rigid backstop make the ball that bounces on the floor: infinitely many bounces in a
-finite time, for which there are closed formulas.
+A hammer requires neither magnet nor pack. A mass, a constant force as its spring and
+a rigid backstop describe a ball that bounces on the floor: infinitely many bounces in
+a finite time, with a closed-form solution.
 """
 
 import matplotlib.pyplot as plt
@@ -22,8 +22,8 @@ ball = ph.Hammer.build(
 )
 
 # %%
-# The amplitude has the unit of a force, so the pulse acts on the ball itself: it is
-# struck from below, flies, and comes back.
+# The amplitude has the unit of a force, so the pulse acts on the ball itself: the
+# ball is struck from below, flies up, and falls back.
 
 motion = ph.simulate(ball, ph.PulseTrain(ball.waveform), duration="4 s", points=4001)
 print(motion)
@@ -38,8 +38,8 @@ axes.set(
 )
 
 # %%
-# Between bounces the motion is a parabola, so bounce n follows from the first one:
-# the speed is multiplied by e each time, a flight lasts 2 v / g, and all flights
+# Between bounces the motion is a parabola, so bounce n follows from the first bounce:
+# the speed is multiplied by e at each bounce, a flight lasts 2 v / g, and all flights
 # together last 2 e v / (g (1 - e)).
 
 bounces = [c for c in motion.contacts if not c.initial]
@@ -58,8 +58,8 @@ print(f"largest error of the time of a bounce      {np.abs(late).max():.1e} s")
 print(f"largest relative error of a speed          {np.abs(fast).max():.1e}")
 
 # %%
-# The heights of the bounces fall by the square of e until the rest is below what
-# the run resolves; from there on the ball rests on the floor.
+# The heights of the bounces decrease by the square of e until they are below the
+# resolution of the run; from then on the ball rests on the floor.
 
 figure, axes = plt.subplots()
 axes.semilogy(
@@ -80,18 +80,19 @@ axes.set(
 axes.legend()
 
 # %%
-# The ledger: all the work of the blow is lost in the bounces.
+# The energy ledger shows that all the work of the pulse is lost in the bounces.
 
 ledger = motion.energy
 print(f"work of the blow    {1e3 * ledger.drive_work:.9f} mJ")
 print(f"loss in the bounces {1e3 * ledger.backstop_loss:.9f} mJ")
 
 # %%
-# On a table that vibrates the ball can bounce for ever. In the frame of the table it
-# feels the force m A w^2 sin(w t) beside its weight. Orbits with one impact a period
-# meet the table each time at the phase p with Gamma cos p = pi (1 - e) / (1 + e), where
-# Gamma = A w^2 / g, so there are two, or none below a fold. One is stable until a
-# multiplier gets to -1, where Gamma sin p = 2 (1 + e^2) / (1 + e)^2.
+# On a vibrating table the ball can bounce forever. In the frame of the table, the
+# force m A w^2 sin(w t) acts on the ball in addition to its weight. Orbits with one
+# impact per period strike the table at the phase p with Gamma cos p = pi (1 - e) / (1
+# + e), where Gamma = A w^2 / g, so there are two such orbits, or none below a fold.
+# One of them is stable until a multiplier reaches -1, where Gamma sin p = 2 (1 + e^2)
+# / (1 + e)^2.
 
 table = ph.load("bouncing-ball")
 weight, restitution = -table.spring.preload, table.backstop.restitution
@@ -101,7 +102,7 @@ doubling = np.hypot(fold, 2.0 * (1.0 + restitution**2) / (1.0 + restitution) ** 
 
 
 def half_way(gamma, sign):
-    """Height and velocity above the table half a period after the phase 0 of it."""
+    """Return height and velocity, half a period after phase 0 of the table."""
     p = sign * np.arccos(fold / gamma)
     height, leaves = gamma * gravity / omega**2, 0.5 * gravity / frequency
     t = (np.pi - p) / omega
@@ -122,8 +123,8 @@ for event in branch.events:
     print(f"{event.kind}: Gamma = {event.value / weight:.12f}, formula {exact:.12f}")
 
 # %%
-# The program follows the branch around the fold and finds both points; the formula is
-# drawn over it.
+# The program follows the branch around the fold and locates both points; the closed
+# form is drawn over the branch.
 
 figure, axes = plt.subplots()
 gamma, height = branch.values / weight, 1e3 * branch.x[:, 0]

@@ -2,10 +2,10 @@
 Brake pulse
 ===========
 
-After its dot the armature falls back and rebounds from the backstop several times. A
-second, narrower pulse, fired while it falls, lets it land softly: a quench by the
-drive instead of the damping. Which pulse does best is a matter of its time and its
-width, and a plane of them answers it.
+After a dot, the armature falls back and rebounds from the backstop several times. A
+second, narrower pulse, fired while the armature falls, makes it land softly: the
+drive, instead of the damping, absorbs the energy. A scan over the time and the width
+of this brake pulse finds the best one.
 """
 
 import matplotlib.pyplot as plt
@@ -19,9 +19,9 @@ alone = ph.simulate(hammer, ph.PulseTrain(pulse), duration="4 ms")
 touch = alone.dots[0].flight_time
 
 # %%
-# In a sequence every firing has a waveform of its own. The first prints, the second
-# is as the hammer's own pulse but for its width. All members of the plane are one
-# ensemble. What counts is how high the armature comes once it has landed.
+# In a sequence, every firing has its own waveform. The first prints; the second is
+# the hammer's own pulse with a different width. All combinations of time and width
+# form one ensemble. The criterion is the height of the rebounds after the landing.
 
 delays = np.linspace(touch, 4.0 * touch, 121)
 widths = np.linspace(0.02, 1.0, 50) * pulse.width
@@ -60,8 +60,8 @@ axes.set(
 )
 
 # %%
-# The best brake and the print pulse in one firing are a chain, which is a waveform
-# like any other: for trains, bursts, and drive files.
+# The print pulse and the best brake pulse can be combined into a chain, which is a
+# waveform like any other, for use in trains, bursts and drive files.
 
 chain = ph.Chain(parts=((0.0, pulse), (float(delay), best)))
 braked = ph.simulate(hammer, ph.PulseTrain(chain), duration="4 ms")
@@ -80,8 +80,8 @@ above.legend()
 below.set(xlabel="time (ms)", ylabel="current (A)")
 
 # %%
-# A second dot over the distance of its pulse from the first one: into the rebounds of
-# a single pulse, and after the soft landing.
+# The last figure shows a second dot against the time of its pulse: fired into the
+# rebounds of a single pulse, and fired after the soft landing.
 
 gaps = np.linspace(delay + touch, 8.0 * touch, 241)
 figure, axes = plt.subplots()

@@ -2,10 +2,10 @@
 A compensation table
 ====================
 
-Fired before it has come to rest, the hammer prints too hard or too soft, too early or
-too late. "Driving current waveforms ought to respond to the phase of the hammer motion
-and the pattern to be printed" (Hendriks, 1983, discussion). Firmware knows the pattern:
-a table tells it when to fire, and for how long.
+If a hammer is fired before it has come to rest, it prints too hard or too soft, too
+early or too late. "Driving current waveforms ought to respond to the phase of the
+hammer motion and the pattern to be printed" (Hendriks, 1983, discussion). Firmware
+knows the pattern: a compensation table tells it when to fire, and for how long.
 """
 
 import matplotlib.pyplot as plt
@@ -18,7 +18,7 @@ rate = 1300.0
 table = ph.tune(hammer, rate=rate, history=1)
 
 # %%
-# The same pattern with one pulse for all dots, and with the table.
+# The same pattern is printed with one pulse for all dots, and with the table.
 
 slots = np.array([0, 1, 2, 3, 5, 6, 8, 11, 12, 13])
 drives = {
@@ -40,14 +40,14 @@ axes[0].set_ylim(60, 150)
 axes[-1].set_xlabel("place of the dot (slots)")
 
 # %%
-# What the firmware gets: a pulse fired later and for less time where the hammer
-# is caught on the rise from the backstop.
+# The table that the firmware receives has later and narrower pulses for dots that are
+# fired while the hammer rises from the backstop.
 
 picture = table.plot()
 
 # %%
-# A table sees nothing. Beside its gain stands what it loses when the hammer is not
-# quite the one it was made for.
+# A table has no sensor. The report shows its gain, and its loss if the hammer differs
+# slightly from the hammer for which the table was tuned.
 
 cases = (ph.Perturbation(), ph.Perturbation(current=0.03), ph.Perturbation(current=0.1))
 report = ph.judge_table(hammer, table, perturbations=cases)

@@ -2,8 +2,9 @@
 Continuation of periodic orbits
 ===============================
 
-Which periodic motions exist at which value of a constant, stable or not? A ball on a
-vibrating table answers in closed form; then the print hammer.
+Continuation shows which periodic motions, stable or unstable, exist at each value of
+a parameter. The first example is a ball on a vibrating table, with a closed-form
+solution; the second is the print hammer.
 """
 
 import math
@@ -22,10 +23,10 @@ ball = ph.Hammer.build(
 )
 
 # %%
-# In the frame of a table that moves as A sin(w t) the ball feels its weight and the
-# force m A w^2 sin(w t). The ratio of the two, Gamma, tells how hard the table
-# shakes. The orbit with one impact a period appears in a fold, and doubles its
-# period, at
+# In the frame of a table that moves as A sin(w t), the ball is subject to its weight
+# and the force m A w^2 sin(w t). The ratio of the amplitude of this force to the
+# weight, Gamma, is the dimensionless acceleration of the table. The orbit with one
+# impact per period appears in a fold, and doubles its period, at
 #
 # .. math::
 #
@@ -37,9 +38,9 @@ fold = math.pi * (1.0 - restitution) / (1.0 + restitution)
 doubling = math.hypot(fold, 2.0 * (1.0 + restitution**2) / (1.0 + restitution) ** 2)
 
 # %%
-# The ball meets the table at the same height each time, so its flight is known, and
-# with it its state half a period after the table is at rest in the middle: a place
-# to start from.
+# The ball strikes the table at the same height each time, so its flight is known in
+# closed form. Its state half a period after phase 0 of the table is the initial
+# guess.
 
 gamma, omega = 0.8, 2.0 * math.pi * frequency
 height, angle = gamma * gravity / omega**2, math.acos(fold / gamma)
@@ -64,7 +65,8 @@ for event, exact in zip(
     print(f"{event.kind:16s} at Gamma = {found:.12f}, exactly {exact:.12f}")
 
 # %%
-# Beyond the doubling the ball needs two periods. That branch is followed as well.
+# Beyond the doubling, the motion repeats after two periods. This branch is followed
+# as well.
 
 (born,) = [event for event in branch.events if event.kind == "period doubling"]
 twice = branch.doubled(born)
@@ -72,7 +74,7 @@ print(twice.message)
 
 
 def draw(axes, one, x, y, color):
-    """Draw stable parts of a branch solid, unstable ones dashed."""
+    """Draw a branch, solid where it is stable and dashed where it is unstable."""
     for stable, style in ((True, "-"), (False, "--")):
         axes.plot(np.where(one.stable == stable, x, np.nan), y, style, color=color)
 
@@ -90,9 +92,9 @@ axes.set(
 )
 
 # %%
-# The print hammer, around 1.3 ms between firings: its branch of period 1 doubles, and
-# turns back at folds, between which several motions exist at once. `period_1.plot()`
-# draws it too.
+# For the print hammer, around 1.3 ms between firings, the branch of period 1 doubles
+# and turns back at folds, between which several motions coexist. `period_1.plot()`
+# draws this branch, too.
 
 hammer = ph.load("hendriks-1983")
 period_1 = ph.continuation(hammer, "period", ("1.23 ms", "1.36 ms"), period="1.25 ms")
@@ -107,8 +109,8 @@ for event in period_1.events:
 axes.set(xlabel="period (ms)", ylabel="velocity at the firing (m/s)")
 
 # %%
-# Each orbit of a branch tells what it does, such as when its dots strike: motions that
-# exist at the same rate print at different times.
+# Each orbit of a branch includes its dots and energies. Motions that coexist at the
+# same rate print at different times.
 
 figure, axes = plt.subplots()
 draw(axes, period_1, 1e3 * period_1.values, 1e6 * period_1.flight_time, "C0")

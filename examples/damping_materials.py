@@ -1,16 +1,18 @@
 """
-What a better backstop would buy
-================================
+What a better backstop would gain
+=================================
 
-The paper ends with a wish: "passive damping methods should be improved, probably
-requiring a breakthrough in materials". Here the backstop is exchanged, and the current
-set anew so that a single pulse prints as hard as before. What is left to differ is how
-the hammer settles, and how fast it may be fired.
+The paper concludes that "passive damping methods should be improved, probably
+requiring a breakthrough in materials". In this example, the backstop is replaced, and
+the current is adjusted such that a single pulse prints with the same force as before.
+The materials then differ only in how the hammer settles, and in the rate at which it
+may be fired.
 """
 
 # %%
-# Three hard backstops with more or less damping, and two elastomers, which give way by
-# some micrometres and creep back. The safe rate is found on a coarse grid.
+# The study compares three hard backstops with different damping and two elastomers,
+# which deform by some micrometres and creep back. The safe rate is computed on a
+# coarse grid.
 
 import printhammer as ph
 
@@ -20,7 +22,7 @@ stop = hammer.backstop.position
 
 
 def elastomer(stiffness, relaxation_time):
-    """Return what to replace for a backstop of an elastomer."""
+    """Return the constants to replace for an elastomer backstop."""
     return {
         "backstop": {
             "law": "elastomer",
@@ -43,9 +45,9 @@ found = ph.damping_study(hammer, materials, first=300, step=100)
 found.plot()
 
 # %%
-# The energy that the backstop takes is what the pack leaves, whatever the material:
-# damping saves no energy. It saves time. The fewer rebounds, the sooner the next dot
-# may be fired.
+# For any material, the backstop absorbs the energy that the pack does not absorb:
+# damping saves no energy, but it saves time. The fewer rebounds, the sooner the next
+# dot may be fired.
 
 for number, material in enumerate(materials):
     print(

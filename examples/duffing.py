@@ -2,9 +2,9 @@
 Duffing's equation with two wells
 =================================
 
-A buckled beam that is shaken, after P. Holmes (Phil. Trans. R. Soc. Lond. A 292 (1979)
-419): x'' = F cos t + x - x³ - 0.2 x'. It has no contacts, and a spring with a negative
-stiffness and a cubic term; its strobe map is strange.
+The equation x'' = F cos t + x - x³ - 0.2 x' describes a shaken buckled beam, after P.
+Holmes (Phil. Trans. R. Soc. Lond. A 292 (1979) 419). This hammer has no contacts, and
+a spring with a negative stiffness and a cubic term; its attractor is strange.
 """
 
 import math
@@ -18,8 +18,8 @@ beam = ph.load("duffing-holmes")
 force = ph.SineForce(0.3, 1.0 / (2.0 * math.pi), phase="90 deg")
 
 # %%
-# Both exponents, and their sum, which is minus the damping whatever the motion does:
-# quoted are 0.159 and -0.359 per unit of time.
+# The sum of the two exponents is minus the damping coefficient for any motion. The
+# published exponents are 0.159 and -0.359 per unit of time.
 
 growth = ph.lyapunov(beam, drive=force, state=(0.1, 0.1), firings=5000, transient=200)
 errors = growth.standard_errors / (2.0 * math.pi)
@@ -30,7 +30,7 @@ print(f"dimension {growth.dimension:.3f} +- {growth.dimension_error:.3f}")
 
 # %%
 # The states at the beginning of each period of the force lie on the attractor; the
-# beam's two places of rest are in the middle of its wells.
+# beam has two rest positions, at the centres of its wells.
 
 states = growth.points
 figure, axes = plt.subplots()
@@ -43,7 +43,7 @@ axes.set(
 )
 
 # %%
-# The energy that the force gives is what the damping takes, in the mean.
+# On average, the damping dissipates the energy that the force supplies.
 
 motion = ph.simulate(beam, force, state=(0.1, 0.1), duration=400.0, points=4001)
 energy = motion.energy

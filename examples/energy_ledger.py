@@ -2,9 +2,10 @@
 The energy ledger
 =================
 
-What the coil gives, what ribbon, paper and backstop take, and what remains. Every
-term has a quadrature of its own along the run; none is computed as a difference of
-the others, so that their sum is a check of the whole run.
+The energy ledger lists the work of the coil, the energy absorbed by ribbon, paper and
+backstop, and the stored energy. Every term is integrated separately along the run; no
+term is computed as a difference of others, so that the sum of all terms is a check on
+the whole run.
 """
 
 import matplotlib.pyplot as plt
@@ -16,8 +17,8 @@ drive = ph.PulseTrain(hammer.waveform)
 motion = ph.simulate(hammer, drive)
 
 # %%
-# From rest to rest, kinetic and stored energy come back to where they were, and the
-# coil's work is what the contacts took.
+# From rest to rest, kinetic and stored energy return to their initial values, and the
+# work of the coil equals the energy absorbed by the contacts.
 
 ledger = motion.energy
 for name in ("coil_work", "pack_loss", "backstop_loss", "kinetic", "stored"):
@@ -26,8 +27,8 @@ share = abs(ledger.residual) / ledger.throughput
 print(f"{'residual':14s} {ledger.residual:10.1e} J, {share:.0e} of the throughput")
 
 # %%
-# Contact by contact. Where rebounds follow ever faster, small losses add up to a
-# high power.
+# The same losses, contact by contact: where rebounds follow in ever shorter
+# intervals, small losses add up to a high power.
 
 contacts = [c for c in motion.contacts if not c.initial]
 figure, axes = plt.subplots()
@@ -58,7 +59,7 @@ axes.set(
 )
 
 # %%
-# The residual follows the tolerance of the run. At the default of 2e-11 it is
+# The residual decreases with the tolerance of the run. At the default of 2e-11, it is
 # below a billionth of the throughput.
 
 tolerances = [10.0**-k for k in range(5, 14)]

@@ -1,10 +1,10 @@
 """
-Chaos, asked twice
-==================
+Two tests for chaos
+===================
 
-Is a train chaotic? The Lyapunov exponents follow how neighbouring motions part. The
-0-1 test looks at the series of states alone. The two share nothing else, so that it
-means something if they agree.
+The example tests whether a train is chaotic. The Lyapunov exponents measure how fast
+neighbouring motions diverge. The 0-1 test uses the series of states alone. The two
+tests are otherwise independent, so that their agreement is significant.
 """
 
 import printhammer as ph
@@ -19,24 +19,28 @@ for period in ("1.25 ms", "1.20 ms", "1.15 ms"):
 estimates = found.plot()
 
 # %%
-# A positive exponent is the rate at which motions part that begin alike. The other one
-# is far below zero: what is a small rectangle of states at one firing is a thread at
-# the next, and the dimension of the attractor is hardly more than one.
+# A positive exponent is the rate at which initially close motions diverge. The other
+# exponent is far below zero: a small rectangle of states at one firing is stretched
+# to a thin strip at the next, and the dimension of the attractor is hardly more than
+# one.
 #
-# The series of states walks a point about in a plane. If it is chaotic the point
-# walks off at random, and the square of its distance grows with time.
+# In the 0-1 test, the series of states drives a point in a plane. If the series is
+# chaotic, the point performs a random walk, and its mean square displacement grows
+# with time.
 
 walk = found.zero_one.plot()
 
 # %%
-# When does the motion come back to where it was? Diagonal lines are stretches during
-# which it repeats what it did before, until it has forgotten.
+# A recurrence plot shows when the motion returns to an earlier state. Diagonal lines
+# are intervals during which the motion repeats an earlier interval, until the two
+# diverge.
 
 returns = ph.recurrence(found.points, rate=0.05).plot()
 
 # %%
-# What is heard of all this is a train of impacts on the paper. Each interval is drawn
-# against the one before: however irregular they are, a simple rule makes them.
+# The audible part of this motion is a train of impacts on the paper. Each interval
+# between impacts is plotted against the preceding interval: although the intervals
+# are irregular, a simple rule generates them.
 
 dots = ph.section(hammer, surface="pack", period="1.15 ms", touches=2000, transient=500)
 train = ph.impact_train(dots)
@@ -44,7 +48,7 @@ print(f"intervals vary by {100 * train.variation:.1f} %")
 intervals = train.plot()
 
 # %%
-# The backstop is met several times each period. Velocity, and time since the firing,
-# are all of the state there.
+# The armature strikes the backstop several times per period. At these contacts,
+# velocity and time since the firing determine the state.
 
 impacts = ph.section(hammer, period="1.15 ms", touches=2000, transient=500).plot()

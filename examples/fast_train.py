@@ -2,9 +2,9 @@
 A fast train that loses dots
 ============================
 
-At low rates every dot is like the first. At rates for which the settle-out is
-incomplete, flight times and forces begin to differ, and at some rates dots are
-lost: here every second one.
+At low rates, every dot is like the first. At rates for which the settle-out is
+incomplete, flight times and forces begin to differ, and at some rates dots are lost:
+in this example, every second dot.
 """
 
 import matplotlib.pyplot as plt
@@ -31,9 +31,8 @@ axes[1].set_title("Nine pulses at 1 kHz")
 axes[1].set_xlabel("time (ms)")
 
 # %%
-# One line for each firing. The contact that makes a dot is the first one with the
-# pack after the firing and before the next; further ones are counted as extra
-# contacts.
+# The table has one line for each firing. The first pack contact between a firing and
+# the next makes the dot; further pack contacts count as extra contacts.
 
 for dot in fast.dots:
     if dot.struck:
@@ -45,9 +44,8 @@ for dot in fast.dots:
         print(f"{dot.index}: lost")
 
 # %%
-# Nine-pulse bursts at many rates. The abstract of the paper says in which order
-# things go wrong: first the flight times and forces vary, then strict periodicity
-# is lost.
+# The next figure shows nine-pulse bursts at many rates. According to the abstract of
+# the paper, flight times and forces vary first, then strict periodicity is lost.
 
 rates = np.arange(400.0, 2001.0, 25.0)
 lost = np.zeros(len(rates))

@@ -2,9 +2,9 @@
 Frequency-time map
 ==================
 
-Nine pulses at many firing rates, laid side by side: time to the right, rate upward,
-displacement as colour. Hendriks (1983), figure 9, shows in one picture how the
-performance of an actuator degrades when it is forced hard.
+A frequency-time map shows bursts of nine pulses at many firing rates: time to the
+right, rate upward, displacement as colour. In Hendriks (1983), figure 9 shows how the
+performance of an actuator degrades at high rates.
 """
 
 import matplotlib.pyplot as plt
@@ -30,10 +30,10 @@ axes.set(
 
 # %%
 # Each bright band is one excursion into the pack. At low rates there are nine equal
-# ones. Further up they waver in time, and some are missing: lost dots. From about
-# 2.2 kHz on the armature no longer comes back to the backstop.
+# excursions. At higher rates their times vary, and some are missing: lost dots. From
+# about 2.2 kHz on, the armature no longer returns to the backstop.
 #
-# The map is an xarray data set, so that one can ask it.
+# The map is an xarray.Dataset, from which further quantities can be computed.
 
 lost = ~chart.struck
 first = chart.rate[lost.any("firing")].values[0]
@@ -43,8 +43,9 @@ for name in ("flight_time", "peak_force"):
     print(f"{name} at 500 Hz: {float(slow.min()):.4g} to {float(slow.max()):.4g}")
 
 # %%
-# Flight times and forces against rate, a dot for each firing. The abstract of the
-# paper says how it begins: with variations of flight time and print force.
+# The next figure shows flight times and forces against rate, with a point for each
+# firing. According to the abstract of the paper, the first effects are variations of
+# flight time and print force.
 
 figure, (above, below) = plt.subplots(2, 1, sharex=True)
 later = chart.isel(firing=slice(1, None))

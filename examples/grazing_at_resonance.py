@@ -2,9 +2,10 @@
 Grazing at resonance
 ====================
 
-The example 15.2 of H. Dankowicz and F. Schilder, *Recipes for Continuation* (2013): an
-oscillator at its resonance, with a stop. Its free oscillation touches the stop at a
-forcing of 0.1; orbits with impacts come back to the same point.
+Example 15.2 of H. Dankowicz and F. Schilder, *Recipes for Continuation* (2013), is an
+oscillator with a stop, driven at resonance. Its oscillation without impacts reaches
+the stop at a forcing of 0.1; the branch of orbits with impacts ends at the same
+point.
 """
 
 import math
@@ -18,13 +19,14 @@ oscillator = ph.load("dankowicz-schilder-2013")
 
 
 def force(amplitude):
-    """The force of the book, whose stop lies on the other side."""
+    """Return the force of the book, mirrored like the position of the stop."""
     return ph.SineForce(amplitude, 1.0 / (2.0 * math.pi), phase="-90 deg")
 
 
 # %%
-# At resonance the amplitude is A / (c w), so that a branch of free oscillations ends at
-# A = 0.1, where a contact without speed leaves the strobe map without a derivative.
+# At resonance the amplitude is A / (c w), so that the branch of oscillations without
+# impacts ends at A = 0.1. There, the oscillation touches the stop with zero velocity,
+# and the strobe map has no derivative.
 
 free = ph.continuation(
     oscillator, "drive.amplitude", (0.02, 0.5), drive=force(0.05), state=(0.0, -0.5)
@@ -34,8 +36,8 @@ print(free.message)
 print(f"grazing at A = {grazing.parameter:.12f}")
 
 # %%
-# The book starts from an orbit with one impact at A = 1 and goes down. Here a train
-# from rest settles to it.
+# The book starts from an orbit with one impact at A = 1 and continues it toward
+# smaller A. Here, a motion from rest settles to this orbit.
 
 points = ph.strobe(oscillator, drive=force(1.0), points=20, transient=300)
 print(points.verdict)
@@ -51,7 +53,7 @@ for event in impacts.events:
     print(f"{event.kind} at A = {event.value:.9f}")
 
 # %%
-# Both branches.
+# The figure shows both branches.
 
 figure, axes = plt.subplots()
 for branch, color, label in ((free, "C1", "free"), (impacts, "C0", "one impact")):

@@ -3,8 +3,8 @@ The linear impact oscillator
 ============================
 
 The standard system of nonsmooth dynamics, built from replaceable parts: a mass on a
-linear spring, driven by a sinusoidal force, in front of a rigid stop. Between
-impacts its motion is known in closed form, so the run can be held against the exact
+linear spring, driven by a sinusoidal force, in front of a rigid stop. Between impacts
+its motion is known in closed form, so that the run can be compared with the exact
 solution.
 """
 
@@ -24,25 +24,25 @@ oscillator = ph.Hammer.build(
 )
 
 # %%
-# A spring counts its travel from the backstop, b of equation (4). So that this one
-# is relaxed at x = 0, its force at the stop, the preload, is -1 N/m times the
-# position of the stop.
+# The deflection of a spring is measured from the backstop, b of equation (4). For
+# this spring to be relaxed at x = 0, its force at the stop, the preload, is -1 N/m
+# times the position of the stop.
 
 drive = ph.SineForce("1 N", frequency=omega / (2.0 * math.pi), phase="90 deg")
 motion = ph.simulate(oscillator, drive, state=(0.0, 0.0), duration=60.0, points=6001)
 print(motion.status, len(motion.contacts), "impacts")
 
 # %%
-# The exact solution of x'' + x = cos(omega t) from a state (t0, x0, v0) is a forced
-# oscillation and a free one. The next impact is the first zero of x - b after t0:
-# bracketed on a fine grid and refined by bisection to the last bit. This is all
-# there is to an oracle for this system; it shares nothing with the program.
+# The exact solution of x'' + x = cos(omega t) from a state (t0, x0, v0) is the sum of
+# a forced and a free oscillation. The next impact is the first zero of x - b after
+# t0, bracketed on a fine grid and refined by bisection to the last bit. These
+# functions are a complete oracle for this system, and share no code with the program.
 
 gain = 1.0 / (1.0 - omega**2)
 
 
 def exact(t, t0, x0, v0):
-    """Displacement and velocity at times t of the motion from (t0, x0, v0) on."""
+    """Return the exact displacement and velocity at times t, from (t0, x0, v0) on."""
     a = x0 - gain * math.cos(omega * t0)
     b = v0 + gain * omega * math.sin(omega * t0)
     x = a * np.cos(t - t0) + b * np.sin(t - t0) + gain * np.cos(omega * t)
@@ -51,7 +51,7 @@ def exact(t, t0, x0, v0):
 
 
 def next_impact(start):
-    """Time and velocity of the first fall through the stop in a piece."""
+    """Return the time and velocity of the first impact after a start (t0, x0, v0)."""
     grid = start[0] + np.linspace(1e-9, 20.0, 40_001)
     below = np.flatnonzero(exact(grid, *start)[0] < stop)
     low, high = (grid[below[0] - 1] if below[0] else start[0]), grid[below[0]]
@@ -74,8 +74,8 @@ x_exact = np.array(
 )
 
 # %%
-# The two lie upon one another; the difference grows slowly, since errors made at
-# one impact are carried on.
+# The two curves coincide; their difference grows slowly, since errors made at one
+# impact propagate to the next.
 
 figure, (above, below) = plt.subplots(2, 1, sharex=True, height_ratios=(3, 2))
 above.plot(motion.t, motion.x, label="printhammer")
@@ -92,7 +92,7 @@ apart = np.abs(impacts - starts[1:]).max()
 print(f"largest difference of impact times  {apart:.1e} s")
 
 # %%
-# A tighter tolerance makes the difference smaller.
+# A tighter tolerance reduces the difference.
 
 finer = ph.simulate(
     oscillator,
@@ -105,7 +105,7 @@ finer = ph.simulate(
 print(f"at the tolerance 1e-13              {np.abs(finer.x - x_exact).max():.1e} m")
 
 # %%
-# The phase plane: the velocity jumps at the stop.
+# In the phase plane, the velocity jumps at the stop.
 
 _, v = motion.at(motion.t)
 jump = np.flatnonzero(np.diff(which)) + 1

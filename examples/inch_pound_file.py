@@ -2,9 +2,10 @@
 A hammer file in inches and pounds
 ==================================
 
-Units exist at the edges of the program only. A hammer file may mix them freely;
-what is read is SI, and what is written back is the file as it was, comments and
-units included, with the replaced constants in the units in which they were given.
+Units exist only at the interfaces of the program. A hammer file may mix units freely.
+Internally, all values are in SI; when the hammer is saved, the file keeps its
+comments and units, and replaced constants are written in the units in which they were
+specified.
 """
 
 import tempfile
@@ -64,8 +65,7 @@ path.write_text(text, encoding="utf-8")
 hammer = ph.load(path)
 
 # %%
-# Each constant keeps the text of the file beside its SI value, and says where it
-# comes from.
+# Each constant stores the value and unit of the file, its SI value, and its source.
 
 for constant in hammer.constants.values():
     given = f"{constant.value:g} {constant.unit}"
@@ -79,7 +79,7 @@ for constant in hammer.constants.values():
 print(f"k = {hammer.backstop.k:.4g} N/m^1.5, l = {hammer.backstop.l:.4g} N s/m^2.5")
 
 # %%
-# The warnings are what `printhammer hammer check` says.
+# `printhammer hammer check` prints these warnings, too.
 
 print(hammer.warnings() or "nothing to warn about")
 motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
@@ -97,8 +97,8 @@ axes.set(
 )
 
 # %%
-# Replacing gives a new hammer and leaves the old one as it is. The fingerprint
-# covers the physics only: the same constant in another unit is the same hammer.
+# `replace` returns a new hammer and does not change the original. The fingerprint
+# depends on the physics only: a constant in a different unit does not change it.
 
 stiffer = hammer.replace(
     "pack.stiffness", "70 lbf", status="stated", source="four-part form"
@@ -110,8 +110,8 @@ print(
 )
 
 # %%
-# Written and read back, nothing is lost: the comments are there, and one line has
-# changed.
+# The hammer can be saved and reloaded without loss: the comments are preserved, and
+# one line has changed.
 
 stiffer.save(folder / "stiffer.toml")
 again = ph.load(folder / "stiffer.toml")
@@ -122,7 +122,8 @@ for old, new in zip(before, after, strict=True):
         print(f"- {old}\n+ {new}")
 
 # %%
-# Bad input is one sentence that names file, key, value and what was expected.
+# Invalid input raises an error of one sentence that names the file, the key, the
+# value and the expectation.
 
 for wrong in (
     text.replace('"oz"', '"lbf"'),

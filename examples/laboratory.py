@@ -2,9 +2,9 @@
 A synthetic laboratory
 ======================
 
-The constants of a hammer come from measurements, and these have noise. Here a hammer
-is measured on five benches, each with sensors as an ordinary laboratory has them, its
-constants are found from the tables, and a hammer is built of them.
+The constants of a hammer are estimated from measurements with noise. In this example,
+a hammer is measured on five benches with the sensors of an ordinary laboratory, its
+constants are fitted to the tables, and a hammer is built from the fitted constants.
 """
 
 import tempfile
@@ -23,13 +23,14 @@ for kind in ("magnet", "spring", "pack", "backstop", "motion"):
     tables[kind].write(folder / f"{kind}.csv")
 
 # %%
-# Held at one place after the other, the armature shows the force of magnet and spring
-# at several currents, and that of the spring alone. Slow load cycles show the loop of
-# the pack; rebounds, how much the backstop keeps.
+# With the armature held at a series of displacements, the force of magnet and spring
+# is measured at several currents, and so is the force of the spring alone. Slow load
+# cycles show the hysteresis loop of the pack; rebounds show the losses in the
+# backstop.
 
 figure, axes = plt.subplots(1, 3, figsize=(10, 3.4))
 panel, magnet = axes[0], tables["magnet"]
-# Each row has a reading of the current, with its noise; what was set is exact.
+# Each row has a noisy reading of the current; the set value of the current is exact.
 for current in np.unique(magnet.true["current"]):
     rows = magnet.true["current"] == current
     x, force = magnet.values["displacement"][rows], magnet.values["force"][rows]
@@ -55,7 +56,8 @@ panel.set(xlabel="impact speed (m/s)", ylabel="restitution", title="Backstop")
 
 # %%
 # The record of one shot is sampled at 1 MHz behind a first-order low-pass of 200 kHz:
-# it is late by 0.8 µs, and by 1 µm where the armature is fast. The fit knows that.
+# it lags by 0.8 µs, and therefore by 1 µm where the armature is fast. The fit
+# includes this lag.
 
 motion = tables["motion"].values
 exact = ph.measure("motion", hammer, sensor={"exact": True}).values
@@ -71,9 +73,9 @@ axes[0].set_title("Record of one shot, and what was there")
 axes[1].set_title("Its first contact with the pack")
 
 # %%
-# Static fits first, each from its own table; the record then gives the mass, and
-# improves what the others have found. The true values are known here, and so one can
-# see what the intervals are worth.
+# The static constants are fitted first, each from its own table; the record then
+# determines the mass, and refines the static constants. Since the true values are
+# known here, the intervals can be verified.
 
 fits = [
     ph.fit(
@@ -82,7 +84,7 @@ fits = [
     ph.fit("pack", folder / "pack.csv", hammer=hammer),
     ph.fit("backstop", folder / "backstop.csv", hammer=hammer),
 ]
-built = hammer.replace("mass", "0.5 g")  # a first guess
+built = hammer.replace("mass", "0.5 g")  # initial guess
 for fit in fits:
     built = fit.into(built)
 record = ph.fit("motion", folder / "motion.csv", hammer=built)
@@ -110,7 +112,8 @@ panel.set(
 )
 
 # %%
-# The hammer that is built of the constants prints its dot when the measured one does.
+# The hammer built from the fitted constants prints its dot at the same time as the
+# measured hammer.
 
 for one in (hammer, built):
     dot = ph.simulate(one, ph.PulseTrain(hammer.waveform)).dots[0]

@@ -2,10 +2,10 @@
 Constants from measurements
 ===========================
 
-What the paper's author did with his hammer: measure forces, load cycles and
-rebounds, and find the constants in them. Here the measurements come from a
-synthetic laboratory, so that the truth is known: it has a force sensor with 0.5 %
-of noise, a displacement sensor with 0.2 um, and one reading in fifty is wrong.
+Like the author of the paper, this example measures forces, load cycles and rebounds,
+and fits the constants of the hammer to them. The measurements are made in a synthetic
+laboratory, so that the true values are known. The force sensor has a noise of 0.5 %,
+the displacement sensor of 0.2 um, and one reading in fifty is an outlier.
 """
 
 import tempfile
@@ -23,9 +23,9 @@ for kind in ("magnet", "spring", "pack", "backstop"):
     table.write(folder / f"{kind}.csv")
 
 # %%
-# Forces of magnet and spring together do not tell the largest magnetic force F0 from
-# the force Bs of the spring. With the spring measured alone they do. Readings that
-# lie too far off are left out and named.
+# The combined force of magnet and spring does not distinguish the largest magnetic
+# force F0 from the force Bs of the spring. With a separate measurement of the spring,
+# both are determined. Outliers are excluded and listed.
 
 fits = [
     ph.fit(
@@ -39,8 +39,8 @@ for found in fits:
 fits[0].plot()
 
 # %%
-# How far are the constants from the truth, in standard errors? Nineteen of twenty
-# should lie within two.
+# The figure shows the deviations of the fitted constants from the true values, in
+# standard errors. Nineteen of twenty should lie within two standard errors.
 
 made = hammer
 names, distances = [], []
@@ -60,7 +60,7 @@ ax.set_yticks(np.arange(len(names)), names)
 ax.set(xlabel="found less true, in standard errors", xlim=(-4, 4))
 
 # %%
-# The hammer made of what was found flies like the one that was measured.
+# The hammer with the fitted constants moves like the measured hammer.
 
 drive = ph.PulseTrain(hammer.waveform, at=[0.0])
 for name, one in (("measured", hammer), ("made", made)):

@@ -2,11 +2,11 @@
 A magnet from a measured force table
 ====================================
 
-Equation (3) of the paper is a fit to measured forces. The table itself will do as
-well: forces on a grid of displacements and currents, read from a CSV file and
-joined by a bicubic spline, which is smooth enough for the integrator. Here a table
-is made from equation (3), so that the result can be compared with what it should
-be.
+Equation (3) of the paper is a fit to measured forces. The table itself can replace
+the fit: forces on a grid of displacements and currents, read from a CSV file and
+interpolated by a bicubic spline, which is smooth enough for the integrator. In this
+example, the table is computed from equation (3), so that the result can be compared
+with the exact law.
 """
 
 import tempfile
@@ -22,7 +22,7 @@ folder = Path(tempfile.mkdtemp())
 
 
 def write_table(path: Path, columns: int) -> None:
-    """Write the forces at 5 currents and at displacements closer where it is steep."""
+    """Write a force table, with denser displacements where the force is steep."""
     magnet = hammer.magnet
     lines = ["displacement [um],current [A],force [N]"]
     for x in np.geomspace(25.4e-6, 420e-6, columns):
@@ -37,7 +37,7 @@ write_table(table, 25)
 print("\n".join(table.read_text(encoding="utf-8").splitlines()[:4]))
 
 # %%
-# The table replaces the magnet; the other parts stay.
+# The table replaces the magnet; the other parts are unchanged.
 
 measured = hammer.replace("magnet", {"law": "table", "file": str(table)})
 drive = ph.PulseTrain(hammer.waveform, at=["0 us", "700 us"])
@@ -53,8 +53,8 @@ below.plot(1e3 * exact.t, 1e9 * (spline.x - exact.x), color="C1")
 below.set(xlabel="time (ms)", ylabel="difference (nm)")
 
 # %%
-# A spline through more points comes closer, with the fourth power of the spacing;
-# here over the first 600 us.
+# The error of the spline decreases with the fourth power of the spacing of its
+# points; it is shown for the first 600 us.
 
 counts = (13, 25, 49, 97)
 largest = []
@@ -68,9 +68,9 @@ for count in counts:
     print(f"{count:3d} displacements: largest difference {1e9 * largest[-1]:.4f} nm")
 
 # %%
-# Nothing is extrapolated. A run that leaves the table ends there, with a status
-# that says so: here the armature is thrown at the backstop so fast that it is
-# compressed beyond the table.
+# Tables are not extrapolated. A run that leaves the table ends with the status "range
+# left": in this run, the armature is thrown at the backstop so fast that it moves
+# beyond the table.
 
 thrown = ph.simulate(measured, drive, state=(hammer.front, -6.0), duration="1 ms")
 print(thrown.status, "-", thrown.message)

@@ -2,9 +2,10 @@
 Periodic orbits
 ===============
 
-A train from rest shows where it ends, and nothing else. Beside that there are motions
-that repeat as well, but from which the smallest change leads away. A search finds both
-kinds, with the factors by which small changes grow in one period: the multipliers.
+A train from rest shows only the motion to which it settles. There are also periodic
+motions that are unstable: the smallest change leads away from them. A search finds
+both kinds, with the factors by which small changes grow in one period: the
+multipliers.
 """
 
 import matplotlib.pyplot as plt
@@ -19,14 +20,14 @@ for orbit in found:
     print(orbit.name, orbit.multipliers)
 
 # %%
-# Two orbits are stable: which of them a train ends on is decided by how it begins. The
-# edge between what leads to one and to the other runs through a saddle.
+# Two orbits are stable; the initial state decides to which of them a train settles.
+# The boundary between the initial states of the two orbits runs through a saddle.
 
 found.plot()
 
 # %%
-# What an orbit does in a period is known with it: contacts, dots, energies. The coil's
-# work is what pack and backstop take.
+# Each orbit includes its contacts, dots and energies in a period. The work of the
+# coil equals the energy absorbed by pack and backstop.
 
 for orbit in found:
     energy = orbit.energy
@@ -38,17 +39,18 @@ for orbit in found:
     )
 
 # %%
-# A strange train has no stable orbit, but many unstable ones: it goes along one of them
-# for a while, leaves it, and comes near another. Their states lie on the attractor
-# or beside it.
+# Near a strange train there is no stable orbit, but many unstable orbits: the train
+# follows one of them for a while, leaves it, and approaches another. The states of
+# these orbits lie on the attractor or near it.
 
 strange = ph.orbits(hammer, period="1.15 ms", longest=6, starts=100)
 print(strange.message)
 strange.plot(points=2000)
 
 # %%
-# How fast the unstable ones lose their neighbours, per firing, beside the largest
-# exponent of the train, which is an average over what it comes near.
+# The figure compares the growth rates of small changes on the unstable orbits, per
+# firing, with the largest exponent of the train, which is an average over the orbits
+# that the train approaches.
 
 exponent = ph.strobe(hammer, period="1.15 ms", points=1).verdict.exponent
 rates = [np.log(abs(orbit.multipliers[0])) / orbit.firings for orbit in strange]

@@ -1,11 +1,11 @@
 """
-A part of one's own
+Write your own part
 ===================
 
-A new law is one small file outside the package: plain scalar functions for the
-force and the energy, a class with the constants, and a line that registers it. It
-then has a place in hammer files, in checks and in the kernel like the laws that
-come with the program, and runs as fast.
+A new law is one small file outside the package: plain scalar functions for the force
+and the energy, a class with the constants, and a line that registers it. The law can
+then be used in hammer files, in checks and in the kernel like the laws of the
+program, and runs equally fast.
 """
 
 from pathlib import Path
@@ -18,13 +18,13 @@ from scipy.special import ellipk
 import printhammer as ph
 
 # %%
-# The whole file. Importing it has registered the law.
+# This is the whole file. Importing it has registered the law.
 
 print(Path(cubic_spring.__file__).read_text(encoding="utf-8"))
 
 # %%
-# The paper compares its hammer with Duffing's equation, which this spring makes: m
-# x'' + K x + D x^3 = 0.
+# The paper compares its hammer with Duffing's equation, which a mass on this spring
+# obeys: m x'' + K x + D x^3 = 0.
 
 oscillator = ph.Hammer.build(
     "1 kg",
@@ -34,9 +34,8 @@ oscillator = ph.Hammer.build(
 print(oscillator.to_toml())
 
 # %%
-# Its free oscillations have a period that falls with the amplitude. The exact
-# period is an elliptic integral, T = 4 K(m) / sqrt(1 + a^2) with m = a^2 / (2 (1 +
-# a^2)).
+# The period of its free oscillations decreases with the amplitude. The exact period
+# is an elliptic integral, T = 4 K(m) / sqrt(1 + a^2) with m = a^2 / (2 (1 + a^2)).
 
 still = ph.SineForce("0 N", "1 Hz")
 amplitudes = np.geomspace(0.1, 10.0, 25)
@@ -68,8 +67,8 @@ below.loglog(
 below.set(xlabel="amplitude (m)", ylabel="relative error")
 
 # %%
-# A file that names the law can be read once the part is registered. A wrong key is
-# refused like in any other part.
+# A hammer file that names the law can be read once the part is registered. A wrong
+# key is an error, as in any other part.
 
 try:
     oscillator.replace("spring.qubic", "1 N/m^3")

@@ -1,19 +1,19 @@
 """
-How fast may it print?
-======================
+How fast may a hammer print?
+============================
 
-Two numbers decide what a wire prints at a rate: how hard each dot is struck, and when.
-Both depend on the dots before, since the armature has not settled when it is fired
-again. The safe rate is the largest rate up to which every pattern of eight slots from
-rest, and a cycle in which all such patterns follow each other, is printed within
-limits: the force of a single pulse within 10 %, its flight time within 50 µs, no second
-contact.
+Two numbers decide what a wire prints at a rate: how hard each dot is struck, and
+when. Both depend on the preceding dots, since the armature has not settled when it is
+fired again. The safe rate is the largest rate up to which every pattern of eight
+slots from rest, and a cycle in which all such patterns follow each other, is printed
+within limits: force within 10 % and flight time within 50 µs of a single pulse, and
+no second contact.
 """
 
 # %%
-# The rates are run one after the other, and beyond the first that fails, to see how the
-# dots drift apart. Bands reach from the worst dot on one side to the worst dot on the
-# other.
+# The rates are simulated one after the other, also beyond the first rate that fails,
+# to show how the dots begin to differ. The bands reach from the largest negative to
+# the largest positive deviation of a dot.
 
 import printhammer as ph
 
@@ -23,10 +23,10 @@ picture = safe.plot()
 print(f"safe up to {safe.rate:g} Hz. {safe.failure.text}")
 
 # %%
-# Beyond the safe rate there are good and bad rates. Of the worst of them the quality
-# report tells which dots are off, and what tolerances the flight times would keep: the
-# paper tells of 200 µs from peak to peak for dot matrix printing, and of a few tens of
-# microseconds for engraved characters.
+# Beyond the safe rate there are good and bad rates. For the worst rate, the quality
+# report shows which dots are outside the limits, and which tolerances the flight
+# times satisfy: the paper mentions 200 µs peak to peak for dot matrix printing, and a
+# few tens of microseconds for engraved characters.
 
 worst = safe.rates[(safe.force_high - safe.force_low).argmax()]
 report = ph.quality(hammer, worst)
@@ -39,8 +39,8 @@ print("good enough for engraved characters:", report.engraved)
 print(f"the backstop takes {1e3 * report.backstop_loss:.2f} mJ a dot")
 
 # %%
-# No hammer is like its drawing. Here 32 hammers are drawn whose constants are all
-# within 1 % of those of the design, and tried at one rate.
+# No hammer matches its drawing exactly. The last lines evaluate, at one rate, 32
+# random hammers whose constants are within 1 % of the design.
 
 hammers = ph.tolerance_yield(hammer, 825, number=32, spreads=0.01)
 picture = hammers.plot()

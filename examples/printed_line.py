@@ -2,10 +2,9 @@
 A printed line
 ==============
 
-What comes of all this on paper: a text, set in dots for nine wires, a hammer on each
-of them, and a carriage that moves one column in a slot. A dot that flies shorter or
-longer than the others lands beside its place, a weak one is grey, a lost one is
-missing.
+This example prints a text as dots of nine wires, with a hammer on each wire and a
+carriage that moves one column per slot. A dot with a shorter or longer flight than
+the others is misplaced, a weak dot is grey, and a lost dot is missing.
 """
 
 import matplotlib.pyplot as plt
@@ -19,7 +18,7 @@ page = ph.print_page(hammer, text, rate="1.5 kHz")
 figure = page.plot()
 
 # %%
-# Every wanted dot is there, with what became of it.
+# The page lists every requested dot, with its outcome.
 
 on = page.printed
 error = 1e6 * page.placement_error[on]
@@ -32,8 +31,8 @@ for fault, count in page.fault_counts.items():
 
 # %%
 # The faster the carriage, the less the hammers have settled when they are fired
-# again. A page takes a fraction of a second, so that one can be printed at many
-# rates.
+# again. Simulating a page takes a fraction of a second, so that many rates can be
+# compared.
 
 pattern = page.pattern
 rates = np.arange(600.0, 2001.0, 50.0)
@@ -51,8 +50,8 @@ below.set(xlabel="slots per second (Hz)", ylabel="dots (%)", ylim=(0.0, None))
 below.legend()
 
 # %%
-# A pattern may also come from a file, a bitmap for instance, and be kept as one. Here
-# is the letter A as nine rows of six slots.
+# A pattern can also be read from a file, for instance a bitmap, and saved to a file.
+# This pattern is the letter A as nine rows of six slots.
 
 letter = ph.Pattern.from_text("A")
 for row in letter.dots[0]:

@@ -2,10 +2,11 @@
 Grazing near resonance
 ======================
 
-An oscillator with damping rests off a stop, and is driven harder until it touches it.
-Where two periods of the force are two and a half of its own, orbits with one impact in
-these two take over: the case on which D. J. W. Simpson and I. Ghosh study resonant
-grazing (arXiv 2602.22797).
+A damped oscillator whose rest position is clear of a stop is driven harder until it
+touches the stop. If two periods of the force equal two and a half periods of the
+natural oscillation, orbits with one impact in two periods of the force follow: the
+case for which D. J. W. Simpson and I. Ghosh study resonant grazing (arXiv
+2602.22797).
 """
 
 import math
@@ -19,15 +20,16 @@ oscillator = ph.load("resonant-grazing")
 print(oscillator.note)
 
 # %%
-# Without impact it swings by F over the square root of :math:`(1 - \omega^2)^2 + b^2
-# \omega^2`. Its branch ends where that is the way to the stop, a unit of length.
+# Without impacts, the amplitude is F over the square root of :math:`(1 - \omega^2)^2
+# + b^2 \omega^2`. The branch ends where the amplitude equals the distance to the
+# stop, one unit of length.
 
 omega, damping, restitution = 0.799, 0.04, 0.9
 graze = math.hypot(1.0 - omega**2, damping * omega)
 
 
 def force(amplitude):
-    """A force as the cosine of the time."""
+    """Return a force with the time course of a cosine."""
     return ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
 
 
@@ -42,8 +44,8 @@ print(swing.message)
 print(f"exactly {graze:.12f}")
 
 # %%
-# Orbits with one impact in two periods begin before that, in a fold. Their state half a
-# period after an impact, a little rounded, is where to start.
+# Orbits with one impact in two periods begin at a smaller amplitude of the force, in
+# a fold. The initial guess is their state half a period after an impact, rounded.
 
 amplitude, phase, state = 0.3628362, 0.0091, (1.91021, -0.06294)
 impacts = ph.continuation(
@@ -60,8 +62,9 @@ for event in impacts.events:
     print(f"{event.kind} at F = {event.value:.12f}")
 
 # %%
-# Whatever the orbit, damping shrinks areas by exp(-b T) in the two periods T, and the
-# impact by the square of the restitution: so much is the product of both multipliers.
+# For every orbit, damping shrinks areas by exp(-b T) in the two periods T, and the
+# impact by the square of the restitution; the product of these factors is the product
+# of both multipliers.
 
 exact = restitution**2 * math.exp(-4.0 * math.pi * damping / omega)
 off = np.abs(impacts.multipliers.prod(axis=1).real / exact - 1.0)
@@ -70,8 +73,8 @@ print(
 )
 
 # %%
-# From the fold one branch goes on to stable motion with impacts, the other back to
-# where the swing grazes.
+# From the fold, one branch continues to stable motion with impacts, the other returns
+# to the grazing.
 
 figure, axes = plt.subplots()
 for stable, style in ((True, "-"), (False, "--")):

@@ -2,9 +2,9 @@
 Which constant matters
 ======================
 
-How do flight time, force and energy change with every constant of a hammer and its
-pulse? The derivatives come from the equations of motion, along one run through all
-contacts; no run is repeated with other constants.
+Sensitivities show how flight time, force and energy change with every constant of a
+hammer and its pulse. The derivatives are integrated with the equations of motion,
+along one run through all contacts; no run is repeated with other constants.
 """
 
 import matplotlib.pyplot as plt
@@ -24,12 +24,12 @@ for name in ("flight_time", "peak_force", "net_loss"):
 found.plot()
 
 # %%
-# A bar of +2 means that one per cent more of the constant makes two per cent more of
-# the quantity. The armature is held by the small difference of two large forces, so
-# the flight time hangs on the magnet more than on anything else.
+# A bar of +2 means that increasing the constant by one per cent increases the
+# quantity by two per cent. The armature is held by the small difference of two large
+# forces, so the flight time depends on the magnet more than on any other part.
 #
-# What tolerances of the constants do to what is printed follows, as long as they are
-# small:
+# The derivatives also give the effect of small tolerances of the constants on the
+# printed dots:
 
 spread = found.spread(
     {"magnet.Am": "0.5 %", "spring.Bs": "1 %", "pack.thickness": "5 %"}
@@ -40,9 +40,9 @@ for name, value, part in zip(
     print(f"{name:14s} {value:.4g} ± {100.0 * part / value:.1f} %")
 
 # %%
-# In a train, what is left of one dot comes back in the next. The second flight depends
-# on when, within a rebound on the backstop, its pulse begins; the more so the less
-# time the rebounds had to die out.
+# In a train, the residual motion after one dot affects the next. The second flight
+# depends on the phase of the rebound at which its pulse begins; this dependence is
+# stronger if the rebounds had less time to decay.
 
 periods = np.linspace(1.2e-3, 2e-3, 161)
 change = []

@@ -2,9 +2,9 @@
 The impact oscillator with damping
 ==================================
 
-S. W. Shaw and P. J. Holmes (J. Sound Vib. 90 (1983) 129) solved a mass on a spring
-with viscous damping, a sinusoidal force and a rigid stop. Its orbits with one impact in
-a period lose their stability in a doubling of the period; beyond others lies chaos.
+S. W. Shaw and P. J. Holmes (J. Sound Vib. 90 (1983) 129) analysed a mass on a spring
+with viscous damping, a sinusoidal force and a rigid stop. Orbits with one impact per
+period lose their stability in a period doubling; further doublings lead to chaos.
 """
 
 import math
@@ -19,13 +19,13 @@ omega = 2.2
 
 
 def force(amplitude):
-    """A force as the cosine of the time."""
+    """Return a force with the time course of a cosine."""
     return ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
 
 
 # %%
-# Starting from a state half a period after an impact, a little rounded, the branch is
-# followed through the doubling, and the doubled orbits after it.
+# Starting from a rounded state half a period after an impact, continuation follows
+# the branch through the period doubling, and then the orbits of twice the period.
 
 branch = ph.continuation(
     oscillator,
@@ -41,7 +41,8 @@ twice = branch.doubled(doubling)
 print(twice.message)
 
 # %%
-# How much does damping matter? The doubling is followed as its constant grows.
+# To show the influence of damping, the period doubling is followed as the damping
+# coefficient increases.
 
 chart = ph.stability_chart(branch, "damping.coefficient", (0.0, 0.2), grid=(0, 0))
 (curve,) = chart.curves
@@ -50,7 +51,7 @@ for value in (0.0, 0.1, 0.2):
     print(f"damping {curve.second[near]:.3f}: doubling at F = {curve.first[near]:.9f}")
 
 # %%
-# The branches, and the doubling against the damping.
+# The figure shows the branches, and the period doubling against the damping.
 
 figure, (left, right) = plt.subplots(1, 2, width_ratios=(3, 2))
 for one, color in ((branch, "C0"), (twice, "C1")):

@@ -15,17 +15,17 @@ hammer = ph.load("hendriks-1983")
 print(hammer.title)
 
 # %%
-# A drive is a waveform and its firing times. Without a rate, a period or times
-# there is one firing, at 0. Without a duration the run ends 4 ms after the last
-# firing; it begins at rest, where the armature compresses the backstop.
+# A drive consists of a waveform and its firing times. By default, there is one firing
+# at time 0, and the run ends 4 ms after the last firing. The run begins at rest, with
+# the armature compressing the backstop.
 
 drive = ph.PulseTrain(hammer.waveform)
 motion = ph.simulate(hammer, drive)
 print(motion)
 
 # %%
-# What the firing did on the paper is a dot. Everything is in SI: seconds, metres,
-# newtons, joules.
+# Each firing has a dot, its mark on the paper. All values are in SI units: seconds,
+# metres, newtons, joules.
 
 dot = motion.dots[0]
 print(f"flight time     {1e6 * dot.flight_time:8.2f} us")
@@ -37,8 +37,8 @@ print(f"loading work    {1e3 * dot.loading_work:8.4f} mJ")
 print(f"net loss        {1e3 * dot.net_loss:8.4f} mJ")
 
 # %%
-# The displacement counts from an arbitrary origin, as in the paper; the grey lines
-# are the surfaces that the armature meets and, above, the platen.
+# The displacement is measured from an arbitrary origin, as in the paper; the grey
+# lines are the surfaces of backstop and pack and, above, the platen.
 
 figure, (above, below) = plt.subplots(2, 1, sharex=True, height_ratios=(4, 1))
 above.plot(1e3 * motion.t, 1e6 * motion.x, color="C0")
@@ -61,9 +61,9 @@ below.set(xlabel="time (ms)", ylabel="current (A)")
 figure.align_ylabels()
 
 # %%
-# Every touch of pack or backstop is a contact, with the speed in and out, the
-# depth, the peak force and the loss. The first one is the rest in the backstop from
-# which the run starts; the last one is still open.
+# Every contact with pack or backstop is listed with the velocities at its start and
+# end, the depth, the peak force and the loss. The first contact is the armature at
+# rest on the backstop, from which the run starts; the last contact is still open.
 
 for contact in motion.contacts:
     left = "open" if contact.v_out is None else f"{contact.v_out:+.3f} m/s"
@@ -72,9 +72,9 @@ for contact in motion.contacts:
     print(f"  depth {1e6 * contact.depth:5.2f} um  peak {contact.peak_force:6.2f} N")
 
 # %%
-# On the output grid one cannot see how well a contact is resolved. The motion can
-# be asked at any time, and at that time the integrator itself is evaluated, not an
-# interpolation between grid points. Below, the first impact on the backstop: 35
+# The output grid does not show how well a contact is resolved. The motion can be
+# evaluated at any time, by the integrator itself instead of an interpolation between
+# grid points. The figure shows the first impact on the backstop, which lasts 35
 # microseconds, while the grid has a point every few microseconds.
 
 impact = next(c for c in motion.contacts if c.surface == "backstop" and not c.initial)
@@ -99,8 +99,8 @@ axes.set(
 axes.legend()
 
 # %%
-# The motion also draws itself, with both unit systems on its axes as in the paper. The
-# result is a figure of matplotlib, to be saved or changed.
+# The method `plot` draws the motion, with both unit systems on its axes as in the
+# paper. It returns a Matplotlib figure, which can be saved or modified.
 
 picture = motion.plot(until="2 ms")
 

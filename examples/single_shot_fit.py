@@ -2,10 +2,10 @@
 Mass and damping from a single shot
 ===================================
 
-The record of one shot, as a sensor shows it, tells the mass of the armature and the
-damping of the backstop, if the static forces are known. The record is cut between
-the contacts; each piece is integrated by itself until the constants are so good that
-the pieces fit together.
+The displacement record of one shot determines the mass of the armature and the
+damping of the backstop, if the static forces are known. The fit uses multiple
+shooting: the record is divided between the contacts, each segment is integrated
+separately, and the constants are refined until the segments join.
 """
 
 import tempfile
@@ -35,7 +35,7 @@ for key, constant in found.constants.items():
     print(f"{key}: {value}, {off:+.1f} standard errors from the truth")
 
 # %%
-# What is left over is noise: no contact shows in it.
+# The residuals are noise, without a trace of the contacts.
 
 first = ph.simulate(start, ph.PulseTrain(start.waveform), duration=1.6e-3)
 figure, (above, below) = plt.subplots(2, 1, sharex=True, height_ratios=(3, 1))
@@ -59,7 +59,8 @@ below.plot(1e6 * found.abscissa, 1e6 * found.residuals, ".", markersize=2)
 below.set(xlabel="time (µs)", ylabel="residual (µm)")
 
 # %%
-# A motion shows forces divided by the mass only. Free them all, and there is no answer:
+# A motion depends only on forces divided by the mass. If the mass and all forces are
+# free, the fit is undetermined, which is an error:
 
 everything = ["mass", "magnet.F0", "magnet.Am", "magnet.Bm", "spring.Bs"]
 everything += ["pack.stiffness", "backstop.stiffness", "backstop.damping"]

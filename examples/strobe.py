@@ -2,9 +2,9 @@
 Poincaré plot
 =============
 
-Fire a hammer again and again, and look at it at the moments of firing. Hendriks
-(1983), figure 11, shows what one sees at twelve strobe times: single points, pairs,
-and strange attractors.
+A Poincaré plot shows the state of a hammer at each firing of a long train. In
+Hendriks (1983), figure 11 shows such plots at twelve strobe times: single points,
+pairs, and strange attractors.
 """
 
 import matplotlib.pyplot as plt
@@ -27,11 +27,11 @@ figure.supxlabel("displacement (µm)")
 figure.supylabel("velocity (m/s)")
 
 # %%
-# The window is that of the paper, its vertical line the backstop. All points are
-# drawn, also the first ones, which lead from rest to where the train ends up.
+# The window is the same as in the paper; the vertical line is the backstop. All
+# points are drawn, including the first points, on the way from rest to the attractor.
 #
-# A strange attractor is a thin curve, folded over and over. Closer up, and without
-# the way there:
+# A strange attractor is a thin curve, folded repeatedly. The next figure magnifies
+# the attractor and omits the transient:
 
 close = ph.strobe(hammer, period="1.15 ms", points=4000, transient=500, verdict=False)
 figure, panel = plt.subplots()
@@ -43,8 +43,8 @@ panel.set(
 )
 
 # %%
-# The same attractor, a part of the period later. The armature flies, prints and comes
-# back in between.
+# The next figure shows the same attractor at later phases of the period, while the
+# armature flies, prints and returns.
 
 figure, panel = plt.subplots()
 for phase in (0.0, 0.1, 0.2, 0.6, 0.8):
@@ -58,8 +58,8 @@ panel.legend(title="phase", markerscale=5)
 panel.set(xlabel="displacement (µm)", ylabel="velocity (m/s)", title="Five phases")
 
 # %%
-# Two trains that begin almost alike part soon, by a factor of about 1.8 at each firing,
-# until they are as far apart as the attractor is wide.
+# Two trains with almost equal initial states diverge quickly, by a factor of about
+# 1.8 at each firing, until their distance equals the width of the attractor.
 
 near = ph.strobe(
     hammer,

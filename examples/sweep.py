@@ -2,9 +2,9 @@
 A sweep that can be interrupted
 ===============================
 
-Which firing rates lose dots depends on where the paper stands. A sweep runs a grid
-of both and keeps the results in a store; killed at any moment, the same call goes
-on where it ended.
+The firing rates at which dots are lost depend on the position of the paper. A sweep
+simulates a grid of both and saves the results in a store; if it is interrupted, the
+same call resumes it.
 """
 
 import tempfile
@@ -31,8 +31,8 @@ found = ph.sweep(spec, folder / "results.zarr")
 print(found)
 
 # %%
-# The result is a Dataset over the axes of the grid. A member whose run
-# ended early would be a row with another status than 0.
+# The result is a Dataset over the axes of the grid. A member whose run ended early
+# would have a status other than 0.
 
 lost = found.lost_dots.where(found.status == 0)
 spread = (1e6 * found.flight_time_spread).where(found.status == 0)
@@ -64,8 +64,8 @@ figure.suptitle("Nine-pulse bursts; white: the pack front of the paper")
 
 # %%
 # The store is a folder of plain Zarr arrays with units and provenance in their
-# attributes; ``xarray.open_zarr`` opens it as well. The same call on a store that
-# is complete computes nothing.
+# attributes; ``xarray.open_zarr`` opens it as well. Calling `sweep` again with a
+# complete store computes nothing.
 
 again = ph.sweep(spec, folder / "results.zarr")
 print(again.identical(found))

@@ -4,7 +4,7 @@ A ball that doubles its period
 
 N. B. Tufillaro, T. Abbott and J. Reilly (*An Experimental Approach to Nonlinear
 Dynamics and Chaos*, 1992) let a ball bounce on the cone of a loudspeaker, at 60 Hz.
-Of the amplitudes at which its period doubles seven digits are quoted.
+The amplitudes at which its period doubles are published to seven digits.
 """
 
 import math
@@ -20,13 +20,13 @@ omega, gravity = 2.0 * math.pi * frequency, weight / ball.mass
 
 
 def centimetres(force):
-    """Amplitude of a table whose shaking is this force in its own frame."""
+    """Return the amplitude of the table, cm, for a force amplitude in its frame."""
     return 100.0 * np.asarray(force) / (ball.mass * omega**2)
 
 
 # %%
-# With one impact a period the ball meets the table at a phase that follows from the law
-# of impact; half a period after the phase 0 of the table it is in flight.
+# With one impact per period, the ball strikes the table at a phase that follows from
+# the law of impact; half a period after phase 0 of the table, the ball is in flight.
 
 gamma = 1.3
 meets = math.acos(math.pi * (1.0 - restitution) / (1.0 + restitution) / gamma)
@@ -48,7 +48,7 @@ branches = [
 ]
 
 # %%
-# Each doubling starts a branch, which is followed to the next one.
+# Each period doubling starts a branch, which is followed to the next doubling.
 
 printed, amplitudes = (0.01053531, 0.01150345, 0.01170804), []
 for known in printed:
@@ -61,7 +61,7 @@ first, second, third = amplitudes
 print(f"ratio of the ways: {(second - first) / (third - second):.4f}")
 
 # %%
-# The ratio tends to Feigenbaum's 4.669 as it goes on.
+# The ratio of successive intervals tends to Feigenbaum's constant 4.669.
 
 figure, axes = plt.subplots()
 for number, branch in enumerate(branches):

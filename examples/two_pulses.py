@@ -2,10 +2,10 @@
 Two pulses
 ==========
 
-A second pulse while the armature still settles out meets it at some phase of its
-rebounds. Hendriks (1983), figure 6, shows that 40 microseconds decide: fired 660
-microseconds after the first, the second dot is lost; at 700 microseconds it is
-stronger than the first.
+A second pulse during the settle-out acts on the armature at some phase of its
+rebounds. In Hendriks (1983), figure 6 shows that 40 microseconds are decisive: if the
+second pulse is fired 660 microseconds after the first, its dot is lost; at 700
+microseconds, its dot is stronger than the first.
 """
 
 import matplotlib.pyplot as plt
@@ -21,8 +21,8 @@ for delay in delays:
     motions[delay] = ph.simulate(hammer, drive, duration="2 ms")
 
 # %%
-# The currents of overlapping pulses would add; here the first has ended when the
-# second begins.
+# The currents of overlapping pulses would add; here, the first pulse has ended when
+# the second begins.
 
 figure, axes = plt.subplots()
 for delay, motion in motions.items():
@@ -39,8 +39,8 @@ axes.set(
 axes.legend(loc="center right")
 
 # %%
-# The dots, and the state of the armature at the second firing. A dot is lost when
-# no pack contact begins between its firing and the next one.
+# The output lists the dots, and the state of the armature at the second firing. A dot
+# is lost if no pack contact begins between its firing and the next firing.
 
 for delay, motion in motions.items():
     first, second = motion.dots
@@ -56,8 +56,9 @@ for delay, motion in motions.items():
         print(f"        lost, largest displacement {largest:.1f} um")
 
 # %%
-# The same for all delays. Each run is independent and takes milliseconds, so a loop
-# will do. Gaps are lost dots.
+# The next figure repeats this for a range of delays. Each run is independent and
+# takes milliseconds, so that a simple loop suffices. Gaps in the curves are lost
+# dots.
 
 swept = np.arange(500e-6, 1500e-6, 5e-6)
 peaks = np.full(len(swept), np.nan)
