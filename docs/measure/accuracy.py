@@ -1,6 +1,6 @@
-"""Measure the figures of the page on numerics.
+"""Measure the tables of the page on numerics.
 
-Run it with ``.venv/bin/python docs/measure/accuracy.py``; it takes a minute or two.
+Run ``.venv/bin/python docs/measure/accuracy.py``, which takes a minute or two.
 """
 
 import math
@@ -15,12 +15,12 @@ HAMMER = ph.load("hendriks-1983")
 SINGLE = ph.PulseTrain(HAMMER.waveform)
 GRID = np.linspace(0.0, 4e-3, 4001)
 FINEST = 1e-14
-"""Tolerance of the reference; its error is about 1e-13 of the stroke."""
+"""Tolerance of the reference, whose error is then about 1e-13 of the stroke."""
 ROOMS = (*MOTION, "tests/oracle")
 
 
 def single_pulse() -> float:
-    """Errors of a single-pulse cycle against the reference; returns the stroke, m."""
+    """Tabulate the errors of a single-pulse cycle against the reference; return the stroke, m."""
     exact = reference(HAMMER, SINGLE, GRID[-1], tolerance=FINEST, times=GRID)
     stroke = float(exact.x.max()) - HAMMER.position
     finer = reference(HAMMER, SINGLE, GRID[-1], tolerance=1e-13, times=GRID)
@@ -43,7 +43,7 @@ def single_pulse() -> float:
 
 
 def trains(stroke: float) -> None:
-    """Errors of trains up to their horizon."""
+    """Tabulate the errors of trains up to the horizon of each train."""
     rows: list[list[Cell]] = []
     drives = {
         "two pulses, 700 µs": ph.PulseTrain(HAMMER.waveform, at=[0.0, 700e-6]),
@@ -69,7 +69,7 @@ def trains(stroke: float) -> None:
 
 
 def pack_alone(tolerance: float) -> float:
-    """Relative error of the rebound from the pack, sqrt(3.7/12) of the speed of approach."""
+    """Return the relative error of the rebound from the pack, exactly sqrt(3.7/12) of the approach speed."""
     pack = {"law": "power", "stiffness": "259 N", "front": "0 m", "thickness": "178 um"}
     mass = ph.Hammer.build("0.4 g", pack=pack)
     still = ph.SineForce(0.0, 1.0)
@@ -78,7 +78,7 @@ def pack_alone(tolerance: float) -> float:
 
 
 def backstop_alone(tolerance: float) -> float:
-    """Error of z - ln(1 + z) = -(y + ln(1 - y)) for a free rebound from the backstop, over its value."""
+    """Return the relative error of z - ln(1 + z) = -(y + ln(1 - y)) for a free rebound from the backstop."""
     backstop = {"law": "hertz", "position": "0 m", "stiffness": 1.2e9, "damping": 4.2e8}
     mass = ph.Hammer.build("0.4 g", backstop=backstop)
     still = ph.SineForce(0.0, 1.0)
@@ -89,7 +89,7 @@ def backstop_alone(tolerance: float) -> float:
 
 
 def oracles() -> None:
-    """Errors against closed forms, at the default and at a tight tolerance."""
+    """Tabulate the errors against closed forms, at the default tolerance and at a tight tolerance."""
     rows: list[list[Cell]] = [
         [name, measure(2e-11), measure(1e-12)]
         for name, measure in (("pack alone", pack_alone), ("backstop alone", backstop_alone))
@@ -99,7 +99,7 @@ def oracles() -> None:
 
 
 def schemes(stroke: float) -> None:
-    """Order of the schemes of 1983 in smooth motion, and their errors on a cycle with contacts."""
+    """Tabulate the order of the 1983 schemes in smooth motion, and their errors on a cycle with contacts."""
     flight = {"state": (80e-6, 1.2), "duration": 80e-6, "times": [80e-6]}
     never = ph.PulseTrain(HAMMER.waveform, at=[1.0])
     landing = ph.simulate(HAMMER, never, tolerance=1e-14, **flight)

@@ -1,8 +1,9 @@
-"""Run every verb on every device that ships beside the print hammer, and write a table of the outcomes.
+"""Run every verb on every shipped device other than the print hammer, and write a table of the outcomes.
 
-Run it with ``.venv/bin/python docs/measure/devices.py``; it takes half an hour. Names of devices or verbs as
-arguments try these alone, print their answers and write nothing. Each cell is the verb with its defaults, at
-a size that takes seconds, in a folder of its own; the table is written anew after each verb.
+Run ``.venv/bin/python docs/measure/devices.py``, which takes half an hour. With names of devices or
+verbs as arguments, the script runs only these, prints their output and writes no table. Each cell is a
+run of the verb with its defaults, at a size that takes seconds, in a separate folder; the table is
+rewritten after each verb.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from measured import MOTION, Cell, Column, write
 import printhammer as ph
 from printhammer.run.window import scaled_rate
 
-# The program depends on every room; what is told here depends on the motions.
+# The program depends on every room, but the outcomes in this table depend only on the motions.
 program = import_module("printhammer.cli.main").main
 
 DEVICES = (
@@ -54,22 +55,22 @@ VERBS = {
     "dead-time": "dead-time {device} --voltage {voltage} --temperature '20 degC, 20 degC, 1'",
     "measure all": "measure all {device} --out bench",
 }
-"""A command line for each verb; the rate is that which 300 Hz are for the hammer of the paper."""
+"""Command line of each verb; the rate corresponds to 300 Hz for the paper's hammer."""
 
-LIMIT = 60  # Longest time of a cell, s
+LIMIT = 60  # Time limit of a cell, s.
 
 
 class TooLongError(Exception):
-    """A cell takes longer than `LIMIT`."""
+    """Raised if a cell takes longer than `LIMIT`."""
 
 
 def late(*_: object) -> NoReturn:
-    """Interrupt a cell."""
+    """Interrupt a cell that exceeds the time limit."""
     raise TooLongError
 
 
 def slots(device: str) -> dict[str, str]:
-    """Return rate, period and widths of the second pulse for a device, as texts."""
+    """Return the rate, the period and the widths of the second pulse for a device, as text."""
     hammer = ph.load(device)
     rate = scaled_rate(hammer, 300.0)
     width, voltage = (float(getattr(hammer.waveform, name, 0.0)) for name in ("width", "voltage"))
@@ -83,7 +84,7 @@ def slots(device: str) -> dict[str, str]:
 
 
 def tried(verb: str, device: str) -> tuple[int | None, str]:
-    """Return exit status (None: too long) and the last sentence of a cell, and print its answer."""
+    """Run a cell and print its output; return the exit status (None after a timeout) and the last message."""
     arguments = shlex.split(VERBS[verb].format(device=device, **slots(device)))
     out, err = io.StringIO(), io.StringIO()
     status: int | None = 0
@@ -98,7 +99,7 @@ def tried(verb: str, device: str) -> tuple[int | None, str]:
             status = int(end.code or 0)
         except TooLongError:
             status = None
-        except Exception:  # noqa: BLE001 - a traceback is what a cell must not show
+        except Exception:  # noqa: BLE001 - no cell may end with a traceback
             status = -1
             traceback.print_exc(file=err)
         finally:
@@ -112,11 +113,11 @@ def tried(verb: str, device: str) -> tuple[int | None, str]:
 
 
 WORDS = {0: "yes", 1: "in part", 2: "no", None: f"over {LIMIT} s"}
-"""Cell of the table by exit status."""
+"""Text of a cell for each exit status."""
 
 
 def main() -> None:
-    """Try the cells, and write the table if they are all."""
+    """Run the cells; write the table if all cells were requested."""
     signal.signal(signal.SIGALRM, late)
     asked = sys.argv[1:]
     devices = [name for name in DEVICES if name in asked] or list(DEVICES)

@@ -1,7 +1,8 @@
-"""Measure what bursts of least work cost.
+"""Measure the work of least-work bursts.
 
-Run it with ``.venv/bin/python docs/measure/energy.py``; it takes some minutes. Eight dots at 1 kHz, rest to
-rest, the settle-out included, for the shipped hammer and five of its family; then the rates, for two of them.
+Run ``.venv/bin/python docs/measure/energy.py``, which takes some minutes. The first table is for
+eight dots at 1 kHz from rest to rest, including the settle-out, for the shipped hammer and five hammers
+of its family; the second for several rates, for two of these hammers.
 """
 
 from measured import MOTION, Cell, Column, write
@@ -16,22 +17,22 @@ RATES = (1000.0, 1250.0, 1500.0)
 DOTS = 8
 ROOMS = (*MOTION, "control/least_work", "control/pulses", "printing/dots")
 SINGLE, POSITIVE, LEAST = 2, 4, 5
-"""Places in what a burst costs: of a single pulse, positive work, and the least that any current needs."""
+"""Indices in the cells of `burst`: ratio of the single pulse, positive work, and lower bound."""
 
 
 def hammers() -> list[ph.Hammer]:
-    """Return the shipped hammer and five of the family."""
+    """Return the shipped hammer and five hammers of the family."""
     chosen = [hammer for hammer in family_hammers() if hammer.name.rpartition("-")[2] in FAMILY]
     return [ph.load("hendriks-1983"), *chosen]
 
 
 def short(hammer: ph.Hammer) -> str:
-    """Return the name of a hammer as pages write it."""
+    """Return the name of a hammer as written on the pages."""
     return hammer.name.replace("hendriks-1983-family", "family")
 
 
 def burst(hammer: ph.Hammer, force: float, rate: float) -> list[Cell]:
-    """Return what a burst costs."""
+    """Compute a least-work burst; return the cells of its row."""
     cells: list[Cell] = []
     try:
         found = ph.least_work(hammer, rate, dots=DOTS, force=force)

@@ -1,7 +1,8 @@
-"""How exact the members of an ensemble are: errors against the reference before the horizon, by tolerance.
+"""Measure the errors of ensemble members against the reference, up to the horizon, for several tolerances.
 
-Forty rates from 500 to 2000 Hz, nine pulses each, at 512 times. For each member the largest error of the
-displacement up to its horizon, in units of the stroke: states in double precision, and pictures in single.
+The members have forty rates from 500 to 2000 Hz, nine pulses each, and 512 output times. The table shows
+the largest error of the displacement of a member up to its horizon, as a fraction of the stroke, for
+states in double precision and for figures in single precision.
 """
 
 from __future__ import annotations

@@ -1,19 +1,20 @@
-"""Measure how fast hammers print with feedback, as they should be and not quite so.
+"""Measure safe rates with feedback, for nominal and for perturbed hammers.
 
-Run it with ``.venv/bin/python docs/measure/feedback.py [--step HZ] [HAMMER ...]``; it takes hours a hammer. A
-hammer is a name, a file, or the number of one of the family, ``02``; ``six`` stands for those of the page.
-Safe rates are those of `printhammer.safe_rate`: all patterns of eight slots and the de Bruijn cycle. The grid
-of rates has the step asked for, from 500 Hz on, and from the last rate that passes 5 Hz to the next.
+Run ``.venv/bin/python docs/measure/feedback.py [--step HZ] [HAMMER ...]``, which takes hours per
+hammer. A hammer is a name, a file, or a number in the family such as ``02``; ``six`` stands for the six
+hammers of the page. Safe rates are computed by `printhammer.safe_rate`, with all patterns of eight slots
+and the de Bruijn cycle. The grid of rates begins at 500 Hz with the step ``--step``; between the last
+rate that passes and the next, the step is 5 Hz.
 
-With ``--grid FIRST`` it looks at every rate of the grid of 5 Hz from there up to 2.2 times the open loop, for
-the hammer as it should be, and goes on after one that fails; some six seconds a rate.
-With ``--shares X [X ...]`` it counts how many of the 128 patterns that begin with a dot are within limits, at
-rates in parts of the open loop's safe rate, for all hammers that differ; some seconds a number.
-With ``--all`` it tells what prints at the rate asked for, and on hammers that differ at 1.5 times the open
-loop.
-With ``--edge SECONDS ...`` it counts those patterns for other drivers, the hammer as it should be.
+``--grid FIRST`` evaluates every rate of the 5 Hz grid from FIRST to 2.2 times the open-loop safe rate,
+for the nominal hammer, and continues after rates that fail; this takes some six seconds per rate.
+``--shares X [X ...]`` counts how many of the 128 patterns that begin with a dot are within limits, at
+rates given as multiples of the open-loop safe rate, for all perturbed hammers; this takes some seconds
+per number. ``--all`` reports the results at the requested rate, and for perturbed hammers at 1.5 times
+the open-loop safe rate. ``--edge SECONDS ...`` counts the same patterns for other drivers, for the
+nominal hammer.
 
-The last four write the tables of the page.
+These four options write the tables of the page.
 """
 
 import argparse
@@ -48,7 +49,7 @@ CASES = [
 ]
 SEEDS = range(1, 6)
 ASKED = 2.2
-"""How many times faster than the open loop feedback is asked to be."""
+"""Rate requested of feedback, as a multiple of the open-loop safe rate."""
 SIX = ("hendriks-1983", "02", "06", "10", "14", "18")
 ROOMS = (*MOTION, "derivatives", "control/feedback", "control/pulses", "printing")
 OFF = {
@@ -59,7 +60,7 @@ OFF = {
     ],
 }
 HARDER = 1.5
-"""How many times faster than the open loop hammers that differ are tried."""
+"""Rate at which perturbed hammers are evaluated, as a multiple of the open-loop safe rate."""
 TEXT = "The quick brown fox\njumps over the lazy dog\n0123456789 !?"
 
 
@@ -71,7 +72,7 @@ def load(name: str) -> ph.Hammer:
 
 
 def fastest(hammer: ph.Hammer, strategy: Strategy, controller: Controller, step: float) -> tuple[float, str]:
-    """Return the safe rate, Hz, first on a coarse grid, then on a fine one, and what fails next."""
+    """Find the safe rate, Hz, on a coarse and then a fine grid; return it and the next failure."""
     given = {"nominal": controller.single, "tolerance": DISPLAY_TOLERANCE}
     coarse = safe_rate(hammer, strategy, first=FIRST, step=step, **given)
     if not np.isfinite(coarse.rate) or coarse.failure is None:
@@ -81,19 +82,19 @@ def fastest(hammer: ph.Hammer, strategy: Strategy, controller: Controller, step:
 
 
 def passes(hammer: ph.Hammer, strategy: Strategy, controller: Controller, rate: float) -> str:
-    """Return what fails at a rate; nothing where all patterns and the cycle are within limits."""
+    """Return a description of the failure at a rate, empty if all patterns and the cycle pass."""
     given = {"nominal": controller.single, "tolerance": DISPLAY_TOLERANCE}
     found = safe_rate(hammer, strategy, first=rate, last=rate, step=FINE, **given)
     return "" if found.failure is None else found.failure.text
 
 
 def rounded_up(rate: float) -> float:
-    """Return the next rate of the fine grid."""
+    """Return the rate rounded up to the fine grid, Hz."""
     return FINE * math.ceil(rate / FINE)
 
 
 def asked_for(hammer: ph.Hammer, controller: Controller, own: float) -> list[Cell]:
-    """Return what feedback prints at the rate that is asked for, and on hammers that differ."""
+    """Return the results of feedback at the requested rate, and on perturbed hammers."""
     strategy, rate = FeedbackStrategy(controller), rounded_up(ASKED * own)
     cells: list[Cell] = [own, rate if not passes(hammer, strategy, controller, rate) else None]
     cells.append(round(rate / own, 2))
@@ -115,13 +116,13 @@ def asked_for(hammer: ph.Hammer, controller: Controller, own: float) -> list[Cel
 
 
 def within(cases: list[Case], way: Strategy) -> list[int]:
-    """Return how many of the patterns that begin with a dot are within limits, for each case."""
+    """Return the number of patterns beginning with a dot that are within limits, for each case."""
     found = attempt(cases, from_rest(every=False), way, limits=Limits(), tolerance=DISPLAY_TOLERANCE)
     return [int(number) for number in found.judgement.passed.reshape(len(cases), -1).sum(axis=1)]
 
 
 def every_rate(hammer: ph.Hammer, controller: Controller, first: float, own: float) -> list[Cell]:
-    """Return how many rates fail on the fine grid, from a first one to that which is asked for."""
+    """Count the rates of the fine grid that fail, from a first rate to the requested rate."""
     strategy = FeedbackStrategy(controller)
     rates = np.arange(first, ASKED * own + FINE, FINE)
     failed = []
@@ -136,9 +137,9 @@ def every_rate(hammer: ph.Hammer, controller: Controller, first: float, own: flo
 
 
 def counts(hammer: ph.Hammer, controller: Controller, own: float, shares: list[float]) -> list[Cell]:
-    """Return how many patterns are within limits with feedback on hammers that differ; print the open loop.
+    """Count the patterns within limits with feedback on perturbed hammers; print the counts of the open loop.
 
-    Of each hammer the number at the first share, and the fewest at any.
+    For each hammer, return the number at the first rate, and the smallest number at any rate.
     """
     seen: list[Cell] = []
     print("| | " + " | ".join(f"{share:g} x, open loop | feedback" for share in shares) + " |")
@@ -154,7 +155,7 @@ def counts(hammer: ph.Hammer, controller: Controller, own: float, shares: list[f
 
 
 def drivers(hammer: ph.Hammer, own: float, edges: list[float], shares: list[float]) -> list[list[Cell]]:
-    """Return the fewest patterns within limits with drivers of other time constants, and at which rate."""
+    """Return the smallest number of patterns within limits, and its rate, for other driver time constants."""
     rows: list[list[Cell]] = []
     for edge in edges:
         controller = Controller(hammer, driver_of(hammer, edge=edge))
@@ -168,7 +169,7 @@ def drivers(hammer: ph.Hammer, own: float, edges: list[float], shares: list[floa
 
 
 def page_row(page: Page) -> str:
-    """Return how good a page is."""
+    """Return the table row of a page: counts of dots, scatter of darkness, and placement errors."""
     on = page.printed
     place = 1e6 * page.placement_error[on]
     counts = f"{page.line.size} | {int(page.lost.sum())} | {int(page.good.sum())}"
@@ -177,7 +178,7 @@ def page_row(page: Page) -> str:
 
 
 def measure(hammer: ph.Hammer, given: argparse.Namespace) -> dict[str, list]:
-    """Return what is asked for of one hammer, by table."""
+    """Measure the requested rows for one hammer, by table name."""
     own = safe_rate(hammer).rate
     controller = Controller(hammer, driver_of(hammer))
     print(f"\n{hammer.name}: open loop {own:.0f} Hz\n", flush=True)
@@ -196,7 +197,7 @@ def measure(hammer: ph.Hammer, given: argparse.Namespace) -> dict[str, list]:
 
 
 def save(found: list[dict[str, list]], hammers: list[ph.Hammer], given: argparse.Namespace) -> None:
-    """Write the tables that were asked for."""
+    """Write the requested tables."""
     names = tuple(hammer.name for hammer in hammers)
     heads = [
         Column(name=name.rpartition("-")[2] if "family" in name else name, format=".4g") for name in names
@@ -229,7 +230,7 @@ def save(found: list[dict[str, list]], hammers: list[ph.Hammer], given: argparse
 
 
 def compare(hammer: ph.Hammer, controller: Controller, own: float, step: float) -> None:
-    """Print safe rates, and pages."""
+    """Print the safe rates, and the quality of pages."""
     print("| | safe rate, Hz | to open loop | first failure |")
     print("|---|---|---|---|")
     for case in CASES:

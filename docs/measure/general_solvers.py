@@ -1,7 +1,8 @@
-"""Hold general-purpose solvers against the reference, each called as one would without thinking of contacts.
+"""Compare general-purpose solvers, called without regard to contacts, with the reference.
 
-One right-hand side with all branches of the force, equations (3) to (7); the local maximum in the pack is
-kept in a variable. Run it with ``.venv/bin/python docs/measure/general_solvers.py``; it takes a minute.
+All solvers use one right-hand side with all branches of the force, equations (3) to (7); the local
+maximum in the pack is stored in a variable. Run ``.venv/bin/python
+docs/measure/general_solvers.py``, which takes a minute.
 """
 
 import math
@@ -30,11 +31,11 @@ CALLS = (
     ("LSODA", 1e-9),
 )
 FEW = 100
-"""Number of evaluations of the force below which a solver has missed the pulses."""
+"""Number of force evaluations below which a solver must have missed the pulses."""
 
 
 def right_hand_side(drive):
-    """Return the function of time and state, and a counter of its calls."""
+    """Return the right-hand side as a function of time and state, and a counter of its calls."""
     magnet, spring, pack, backstop = HAMMER.magnet, HAMMER.spring, HAMMER.pack, HAMMER.backstop
     wave, b, front = HAMMER.waveform, HAMMER.position, HAMMER.front
     memory = {"r_max": 0.0, "calls": 0}
@@ -70,7 +71,7 @@ def right_hand_side(drive):
 
 
 def compare(drive: ph.PulseTrain, end: float) -> list[Cell]:
-    """Return the errors of all solvers in one run, or what they say."""
+    """Return the errors of all solvers in one run, or their error messages."""
     grid = np.linspace(0.0, end, 3001)
     exact = reference(HAMMER, drive, end, tolerance=1e-13, times=grid)
     start = (ph.rest_state(HAMMER), 0.0)

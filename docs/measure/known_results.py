@@ -1,6 +1,6 @@
-"""Compare what the program computes for the oscillators of the literature with what is known of them.
+"""Compare computed results for the oscillators of the literature with published or exact values.
 
-Run it with ``.venv/bin/python docs/measure/known_results.py``; it takes a minute or two.
+Run ``.venv/bin/python docs/measure/known_results.py``, which takes a minute or two.
 """
 
 import math
@@ -16,25 +16,25 @@ from printhammer.chaos.continuation.branch import Branch
 
 ROOMS = (*MOTION, "chaos", "derivatives")
 SHARP = 1e-9
-"""Difference allowed from a closed form."""
+"""Tolerance for results with a closed form."""
 
 
 @dataclass(frozen=True)
 class Known:
-    """One number that is known of a shipped oscillator, and how the program computes it."""
+    """Known value of a shipped oscillator, with the function that computes it."""
 
     hammer: str
     what: str
     source: str
     expected: str
-    """As printed; closed forms to twelve digits."""
+    """Known value, as printed; closed forms to twelve digits."""
     tolerance: float
-    """Half a unit of the last digit that is printed; more only for a mean over a chaotic motion."""
+    """Tolerance: half a unit of the last printed digit, or more for an average over a chaotic motion."""
     compute: Callable[[], float]
 
 
 def resonant(omega: float, amplitude: float, phase: float, state: tuple[float, float], kind: str) -> float:
-    """Branch point of the orbits with one impact in two periods of the force."""
+    """Return a bifurcation point of the orbits with one impact in two periods of the force."""
     (event,) = [
         event for event in resonant_branch(omega, amplitude, phase, state).events if event.kind == kind
     ]
@@ -43,7 +43,7 @@ def resonant(omega: float, amplitude: float, phase: float, state: tuple[float, f
 
 @cache
 def resonant_branch(omega: float, amplitude: float, phase: float, state: tuple[float, float]) -> Branch:
-    """The orbits with one impact in two periods of the force, near an amplitude."""
+    """Return the branch of orbits with one impact in two periods of the force, near an amplitude."""
     drive = ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
     bounds = (amplitude * (1.0 - 2e-3), amplitude * (1.0 + 2e-3))
     hammer = ph.load("resonant-grazing")
@@ -58,7 +58,7 @@ FARTHER = (0.95001, 0.44844, 0.0059, (1.84241, -0.48668))
 
 
 def product() -> float:
-    """Product of the multipliers of the orbits with one impact in two periods, that farthest from exact."""
+    """Return the product of the multipliers of orbits with one impact in two periods that deviates most."""
     branch = resonant_branch(*FARTHER)
     exact = 0.81 * math.exp(-4.0 * math.pi * 0.04 / FARTHER[0])
     products = branch.multipliers.prod(axis=1).real
@@ -66,7 +66,7 @@ def product() -> float:
 
 
 def grazing(name: str, omega: float, start: float, bounds: tuple[float, float]) -> float:
-    """Amplitude of the force at which the oscillation without impact touches the stop."""
+    """Return the amplitude of the force at which the oscillation without impact touches the stop."""
     hammer = ph.load(name)
     spring = hammer.spring
     rest = hammer.position + spring.preload / spring.stiffness
@@ -79,7 +79,7 @@ def grazing(name: str, omega: float, start: float, bounds: tuple[float, float]) 
 def shaw_holmes(
     omega: float, amplitude: float, phase: float, state: tuple[float, float], firings: int, kind: str
 ) -> float:
-    """Branch point of the orbits with one impact in so many periods of the force."""
+    """Return a bifurcation point of the orbits with one impact in a number of periods of the force."""
     drive = ph.SineForce(amplitude, omega / (2.0 * math.pi), phase="90 deg")
     bounds = (0.99 * amplitude, 1.01 * amplitude)
     branch = ph.continuation(
@@ -97,11 +97,11 @@ def shaw_holmes(
 
 @cache
 def doublings() -> list[float]:
-    """Amplitudes of the table, cm, at which the ball doubles its period, one after the other."""
+    """Return the amplitudes of the table, cm, at successive period doublings of the ball."""
     ball, frequency = ph.load("tufillaro-1992"), 60.0
     weight, omega, e = -ball.spring.preload, 2.0 * math.pi * frequency, ball.backstop.restitution
     gravity, gamma = weight / ball.mass, 1.3
-    # The table meets the ball at this phase; half a period after its phase 0 the ball is in flight.
+    # Phase of the table at an impact; half a period after phase 0 of the table, the ball is in flight.
     meets = math.acos(math.pi * (1.0 - e) / (1.0 + e) / gamma)
     height, leaves, later = gamma * gravity / omega**2, 0.5 * gravity / frequency, (math.pi - meets) / omega
     state = height * math.sin(meets) + leaves * later - 0.5 * gravity * later**2, leaves - gravity * later
@@ -123,7 +123,7 @@ def doublings() -> list[float]:
 
 @cache
 def duffing() -> tuple[float, float, float]:
-    """Both exponents per unit of time, and their sum."""
+    """Return both exponents per unit of time, and their sum."""
     drive = ph.SineForce(0.3, 1.0 / (2.0 * math.pi), phase="90 deg")
     found = ph.lyapunov(
         ph.load("duffing-holmes"), drive=drive, state=(0.1, 0.1), firings=50_000, transient=500
@@ -134,12 +134,12 @@ def duffing() -> tuple[float, float, float]:
 
 @cache
 def rocking() -> ph.Motion:
-    """A block that is let go at 0.6 of the angle at which it tips over, in units of 1/p and of that angle."""
+    """Simulate a block released at 0.6 of its tipping angle, in units of 1/p and of this angle."""
     return ph.simulate(ph.load("housner-1963"), ph.SineForce(0.0, 1.0), state=(0.6, 0.0), duration=12.0)
 
 
 def rocking_angle(impacts: int) -> float:
-    """Largest angle after so many impacts."""
+    """Return the largest angle after a number of impacts."""
     return float(rocking().maxima[1][impacts - 1])
 
 
@@ -281,7 +281,7 @@ CASES = (
 
 
 def main() -> None:
-    """Compute all and write the table."""
+    """Compute all known results and write the table."""
     rows: list[list[Cell]] = []
     for case in CASES:
         ours = case.compute()

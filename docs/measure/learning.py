@@ -1,18 +1,18 @@
-"""Measure what each way to drive prints on hammers nobody has measured, and what learning adds.
+"""Measure the dots within limits on unmeasured units for each driving strategy, and the gain by learning.
 
-Run it with ``.venv/bin/python docs/measure/learning.py``. It draws hammers from the variability of a
-production, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots within limits at
-parts of the nominal hammer's open-loop safe rate: open loop, table and robust table, each with the hammer's
-own pulse and with a fast switch, and what is learned after some dots from times of impact with 5 us of noise,
-and with forces to 3 % as well: all units at 1.5 times, a fifth of them elsewhere. It takes an hour on two
-cores.
+Run ``.venv/bin/python docs/measure/learning.py``. The script draws hammers from the variability
+of a production, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots within
+limits, at multiples of the nominal hammer's open-loop safe rate. The strategies are open loop, table and
+robust table, each with the hammer's own pulse and with a fast switch, and tables learned after some dots
+from impact times with 5 us of noise, without and with forces to 3 %. All units are evaluated at 1.5 times
+the safe rate, a fifth of them at the other rates. It takes an hour on two cores.
 
-``--units N`` draws another number, ``--feedback N`` lets feedback print a cycle of order 6 on as many of
-them. ``--sensors`` tries other sensors instead, ``--tolerance`` other variabilities, ``--drivers`` other
-drivers at 1.5 times, and ``--family`` units of two others of the family. ``--picture FILE`` only draws what
-one unit prints while it learns, ``--curves FILE`` how many units print all dots, ``--tolerance-curves FILE``
-which dots are within limits as the production is spread less and more, ``--parts FILE`` what driver, table,
-learning and feedback each add.
+``--units N`` sets the number of units, ``--feedback N`` the number of units on which feedback prints a
+cycle of order 6. ``--sensors`` measures other sensors instead, ``--tolerance`` other variabilities,
+``--drivers`` other drivers at 1.5 times the safe rate, and ``--family`` units of two other hammers of the
+family. ``--picture FILE`` only draws the dots of one unit while it learns, ``--curves FILE`` the fraction
+of units that print all dots, ``--tolerance-curves FILE`` the dots within limits against the spread of the
+production, ``--parts FILE`` the contributions of driver, table, learning and feedback.
 """
 
 import argparse
@@ -44,7 +44,7 @@ from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 SHARES = (1.0, 1.25, 1.5, 1.75)
 ASKED = 1.5
-"""The rate at which 90 of 100 units are asked for."""
+"""Rate at which 90 of 100 units should print all dots, as a multiple of the open-loop safe rate."""
 SAFE = 850.0
 """Open-loop safe rate of the shipped hammer, Hz."""
 SENSORS = {"time": ImpactSensor(), "time and force": ImpactSensor(force=0.03)}
@@ -57,17 +57,17 @@ OTHERS = {
     "1 of 100 missed, 1 of 100 false": {"missed": 0.01, "false": 0.01},
 }
 UNKNOWN = {"mass": 0.02, "backstop.stiffness": 0.1}
-"""Constants that the learner does not know to vary, and by how much they do, relative."""
+"""Constants that vary without being estimated by the learner, with their relative standard deviations."""
 FEWER = Column(name="units that print fewer than in the open loop")
 SHOWN = 2
-"""Number of the unit in the picture: one of the many that an open loop does not print well."""
+"""Index of the unit in the figure, one of many units for which the open loop fails."""
 FAMILY = {"02": 880.0, "06": 965.0}
-"""Two of the family, and their open-loop safe rates, Hz."""
+"""Open-loop safe rates of two hammers of the family, Hz."""
 AFTER = (50, 200, 1000)
 OWN = 50
-"""Number of units, at most, that learn with the hammer's own pulse."""
+"""Maximum number of units that learn with the hammer's own pulse."""
 FEEDBACK = 10
-"""Number of units on which feedback prints beside many others, of a shorter cycle."""
+"""Number of units on which feedback prints a shorter cycle, if many units are measured."""
 FEW = f"feedback, {FEEDBACK} of them"
 ROOMS = (
     *MOTION,
@@ -82,7 +82,7 @@ ROOMS = (
 
 
 def shares(units: list[ph.Hammer], single: object, rate: float, way: Strategy) -> np.ndarray:
-    """Return the share of the dots of cycle and rows within limits, for each unit."""
+    """Return the fraction of dots of the cycle and the rows within limits, for each unit."""
     trial = attempt(
         [Case(unit, single, rate) for unit in units],
         [PRINTED],
@@ -95,17 +95,17 @@ def shares(units: list[ph.Hammer], single: object, rate: float, way: Strategy) -
 
 
 def cells(good: np.ndarray, plain: np.ndarray | None = None) -> list[Cell]:
-    """Return the share of dots, of units that print all, and how many print fewer than in an open loop."""
+    """Return the percentage of dots, and the numbers of perfect units and of units worse than open loop."""
     fewer = None if plain is None else int((good < plain - 1e-12).sum())
     return [100.0 * float(good.mean()), int((good == 1.0).sum()), fewer]
 
 
 SHARED: dict[str, Any] = {}
-"""What processes learn by: law and sensor."""
+"""Learning law and sensor, shared with the worker processes."""
 
 
 def learned(law: LearningLaw, units: list[ph.Hammer], sensor: ImpactSensor) -> dict[int, np.ndarray]:
-    """Return the share of dots within limits, of each unit, after each number of dots; by two processes."""
+    """Return the fraction of dots within limits of each unit after each number of dots, by two processes."""
     SHARED.update(law=law, sensor=sensor)
     with get_context("fork").Pool(2) as pool:
         halves = pool.map(learned_by, ([units[k] for k in range(first, len(units), 2)] for first in (0, 1)))
@@ -117,13 +117,13 @@ def learned(law: LearningLaw, units: list[ph.Hammer], sensor: ImpactSensor) -> d
 
 
 def learned_by(units: list[ph.Hammer]) -> dict[int, np.ndarray]:
-    """Return the same for some of the units."""
+    """Return the fraction of dots within limits after each number of dots, for some of the units."""
     stages = calibrate(SHARED["law"], units, SHARED["sensor"])[1]
     return {stage.dots: stage.good.mean(axis=1) for stage in stages}
 
 
 def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:
-    """Return a row a way at a rate."""
+    """Return one row of the table for each strategy at a rate."""
     rate, single, rows = share * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
 
     def add(way: str, good: np.ndarray, plain: np.ndarray | None = None) -> None:
@@ -148,7 +148,7 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[lis
 
 
 def feedback(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
-    """Return what feedback prints, of a shorter cycle, with its sensor and with one that is blinded."""
+    """Return the results of feedback for a shorter cycle, with its sensor and with a blinded sensor."""
     controller = Controller(hammer, driver_of(hammer))
     slots, rows = slots_of(cycle_with_lead_in(6, 0)), []
     from printhammer.control.feedback.estimator.sensor import PositionSensor
@@ -166,7 +166,7 @@ def feedback(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
 
 
 def sensors(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
-    """Return what is learned with other sensors at 1.5 times the safe rate."""
+    """Return the results of learning with other sensors at 1.5 times the safe rate."""
     rows = []
     for name, sensor in SENSORS.items():
         law, _base = law_for(hammer, 1.5 * SAFE, sensor=sensor, threads=1)
@@ -189,7 +189,7 @@ def sensors(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
 
 
 def drivers(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
-    """Return what each driver prints, in an open loop, with a robust table and with one that was learned."""
+    """Return the results of each driver in open loop, with a robust table and with a learned table."""
     rows, sensor = [], SENSORS["time and force"]
     for share in (1.5,):
         for driver in DRIVERS:
@@ -206,7 +206,7 @@ def drivers(hammer: ph.Hammer, units: list[ph.Hammer]) -> list[list[Cell]]:
 
 
 def family(count: int, seed: int) -> list[list[Cell]]:
-    """Return what units of two hammers of the family print at 1.5 times their safe rates."""
+    """Return the results for units of two hammers of the family at 1.5 times their safe rates."""
     from studies.reconstruction.family.family import family_hammers
 
     rows = []
@@ -228,7 +228,7 @@ def family(count: int, seed: int) -> list[list[Cell]]:
 
 
 def looped(controller: Controller, units: list[ph.Hammer], rate: float) -> np.ndarray:
-    """Return the share of dots within limits with feedback, for each unit, of a cycle of order 6."""
+    """Return the fraction of dots within limits with feedback, for each unit, for a cycle of order 6."""
     trial = attempt(
         [Case(unit, controller.single, rate) for unit in units],
         [slots_of(cycle_with_lead_in(6, 0))],
@@ -240,7 +240,7 @@ def looped(controller: Controller, units: list[ph.Hammer], rate: float) -> np.nd
 
 
 def tolerance_curves(path: Path) -> None:
-    """Draw which share of the dots is within limits, by the spread of the production, as measured."""
+    """Draw the measured fraction of dots within limits against the spread of the production."""
     style = import_module("printhammer.figures.elements.style")
     looks = {
         "open loop, own": (style.MUTED, "-", "o"),
@@ -277,7 +277,7 @@ def tolerance_curves(path: Path) -> None:
 
 
 def parts(path: Path) -> None:
-    """Draw what driver, table, learning and feedback each add at 1.5 times the safe rate, as measured."""
+    """Draw the measured contributions of driver, table, learning and feedback at 1.5 times the safe rate."""
     style = import_module("printhammer.figures.elements.style")
     looks = {
         "open loop, own": style.MUTED,
@@ -315,7 +315,7 @@ def parts(path: Path) -> None:
 
 
 def curves(path: Path) -> None:
-    """Draw which share of the units prints all dots, by rate and way, from the measured tables."""
+    """Draw the measured fraction of units that print all dots, against rate, for each strategy."""
     style = import_module("printhammer.figures.elements.style")
     looks = {
         "open loop, own": (style.MUTED, "-", "o"),
@@ -358,7 +358,7 @@ def curves(path: Path) -> None:
 
 
 def tolerance(hammer: ph.Hammer, count: int, seed: int) -> list[list[Cell]]:
-    """Return what is printed at 1.5 times the safe rate by units that are spread less and more."""
+    """Return the results at 1.5 times the safe rate for productions with smaller and larger spread."""
     rows, rate, single = [], 1.5 * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     table = ph.tune(hammer, rate=rate, driver="switch")
     switched = driven_by(hammer, "switch", 2.0)
@@ -449,7 +449,7 @@ def main() -> None:
         write("learning-feedback", heads, rows, settings, (*ROOMS, "control/feedback"))
     else:
         heads = [rate, Column(name="way"), Column(name="units", format="d"), *good, FEWER]
-        # All units where the most is asked, a fifth of them elsewhere.
+        # All units are evaluated at the rate `ASKED`, a fifth of them at the other rates.
         sizes = {share: len(units) // (1 if share == ASKED else 5) for share in SHARES}
         rows = [row for share in SHARES for row in measure(hammer, units[: sizes[share]], share)]
         write("learning", heads, rows, settings, ROOMS)

@@ -1,9 +1,10 @@
-"""Measure what hammers behind a rail learn, from their coil alone and from a microphone.
+"""Measure learning for hammers with a rail driver, from the coil current alone and from a microphone.
 
-Run it with ``.venv/bin/python docs/measure/learning_rail.py``. It draws units of the paper's hammer behind a
-rail of 100 V, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots within limits,
-at parts of the open-loop safe rate of the hammer with its current; ``--wire`` takes the wire of a dot-matrix
-head that is shipped, at 1200 Hz. It takes some minutes; ``--units N`` draws another number.
+Run ``.venv/bin/python docs/measure/learning_rail.py``. The script draws units of the paper's
+hammer with a 100 V rail, and counts the dots of the de Bruijn cycle of order 8 and of rows of 200 slots
+within limits, at multiples of the open-loop safe rate of the current-driven hammer; ``--wire`` uses the
+shipped wire of a dot-matrix head instead, at 1200 Hz. It takes some minutes; ``--units N`` sets the
+number of units.
 """
 
 import argparse
@@ -27,9 +28,9 @@ SAFE = 850.0
 """Open-loop safe rate of the shipped hammer, Hz."""
 SHARES = (1.5,)
 WIRE = 1200.0
-"""Rate at which the wire prints, Hz: in an open loop it does well at 900 Hz, and not at 1000."""
+"""Rate at which the wire prints, Hz; in open loop, all dots are good at 900 Hz, but not at 1000 Hz."""
 BOUND = 5.0
-"""Bound on its current, A."""
+"""Limit on the current of the wire, A."""
 AFTER = (0, 50, 200, 1000)
 MEMBERS = 150
 NOISE = "50 mV"
@@ -53,7 +54,7 @@ ROOMS = (
 def printed(
     hammer: ph.Hammer, units: list[ph.Hammer], rate: float, sensors: dict[str, ph.ImpactSensor], bound: float
 ) -> list[tuple[str, np.ndarray]]:
-    """Return ways to drive and the share of dots within limits, of each unit: open loop, table, learned."""
+    """Return the fraction of dots within limits of each unit, by strategy: open loop, table, learned."""
     rows: list[tuple[str, np.ndarray]] = []
     single = nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     for name, sensor in sensors.items():
@@ -81,7 +82,7 @@ def printed(
 
 
 def cells(rows: list[tuple[str, np.ndarray]]) -> list[list[Cell]]:
-    """Return way, dots within limits, units that print all, and those that lose by it, for each way."""
+    """Return one row per strategy: dots within limits, perfect units, and units with a loss."""
     plain = rows[0][1]
     return [
         [way, 100.0 * float(good.mean()), int((good == 1.0).sum()), int((good < plain - 1e-12).sum())]

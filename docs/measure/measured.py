@@ -1,13 +1,14 @@
-"""Measured tables: written by the scripts beside this file, shown by the pages, and known to be stale.
+"""Measured tables: written by the scripts in this folder, shown by the pages, and checked for staleness.
 
-A table is a file ``docs/measured/NAME.json``. It holds, beside columns and rows, the command that made it,
-the fingerprints of its hammers and one of the code that the figures depend on. Where one of them is another
-today the table is stale; ``.venv/bin/python docs/measure/measured.py`` lists those, as ``make docs`` does.
+A table is a file ``docs/measured/NAME.json``. In addition to columns and rows, it contains the command
+that produced it, the fingerprints of its hammers, and a fingerprint of the code on which the numbers
+depend. A table is stale if one of the fingerprints has changed; ``.venv/bin/python
+docs/measure/measured.py`` and ``make docs`` list the stale tables.
 
-The fingerprint of code is that of the syntax trees of the rooms that a script names: paths in
-``src/printhammer``, or in the repository for rooms beside the package.
-File names, order, docstrings, comments, imports and the words of errors do not count, so that code may move
-within these rooms.
+The code fingerprint is a digest of the syntax trees of the rooms that a script names: paths in
+``src/printhammer``, or in the repository for rooms outside the package. File names, order, docstrings,
+comments, imports and the text of errors do not affect the digest, so that code may move within these
+rooms.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ from printhammer.kernel.compile.bindings import syntax_text
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "docs" / "measured"
 SOURCES = ROOT / "src" / "printhammer"
-# Scripts use the oracle of the tests and the studies too.
+# Scripts import the oracle of the tests and the studies.
 sys.path.insert(0, str(ROOT))
 MOTION = ("drive", "hammer", "kernel", "parts", "run", "support/roots")
-"""Rooms that every motion depends on."""
+"""Rooms on which every motion depends."""
 OUTSIDE = ("studies/", "tests/")
-"""How the paths of rooms begin that lie beside the package."""
+"""Prefixes of the paths of rooms outside the package."""
 
 Cell = bool | int | float | str | None
 UNSEEN = (ast.Import, ast.ImportFrom)
@@ -44,7 +45,7 @@ UNCOUNTED = tuple(SOURCES / "kernel" / "compile" / name for name in ("cache.py",
 
 
 class Column(BaseModel):
-    """A column: its name in the page, its unit, and how its numbers are written, in Python's notation."""
+    """Column of a table: name on the page, unit, and number format in Python's notation."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -54,12 +55,12 @@ class Column(BaseModel):
 
     @property
     def head(self) -> str:
-        """Name and unit."""
+        """Heading of the column: name and unit."""
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
 
 class Measured(BaseModel):
-    """A measured table; an empty fingerprint is one that was not recorded."""
+    """Measured table; an empty fingerprint means that it was not recorded."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -74,11 +75,11 @@ class Measured(BaseModel):
 
     @property
     def script(self) -> str:
-        """The script that makes it."""
+        """Path of the script that produced the table."""
         return shlex.split(self.command)[0]
 
     def stale(self) -> list[str]:
-        """Return what has changed since it was measured; nothing for a fresh table."""
+        """Return the reasons for staleness; empty for a fresh table."""
         if not self.code:
             return ["its code was not recorded"]
         changed = ["the code"] if self.code != code_fingerprint(self.rooms) else []
@@ -94,7 +95,7 @@ def write(
     rooms: tuple[str, ...],
     hammers: tuple[str, ...] = ("hendriks-1983",),
 ) -> None:
-    """Print a table and write it, unless there is one of other settings that was measured too."""
+    """Print a table and write it, unless a recorded table with other settings exists."""
     print(f"\n{markdown(columns, rows)}\n")
     path = FOLDER / f"{name}.json"
     settings = json.loads(json.dumps(settings))
@@ -104,7 +105,7 @@ def write(
     script = Path(sys.argv[0]).resolve().relative_to(ROOT).as_posix()
     options = sys.argv[1:]
     if "--keep" in options:
-        # A folder of one machine, which changes no number.
+        # The folder exists on one machine only and does not affect the numbers.
         at = options.index("--keep")
         options = options[:at] + options[at + 2 :]
     table = Measured(
@@ -122,7 +123,7 @@ def write(
 
 
 def text_of(table: Measured) -> str:
-    """Return the text of a file, a row a line."""
+    """Return the JSON text of a table, with one line per row."""
     data = table.model_dump()
     parts = [f"  {json.dumps(key)}: {_value(key, value)}" for key, value in data.items()]
     return "{\n" + ",\n".join(parts) + "\n}\n"
@@ -146,14 +147,14 @@ def names() -> list[str]:
 
 
 def markdown(columns: list[Column], rows: list[list[Cell]]) -> str:
-    """Return a table as a page shows it."""
+    """Return a table in Markdown, as shown on a page."""
     lines = [[column.head for column in columns], ["---"] * len(columns)]
     lines += [[shown(cell, column) for cell, column in zip(row, columns, strict=True)] for row in rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def shown(cell: Cell, column: Column) -> str:
-    """Return the text of a cell."""
+    """Return the text of a cell in the format of its column."""
     if cell is None or isinstance(cell, str):
         return cell or ""
     if isinstance(cell, bool):
@@ -163,7 +164,7 @@ def shown(cell: Cell, column: Column) -> str:
 
 @cache
 def hammer_fingerprint(name: str) -> str:
-    """Return the fingerprint that a shipped hammer, or one of the family, has today."""
+    """Return the current fingerprint of a shipped hammer or of a hammer of the family."""
     from studies.reconstruction.family.family import family_hammers
 
     if "-family-" in name:
@@ -172,13 +173,13 @@ def hammer_fingerprint(name: str) -> str:
 
 
 def code_fingerprint(rooms: tuple[str, ...] | list[str]) -> str:
-    """Return the fingerprint of the code of some rooms: folders or modules."""
+    """Return the code fingerprint of rooms, which are folders or modules."""
     found = sorted(statement for room in rooms for statement in _statements(room))
     return hashlib.sha256("\n".join(found).encode()).hexdigest()[:16]
 
 
 def files_of(room: str) -> list[Path]:
-    """Return the files of a room of the package or, where its path begins so, of the repository."""
+    """Return the files of a room of the package or, for a path in `OUTSIDE`, of the repository."""
     path = (ROOT if room.startswith(OUTSIDE) else SOURCES) / room
     return sorted(path.rglob("*.py")) if path.is_dir() else [path.with_suffix(".py")]
 

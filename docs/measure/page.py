@@ -1,7 +1,8 @@
-"""Measure how long a page of 60 characters takes, simulated and drawn,.
+"""Measure the time to simulate and draw a page of 60 characters.
 
-Run it with ``.venv/bin/python docs/measure/page.py``; it takes a few seconds. Imports and compilation are not
-counted. Medians of several pages, wall-clock time and processor time of all threads.
+Run ``.venv/bin/python docs/measure/page.py``, which takes a few seconds. The table shows medians
+over several pages of the wall-clock time and the processor time of all threads, without imports and
+compilation.
 """
 
 import io
@@ -21,7 +22,7 @@ REPEATS = 9
 
 
 def timed(call: Callable[[], object]) -> tuple[float, float]:
-    """Return medians of wall-clock and processor time of a call, s."""
+    """Return the median wall-clock and processor times of a call, s."""
     call()
     wall, busy = [], []
     for _ in range(REPEATS):
@@ -33,12 +34,12 @@ def timed(call: Callable[[], object]) -> tuple[float, float]:
 
 
 def whole() -> None:
-    """Simulate a page and write its picture."""
+    """Simulate a page and write its figure."""
     drawn(ph.print_page(HAMMER, TEXT, RATE))
 
 
 def drawn(page: Page) -> None:
-    """Write the picture of a page."""
+    """Write the figure of a page."""
     page.plot().savefig(io.BytesIO(), format="png", dpi=200)
 
 

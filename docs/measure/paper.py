@@ -1,11 +1,12 @@
-"""Measure what each way to drive prints on paper that is not the same everywhere.
+"""Measure the dots within limits for each driving strategy on paper that varies along the line.
 
-Run it with ``.venv/bin/python docs/measure/paper.py``. It draws hammers from the variability of a production,
-has each print the de Bruijn cycle of order 8 on even paper, on paper that varies, and on paper that varies
-twice as much, and counts the dots within limits: in an open loop, by a table, by one that was learned from
-times of impact and forces, and with feedback. It takes some twenty minutes on one core.
+Run ``.venv/bin/python docs/measure/paper.py``. The script draws hammers from the variability of a
+production. Each hammer prints the de Bruijn cycle of order 8 on uniform paper, on paper that varies, and
+on paper that varies twice as much; the script counts the dots within limits in open loop, with a table,
+with a table learned from impact times and forces, and with feedback. It takes some twenty minutes on one
+core.
 
-``--units N`` draws another number, ``--share X`` prints at other rates, in open-loop safe rates.
+``--units N`` sets the number of hammers, ``--share X`` the rate as a multiple of the open-loop safe rate.
 """
 
 import argparse
@@ -47,13 +48,13 @@ ROOMS = (
     *("printing/dots", "printing/rates", "support/threads"),
 )
 SPEED = 1.0
-"""Speed of a touch, m/s, by which the front shifts times of impact."""
+"""Impact speed, m/s, that converts a shift of the front into a shift of the impact time."""
 FORCE = 1.0 / 3.7
-"""By which power of its stiffness the force of a power-law pack grows at the same energy."""
+"""Exponent with which the peak force of a power-law pack depends on its stiffness, at fixed energy."""
 
 
 def sensor_on(paper: ph.Paper | None) -> ImpactSensor:
-    """Return a sensor of times and forces, in whose noise what the paper adds is contained."""
+    """Return a sensor of times and forces whose noise includes the variation of the paper."""
     if paper is None:
         return ImpactSensor(force=0.03)
     time, force = math.hypot(5e-6, paper.front / SPEED), math.hypot(0.03, FORCE * paper.stiffness)
@@ -63,7 +64,7 @@ def sensor_on(paper: ph.Paper | None) -> ImpactSensor:
 def good(
     ways: list[Strategy], units: list[ph.Hammer], rate: float, by: Nominal, paper: ph.Paper | None
 ) -> list[float]:
-    """Return the share of dots within limits, for each unit, each on paper of its own."""
+    """Return the fraction of dots within limits for each unit, each on its own sample of paper."""
     shares = []
     for number, (unit, way) in enumerate(zip(units, ways, strict=True)):
         own = None if paper is None else ph.Paper(paper.stiffness, paper.front, paper.length, number)
@@ -73,7 +74,7 @@ def good(
 
 
 def learned(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, paper: ph.Paper | None) -> list[Strategy]:
-    """Return the table that each unit learns from times of impact and forces on the paper."""
+    """Return the table that each unit learns from impact times and forces on the paper."""
     sensor = sensor_on(paper)
     law, base = law_for(hammer, rate, sensor=sensor, members=400)
     learners = calibrate(law, units, sensor)[0]
@@ -81,7 +82,7 @@ def learned(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, paper: ph.Pa
 
 
 def measure(hammer: ph.Hammer, units: list[ph.Hammer], share: float) -> list[list[Cell]]:
-    """Return a row for each paper and way at a rate."""
+    """Return one row for each paper and strategy at a rate."""
     rate, single, rows = share * SAFE, nominal(hammer, tolerance=DISPLAY_TOLERANCE), []
     switched = driven_by(hammer, "switch", 2.0)
     fired = [with_pulse(unit, switched.waveform) for unit in units]

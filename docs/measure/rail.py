@@ -1,6 +1,6 @@
-"""Measure what becomes of the paper's claims when its hammer stands behind a rail.
+"""Evaluate the claims of the paper for its hammer with a rail driver.
 
-Run it with ``.venv/bin/python docs/measure/rail.py``; it takes some minutes.
+Run ``.venv/bin/python docs/measure/rail.py``, which takes some minutes.
 """
 
 import runpy
@@ -16,7 +16,7 @@ ROOMS = (*MOTION, "claims", "chaos", "derivatives", "maps", "printing")
 
 
 def main() -> None:
-    """Judge the claims for the hammer with a current and behind rails."""
+    """Evaluate the claims for the hammer with a prescribed current and with rail drivers."""
     import matplotlib
 
     matplotlib.use("Agg")

@@ -1,6 +1,6 @@
-"""Measure how often the intervals at the end of the recipe of ``docs/howto/fitting.md`` hold, run as printed.
+"""Measure the coverage of the final intervals of the commands in ``docs/howto/fitting.md``.
 
-Run it with ``.venv/bin/python docs/measure/recipe.py``; it takes some 25 minutes. ``--labs N`` for another
+Run ``.venv/bin/python docs/measure/recipe.py``, which takes some 25 minutes. ``--labs N`` sets the
 number of synthetic laboratories, whose seeds are 0 to N - 1.
 """
 
@@ -25,11 +25,11 @@ from printhammer.identify.result import CONFIDENCE, student
 
 PAGE = ROOT / "docs" / "howto" / "fitting.md"
 GUESS = 1.15
-"""Of the mass, which the recipe begins with, over the true one."""
+"""Initial guess of the mass, as a fraction of the true mass."""
 
 
 def recipe() -> list[list[str]]:
-    """Return the commands of the page, without the pictures."""
+    """Return the commands of the page, without options for figures."""
     block = next(
         text for text in re.findall(r"```sh\n(.*?)```", PAGE.read_text("utf-8"), re.S) if "motion" in text
     )
@@ -48,7 +48,7 @@ def run(arguments: list[str], folder: str) -> None:
 
 
 def laboratory(hammer: ph.Hammer, seed: int, commands: list[list[str]]) -> ph.Hammer:
-    """Measure a hammer and return what the recipe makes of the tables."""
+    """Measure a hammer in one laboratory, and return the constants fitted by the commands of the page."""
     with tempfile.TemporaryDirectory() as folder:
         hammer.save(Path(folder) / "true.toml")
         hammer.replace("mass", GUESS * hammer.mass).save(Path(folder) / "base.toml")
@@ -59,7 +59,7 @@ def laboratory(hammer: ph.Hammer, seed: int, commands: list[list[str]]) -> ph.Ha
 
 
 def table(made: list[ph.Hammer], truth: ph.Hammer) -> list[list[Cell]]:
-    """Return a row for each constant, and one for all."""
+    """Return one row for each constant, and one row for all constants."""
     rows: list[list[Cell]] = []
     every = made[0].uncertainty
     keys = every.keys if every is not None else ()
@@ -79,7 +79,7 @@ def table(made: list[ph.Hammer], truth: ph.Hammer) -> list[list[Cell]]:
 
 
 def _between(held: int, count: int) -> str:
-    """Return the 95 % interval of the share of intervals that hold, after Clopper and Pearson."""
+    """Return the 95 % Clopper-Pearson interval of the fraction of intervals that contain the true value."""
     tail = 0.5 * (1.0 - CONFIDENCE)
     low = beta.ppf(tail, held, count - held + 1) if held else 0.0
     high = beta.ppf(1.0 - tail, held + 1, count - held) if held < count else 1.0

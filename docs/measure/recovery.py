@@ -1,7 +1,8 @@
-"""Measure what the intervals of fitted constants are worth: how often they hold in synthetic laboratories.
+"""Measure the coverage of the intervals of fitted constants in synthetic laboratories.
 
-Run it with ``.venv/bin/python docs/measure/recovery.py``; it takes several minutes. ``--labs N`` for another
-number of laboratories, ``--random`` for hammers of their own, every constant within 20 % of the shipped one.
+Run ``.venv/bin/python docs/measure/recovery.py``, which takes several minutes. ``--labs N`` sets the
+number of laboratories; ``--random`` uses a random hammer in each, with every constant within 20 % of the
+shipped hammer.
 """
 
 import argparse
@@ -15,11 +16,11 @@ from studies.recovery import Recovery, recover
 import printhammer as ph
 
 SPREAD = 0.2
-"""Range of the constants of random hammers about the shipped one, both ways."""
+"""Relative range of the constants of random hammers, on either side of the shipped hammer."""
 
 
 def hammers(labs: int, random: bool) -> Iterator[ph.Hammer]:
-    """Return a hammer for each laboratory; one that does not print its dot and come back is drawn again."""
+    """Return one hammer per laboratory; a hammer that does not print and return to the backstop is redrawn."""
     shipped = ph.load("hendriks-1983")
     rng = np.random.default_rng(1983)
     low, high = math.log(1.0 - SPREAD), math.log(1.0 + SPREAD)
@@ -40,13 +41,13 @@ def hammers(labs: int, random: bool) -> Iterator[ph.Hammer]:
 
 
 def prints(hammer: ph.Hammer) -> bool:
-    """Return whether a single pulse prints, and the armature then touches the backstop."""
+    """Whether a single pulse prints a dot, after which the armature touches the backstop."""
     motion = ph.simulate(hammer, ph.PulseTrain(hammer.waveform))
     return motion.dots[0].struck and any(touch.surface == "backstop" for touch in motion.contacts[1:])
 
 
 def table(found: list[Recovery]) -> list[list[Cell]]:
-    """Return a row for each constant: in a fit of its own, and in the end, from all measurements."""
+    """Return one row for each constant: from its own fit, and finally from all measurements."""
     rows: list[list[Cell]] = []
     for kind in found[0].fits:
         for key, constant in found[0].fits[kind].constants.items():

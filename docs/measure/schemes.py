@@ -1,7 +1,7 @@
-"""Write the table of how often the schemes of 1983 change a verdict on Fig. 11, from what ships.
+"""Write the table of panels of Fig. 11 that the schemes of 1983 classify wrongly, from the shipped data.
 
-The comparison itself takes an hour and is made by ``python -m studies.reconstruction schemes``; this is its
-table for the pages. Run it with ``.venv/bin/python docs/measure/schemes.py``.
+The comparison itself takes an hour and is computed by ``python -m studies.reconstruction schemes``; this
+script writes its table for the pages. Run ``.venv/bin/python docs/measure/schemes.py``.
 """
 
 from measured import MOTION, Cell, Column, write

@@ -1,11 +1,13 @@
-"""Measure how fast hammers print with a compensation table: safe rates beside open loop, also perturbed.
+"""Measure safe rates with a compensation table and in open loop, for nominal and perturbed hammers.
 
-Run it with ``.venv/bin/python docs/measure/tables.py``. For the shipped hammer and two of its family it
-tunes a table over all rates and makes a row, with ``--perturbed`` one for each hammer that differs. It
-takes some ten minutes on two cores, ``--perturbed`` some five more for each hammer.
+Run ``.venv/bin/python docs/measure/tables.py``. For the shipped hammer and two hammers of its
+family, the script tunes a table for all rates and writes one row; with ``--perturbed``, one row for each
+perturbed hammer. It takes some ten minutes on two cores, and with ``--perturbed`` some five more for each
+hammer.
 
-``--history N`` and ``--robust`` are as for ``printhammer tune``. ``--hammer`` takes a name or a file instead
-of the three, and may be repeated. ``--keep FOLDER`` keeps the tables, and takes those that are there already.
+``--history N`` and ``--robust`` are as for ``printhammer tune``. ``--hammer`` selects a name or a file
+instead of the three hammers, and is repeatable. ``--keep FOLDER`` stores the tables, and reuses tables
+already stored.
 """
 
 import argparse
@@ -25,13 +27,13 @@ from printhammer.printing.rates.safe_rate import SafeRate
 from printhammer.printing.rates.variability import Perturbation, perturbed
 
 OTHERS = (5, 17)
-"""Places of the two hammers in the family."""
+"""Indices of the two hammers in the family."""
 
 TOLERANCE = 5e-7
-"""That for pictures."""
+"""Display tolerance, used for all runs of this script."""
 
 BETWEEN = 2.5
-"""Shift of a grid of rates that lie between those of the table, Hz."""
+"""Shift of the grid of rates between the rates of the table, Hz."""
 
 ROOMS = (
     *MOTION,
@@ -44,12 +46,12 @@ ROOMS = (
 
 
 def finite(value: float) -> float | str:
-    """Return a number, or "none" for what is not one."""
+    """Return a finite number, or "none" for any other value."""
     return float(value) if np.isfinite(value) else "none"
 
 
 def hammers(names: list[str]) -> Iterator[ph.Hammer]:
-    """Return the hammers of these names, or the three."""
+    """Return the hammers with the given names, or the three default hammers."""
     if names:
         yield from (ph.load(name) for name in names)
         return
@@ -61,7 +63,7 @@ def hammers(names: list[str]) -> Iterator[ph.Hammer]:
 def tuned(
     hammer: ph.Hammer, history: int, robust: bool, kept: Path | None
 ) -> tuple[CompensationTable, float]:
-    """Return a table over all rates, and the processor time it took, s; 0 for one that was kept."""
+    """Return a table for all rates, and the processor time of tuning, s; 0 for a stored table."""
     path = None if kept is None else kept / f"{hammer.fingerprint[:8]}-{history}{'-robust' * robust}.json"
     if path is not None and path.exists():
         return ph.load_table(path), 0.0
@@ -74,7 +76,7 @@ def tuned(
 
 
 def rates_of(hammer: ph.Hammer, table: CompensationTable, by: Perturbation) -> tuple[SafeRate, SafeRate]:
-    """Return the safe rates of a hammer that differs, open loop and with the table."""
+    """Return the safe rates of a perturbed hammer, in open loop and with the table."""
     driven, single = perturbed(hammer, by), nominal(hammer, tolerance=TOLERANCE)
     last = float(table.rates[-1])
     options = {"nominal": single, "tolerance": TOLERANCE}
@@ -103,7 +105,7 @@ def main() -> None:
             plain, better = rates_of(hammer, table, by)
             between = None
             if by == Perturbation():
-                # From the first rate on at which a dot does not follow on rest.
+                # The grid begins at the first rate at which dots do not start from rest.
                 found = ph.safe_rate(
                     hammer,
                     table.strategy(hammer),

@@ -1,7 +1,7 @@
-"""Measure the figures of the page on the tangent flow.
+"""Measure the tables of the page on the tangent flow.
 
-Run it with ``.venv/bin/python docs/measure/tangent.py``; it takes a few minutes. The differences of runs and
-the hammers are those of the tests.
+Run ``.venv/bin/python docs/measure/tangent.py``, which takes a few minutes. Finite differences and
+hammers are the same as in the tests.
 """
 
 import sys
@@ -24,11 +24,11 @@ from printhammer.hammer.equilibrium import rest_state
 from printhammer.run.problem import TOLERANCE, Problem
 
 SIZES = (1e-4, 1e-5, 1e-3, 1e-6)
-"""First spacings of the differences; the best counts, since each has its own rounding and curvature."""
+"""Initial spacings of the finite differences; the best result counts, since their errors differ."""
 
 
 def best(*what: object, **how: object) -> float:
-    """Return the smallest deviation over the spacings."""
+    """Return the smallest deviation over all spacings."""
     found = np.inf
     for size in SIZES:
         found = min(found, deviation(*what, size=size, **how))
@@ -44,7 +44,7 @@ def row(name: str, errors: list[float]) -> list[Cell]:
 
 
 def crude_hammer() -> list[list[Cell]]:
-    """A single pulse, trains, from contact to contact; and what the default tolerance does."""
+    """Compare a single pulse, trains, and maps from contact to contact; also at the default tolerance."""
     rows = []
     hammer = crude()
     single = ph.PulseTrain(hammer.waveform)
@@ -69,7 +69,7 @@ def crude_hammer() -> list[list[Cell]]:
 
 
 def other_hammers() -> list[list[Cell]]:
-    """Parts, drives, and hammers drawn about the crude one."""
+    """Compare other parts, drives, and random hammers near the crude hammer."""
     errors: dict[bool, list[float]] = {False: [], True: []}
     for magnet, spring, pack, backstop, name, start, end in CASES:
         with tempfile.TemporaryDirectory() as folder, interpreted():
@@ -90,7 +90,7 @@ def other_hammers() -> list[list[Cell]]:
 
 
 def cost() -> list[Cell]:
-    """Time of exponents over time of the runs alone, a row of a table."""
+    """Return a row with the time for exponents divided by the time for the runs alone."""
     hammer = ph.load("hendriks-1983")
     ratios = []
     for _ in range(5):

@@ -1,12 +1,12 @@
-"""Measure what it costs that firmware fires in whole ticks of a timer.
+"""Measure the effect of rounding the times of a table to whole ticks of a timer.
 
-Run it with ``.venv/bin/python docs/measure/ticks.py``. For the shipped hammer it tunes a table over all rates
-and finds its safe rate as the ticks get longer; and tables at 1.5 times the open-loop safe rate, whose worst
-dot on the nominal hammer, and whose dots within limits on hammers drawn from the variability of a production,
-it counts. It takes some ten minutes on one core.
+Run ``.venv/bin/python docs/measure/ticks.py``. For the shipped hammer, the script tunes a table
+for all rates and computes its safe rate for increasing ticks. For tables at 1.5 times the open-loop safe
+rate, it computes the worst dot on the nominal hammer, and the dots within limits on hammers drawn from
+the variability of a production. It takes some ten minutes on one core.
 
-``--units N`` draws another number; ``--keep FOLDER`` is as for ``tables.py``; ``--curves FILE`` only draws
-the measured table.
+``--units N`` sets the number of hammers; ``--keep FOLDER`` is as for ``tables.py``; ``--curves FILE``
+only draws the measured table.
 """
 
 import argparse
@@ -28,7 +28,7 @@ from printhammer.printing.rates.variability import Variability
 from printhammer.run.ensemble import DISPLAY_TOLERANCE
 
 SHARE = 1.5
-"""Rate of the tables for one rate, in open-loop safe rates."""
+"""Rate of the single-rate tables, as a multiple of the open-loop safe rate."""
 TICKS = (None, "1 us", "2 us", "5 us", "10 us", "20 us")
 ROOMS = (
     *MOTION,
@@ -41,7 +41,7 @@ ROOMS = (
 
 
 def printed(units: list[ph.Hammer], hammer: ph.Hammer, table: CompensationTable, rate: float) -> Trial:
-    """Return what hammers print of the cycle with a table."""
+    """Return the dots of the cycle that hammers print with a table."""
     single = nominal(hammer, tolerance=DISPLAY_TOLERANCE)
     return attempt(
         [Case(unit, single, rate) for unit in units],
@@ -54,7 +54,7 @@ def printed(units: list[ph.Hammer], hammer: ph.Hammer, table: CompensationTable,
 
 
 def worst(trial: Trial) -> float:
-    """Return how far the worst dot is off, in parts of the limits."""
+    """Return the largest deviation of a dot, as a fraction of the limits."""
     judgement, limits = trial.judgement, Limits()
     force = np.abs(judgement.force_deviation[judgement.wanted]) / limits.force
     arrival = np.abs(judgement.arrival_deviation[judgement.wanted]) / limits.arrival
@@ -62,7 +62,7 @@ def worst(trial: Trial) -> float:
 
 
 def measure(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, kept: Path | None) -> list[list[Cell]]:
-    """Return a row a tick."""
+    """Return one row for each tick."""
     (whole, _time), rows = tuned(hammer, 1, robust=False, kept=kept), []
     tables = {driver: ph.tune(hammer, rate=rate, driver=driver) for driver in ("own", "switch")}
     for tick in TICKS:
@@ -83,7 +83,7 @@ def measure(hammer: ph.Hammer, units: list[ph.Hammer], rate: float, kept: Path |
 
 
 def curves(path: Path) -> None:
-    """Draw safe rate and worst dot by tick."""
+    """Draw the safe rate and the worst deviation against the tick."""
     style = import_module("printhammer.figures.elements.style")
     measured = read("ticks")
     rows, safe, rate = measured.rows, measured.settings["safe rate"], measured.settings["rate"]

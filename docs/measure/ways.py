@@ -1,9 +1,9 @@
-"""Set three ways to drive a hammer side by side: open loop, a compensation table, feedback.
+"""Compare three strategies to drive a hammer: open loop, a compensation table, and feedback.
 
-Run it with ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE]``. It measures how good a page of
-several lines is at each rate and how far the second of two dots is off at all distances, which takes a few
-minutes. With ``--picture FILE`` it only draws one line, printed in each way at the last rate: the picture of
-the README, ``docs/images/ways.png``.
+Run ``.venv/bin/python docs/measure/ways.py [HAMMER] [--rate RATE]``. The script measures the dots
+within limits on a page of several lines at each rate, and the deviations of the second of two dots for
+all distances, which takes a few minutes. With ``--picture FILE``, it only draws one line printed with
+each strategy at the last rate: the figure of the README, ``docs/images/ways.png``.
 """
 
 import argparse
@@ -29,13 +29,13 @@ LINE = "Bounce and chaos 1983"
 
 
 def ways_at(hammer: ph.Hammer, rate: str, controller: Controller) -> list[Strategy]:
-    """Return the three ways to drive; the table is tuned for the rate."""
+    """Return the three strategies; the table is tuned for the rate."""
     table = ph.tune(hammer, rate=rate, history=2)
     return [open_loop, table.strategy(hammer), FeedbackStrategy(controller)]
 
 
 def page_row(page: Page) -> list[Cell]:
-    """Return how good a page is, a row of a table."""
+    """Return a table row with the dots within limits on a page."""
     on = page.printed
     force, place = 100.0 * (page.force_ratio[on] - 1.0), 1e6 * page.placement_error[on]
     return [
@@ -49,7 +49,7 @@ def page_row(page: Page) -> list[Cell]:
 
 
 def pair_rows(found: Feedback) -> list[list[Cell]]:
-    """Return how far the second of two dots is off, a row for each way."""
+    """Return the deviations of the second of two dots, one row per strategy."""
     rows: list[list[Cell]] = []
     for number, name in enumerate(found.strategies):
         force, arrival = found.gap_force[number], found.gap_arrival[number]
@@ -62,7 +62,7 @@ def pair_rows(found: Feedback) -> list[list[Cell]]:
 
 
 def picture(pages: list[Page], path: Path) -> None:
-    """Draw the same line printed in each way, one below the other."""
+    """Draw the same line printed with each strategy, one below the other."""
     from matplotlib.figure import Figure
     from matplotlib.image import imread
 
@@ -79,7 +79,7 @@ def picture(pages: list[Page], path: Path) -> None:
 
 
 def main() -> None:
-    """Read the arguments, measure the tables, draw the picture."""
+    """Read the arguments; measure the tables or draw the figure."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("hammer", nargs="?", default="hendriks-1983")
     parser.add_argument("--rate", action="append", dest="rates")

@@ -1,6 +1,6 @@
-"""Measure which part of a production prints well, for spreads of its constants and at several rates.
+"""Measure the fraction of a production that prints within limits, for several spreads and rates.
 
-Run it with ``.venv/bin/python docs/measure/yields.py``; it takes some minutes.
+Run ``.venv/bin/python docs/measure/yields.py``, which takes some minutes.
 """
 
 from measured import MOTION, Cell, Column, write
@@ -9,16 +9,16 @@ from studies.reconstruction.family.family import family_hammers
 import printhammer as ph
 
 NUMBER = 256
-"""Hammers drawn for each number."""
+"""Number of hammers drawn for each entry."""
 
 SPREADS = (("own", 0.01), ("own", 0.02), ("design", 0.01))
-"""By which single pulse dots are judged, and the spread of the constants."""
+"""Reference single pulse of each column, and the relative spread of the constants."""
 
 RATES = {
     "hendriks-1983": {400.0: (2,), 750.0: (0, 1), 800.0: (0, 1, 2)},
     "hendriks-1983-family-06": {400.0: (2,), 900.0: (0, 1, 2), 925.0: (0, 1)},
 }
-"""Rates of each hammer, Hz, and the places in `SPREADS` that are measured there."""
+"""Rates of each hammer, Hz, with the indices in `SPREADS` to measure at each rate."""
 
 
 def main() -> None:
