@@ -20,7 +20,7 @@ SPREAD = 0.2
 
 
 def hammers(labs: int, random: bool) -> Iterator[ph.Hammer]:
-    """Return one hammer per laboratory; a hammer that does not print and return to the backstop is redrawn."""
+    """Return one hammer per laboratory; hammers that do not print and return to the backstop are redrawn."""
     shipped = ph.load("hendriks-1983")
     rng = np.random.default_rng(1983)
     low, high = math.log(1.0 - SPREAD), math.log(1.0 + SPREAD)
