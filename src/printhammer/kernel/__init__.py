@@ -1,1 +1,1 @@
-"""Numerical kernel: arrays and numbers only, without units, files or pictures."""
+"""Numerical kernel: integration of the motion on numbers and arrays in SI units, without files or plots."""

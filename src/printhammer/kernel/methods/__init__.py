@@ -1,1 +1,1 @@
-"""Integration methods, and location of switches within a step."""
+"""Integration methods, and location of switching events within a step."""

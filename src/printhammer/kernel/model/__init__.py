@@ -1,1 +1,1 @@
-"""Model: laws, force sum, modes, drive at an instant, and derivatives of the laws."""
+"""Model of the hammer: force laws, total force, modes of motion, coil circuit, and value of the drive."""

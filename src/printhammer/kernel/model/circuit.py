@@ -1,27 +1,29 @@
-"""The coil circuit: flux linkage as part of the state, under a voltage source or the paths of a driver.
+"""Coil circuit: the flux linkage as a state variable, with a voltage source or the current paths of a driver.
 
-With the flux linkage lambda(x, i) of the magnet and the constant inductance L of the coil the circuit obeys
+With the flux linkage lambda_m(x, i) of the magnet and the constant inductance L of the coil, the circuit
+obeys
 
     d lambda / dt = u - R i,    lambda = lambda_m(x, i) + L i,
 
-and force and back-EMF are the two sides of one coenergy: F = dW'/dx, lambda_m = dW'/di. With a shorted turn
-of resistance Re (referred to the coil) and leakage Ls, the turn carries the current ie:
+and force and flux linkage derive from one coenergy W'(x, i): F = dW'/dx, lambda_m = dW'/di. A shorted turn of
+resistance Re (referred to the coil) and leakage inductance Ls carries the current ie:
 
     lambda = lambda_1 + Ls i,    d lambda_1 / dt = -Re ie,    lambda_1 = lambda_m(x, i + ie) + L (i + ie).
 
 H. H. Woodson and J. R. Melcher, *Electromechanical Dynamics* (1968), ch. 3. A reservoir of capacitance C,
 charged from V through Rc and shared by n coils, has the voltage q: dq/dt = (V - q) / (Rc C) - n i / C.
 
-The electric state is the tuple ``(lambda, lambda_1, q)``, the empty tuple in a kernel without a circuit. It
-travels with the array ``live`` of the drive: where other kernels hand on ``live``, this one hands on ``(live,
-electric)``. The last two places of ``live`` hold what a driver does at present: its path, and until when a
-chopper of fixed off-time stays off [s].
+The electric state is the tuple ``(lambda, lambda_1, q)``; it is empty in a kernel without a circuit. The
+drive argument of the force functions is ``live`` without a circuit, and ``(live, electric)`` with one. The
+last two elements of ``live`` hold the state of the driver: the end of the off-time [s] of a fixed off-time
+chopper, and the current path.
 
-A driver's pieces, of which at most one is under way, are ``[start, SWITCHED_PIECE, voltage, series
-resistance, upper, lower]``, with the thresholds of a chopper [A], an infinite upper one for none, and minus
-the off-time [s] as the lower one of a chopper of fixed off-time; ``[start, DECAY_PIECE, voltage against which
-the current decays, series resistance, share given back to the supply, 0]``; and ``[start, RESERVOIR_PIECE, 0,
-series resistance, 0, 0]``. All other pieces are the voltage of an ideal source, in both directions.
+At most one piece of a driver is active at a time. Its pieces are ``[start, SWITCHED_PIECE, voltage, series
+resistance, upper, lower]`` with the current thresholds of the chopper [A], where `upper` is infinite without
+a chopper, and `lower` is minus the off-time [s] of a fixed off-time chopper; ``[start, DECAY_PIECE, voltage
+that opposes the decaying current, series resistance, fraction of the energy returned to the supply, 0]``; and
+``[start, RESERVOIR_PIECE, 0, series resistance, 0, 0]``. All other pieces are the voltage of an ideal source,
+which conducts in both directions.
 """
 
 from __future__ import annotations
@@ -63,23 +65,25 @@ if TYPE_CHECKING:
 Hammer = Any
 
 Electric = Any
-"""Flux linkage of the coil and of the shorted turn [Wb], voltage of the reservoir [V]; or the empty tuple."""
+"""Electric state: flux linkages of coil and shorted turn [Wb], reservoir voltage [V]; empty without a
+circuit."""
 
 SOURCE, CHOPPED, BLOCKED, BACKWARD = 0.0, 1.0, 2.0, 3.0
-"""Paths of the current: through the source, through the diode of a chopper, none, decay of a negative
-current."""
+"""Paths of the coil current: through the source, through the freewheeling diode of a chopper, blocked (no
+current), and decay of a negative current."""
 
 PATH = 1
 UNTIL = 2
-"""Places in `live`, counted from its end."""
+"""Indices in `live`, counted from its end, of the current path and of the end of the chopper's off-time."""
 
 STILL_SHARE = 1e-12
-"""Largest change in one characteristic time of a circuit at rest, as a fraction of the scales."""
+"""Largest change of the electric state in one characteristic time that counts as zero, as a fraction of the
+scales."""
 
 
 @inlined
 def driven(live: Any, electric: Electric) -> Drive:
-    """Return the drive argument of the force functions."""
+    """Return the drive argument of the force functions: `live`, or `live` and the electric state."""
     if HAS_CIRCUIT:
         return live, electric
     return live
@@ -87,26 +91,26 @@ def driven(live: Any, electric: Electric) -> Drive:
 
 @inlined
 def path_of(live: Any) -> float:
-    """Return the path of the current."""
+    """Return the present path of the coil current, stored in `live`."""
     return float(live[live.size - PATH])
 
 
 @inlined
 def take_path(live: Any, path: float, until: float) -> None:
-    """Set the path of the current."""
+    """Store the path of the coil current in `live`, with the time `until` [s] at which an off-time ends."""
     live[live.size - PATH] = path
     live[live.size - UNTIL] = until
 
 
 @inlined
 def kind_of(live: Any) -> float:
-    """Return the kind of the active piece; -1 without one."""
+    """Return the kind of the first active waveform piece; -1 if no piece is active."""
     return float(live[3]) if live[0] > 0.0 else -1.0
 
 
 @inlined
 def current_at(x: float, linkage: float, hammer: Hammer) -> float:
-    """Return the current [A] that links `linkage` [Wb] with the constant inductance and the magnet."""
+    """Return the magnetising current [A] at displacement `x` [m] and flux linkage `linkage` [Wb]."""
     if hammer[COUPLED] != 0.0:
         return float(magnet_current(hammer[MAGNET:], x, linkage, hammer[INDUCTANCE]))
     return float(linkage / hammer[INDUCTANCE])
@@ -114,7 +118,7 @@ def current_at(x: float, linkage: float, hammer: Hammer) -> float:
 
 @inlined
 def linkage_at(x: float, current: float, hammer: Hammer) -> float:
-    """Return the flux linkage [Wb] of the main path at a displacement [m] and a current [A]."""
+    """Return the main flux linkage, without leakage [Wb], at displacement [m] and magnetising current [A]."""
     own = hammer[INDUCTANCE] * current
     if hammer[COUPLED] != 0.0:
         return float(magnet_linkage(hammer[MAGNET:], x, current) + own)
@@ -123,7 +127,7 @@ def linkage_at(x: float, current: float, hammer: Hammer) -> float:
 
 @inlined
 def coil_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the current in the coil [A]; zero on a blocked path."""
+    """Return the coil current [A]; zero while the current path is blocked."""
     if path_of(live) == BLOCKED:
         return 0.0
     if hammer[TURN_RESISTANCE] > 0.0:
@@ -133,7 +137,7 @@ def coil_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> flo
 
 @inlined
 def magnetising_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the magnetising current [A]: that of the coil plus that of the shorted turn, if any."""
+    """Return the magnetising current [A]: coil current plus the current of the shorted turn, if any."""
     if hammer[TURN_RESISTANCE] > 0.0:
         return current_at(x, electric[1], hammer)
     return coil_current(x, electric, hammer, live)
@@ -141,7 +145,7 @@ def magnetising_current(x: float, electric: Electric, hammer: Hammer, live: Any)
 
 @inlined
 def source_of(t: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[float, float]:
-    """Return the voltage [V] that acts on the coil and the resistance [ohm] in series with it."""
+    """Return the source voltage [V] and the resistance in series with the coil [ohm] on the present path."""
     kind = kind_of(live)
     if kind == SWITCHED_PIECE:
         if path_of(live) == CHOPPED:
@@ -156,7 +160,7 @@ def source_of(t: float, electric: Electric, hammer: Hammer, live: Any) -> tuple[
 
 @inlined
 def open_rate(x: float, v: float, electric: Electric, hammer: Hammer) -> float:
-    """Return the rate of the flux linkage [V] if no current flows in the coil."""
+    """Return the time derivative of the flux linkage [V] for zero coil current."""
     if hammer[TURN_RESISTANCE] > 0.0:
         return float(-hammer[TURN_RESISTANCE] * current_at(x, electric[1], hammer))
     if hammer[COUPLED] != 0.0:
@@ -166,7 +170,7 @@ def open_rate(x: float, v: float, electric: Electric, hammer: Hammer) -> float:
 
 @inlined
 def reservoir_rate(current: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the rate of the voltage of the reservoir [V/s]."""
+    """Return the time derivative of the reservoir voltage [V/s] for a coil current [A]."""
     if hammer[CAPACITANCE] == 0.0:
         return 0.0
     rate = (hammer[CHARGED] - electric[2]) / hammer[CHARGING]
@@ -179,7 +183,7 @@ def reservoir_rate(current: float, electric: Electric, hammer: Hammer, live: Any
 def electric_rates(
     t: float, x: float, v: float, electric: Electric, hammer: Hammer, live: Any
 ) -> tuple[float, float, float]:
-    """Return the rates of the electric state [V, V, V/s]."""
+    """Return the time derivatives of the electric state: flux linkages [V], reservoir voltage [V/s]."""
     if path_of(live) == BLOCKED:
         rate = open_rate(x, v, electric, hammer)
         return (
@@ -198,7 +202,7 @@ def electric_rates(
 
 @inlined
 def moved(electric: Electric, pause: float, rates: Electric) -> Electric:
-    """Return the electric state after a pause [s] with constant rates."""
+    """Extrapolate the electric state linearly by a time interval `pause` [s], with the given rates."""
     return (
         electric[0] + pause * rates[0],
         electric[1] + pause * rates[1],
@@ -208,7 +212,7 @@ def moved(electric: Electric, pause: float, rates: Electric) -> Electric:
 
 @compiled
 def electric_at_rest(x: float, hammer: Hammer) -> tuple[float, float, float]:
-    """Return the electric state without current, with a full reservoir."""
+    """Return the electric state at displacement `x` [m] with zero currents and a full reservoir."""
     linkage = linkage_at(x, 0.0, hammer)
     return linkage, linkage, hammer[CHARGED]
 
@@ -217,9 +221,9 @@ def electric_at_rest(x: float, hammer: Hammer) -> tuple[float, float, float]:
 def electric_with(
     x: float, current: float, turn: float, reservoir: float, hammer: Hammer
 ) -> tuple[float, float, float]:
-    """Return the electric state of currents in coil and shorted turn [A] and a voltage of the reservoir [V].
+    """Return the electric state for given currents in coil and shorted turn [A] and reservoir voltage [V].
 
-    A reservoir of NaN is full.
+    A reservoir voltage of NaN denotes a full reservoir.
     """
     charge = hammer[CHARGED] if math.isnan(reservoir) else reservoir
     if hammer[TURN_RESISTANCE] > 0.0:
@@ -231,7 +235,7 @@ def electric_with(
 
 @compiled
 def turn_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the current in the shorted turn [A], 0 without one."""
+    """Return the current in the shorted turn [A]; 0 if the coil has no shorted turn."""
     if hammer[TURN_RESISTANCE] > 0.0:
         return current_at(x, electric[1], hammer) - coil_current(x, electric, hammer, live)
     return 0.0
@@ -239,7 +243,7 @@ def turn_current(x: float, electric: Electric, hammer: Hammer, live: Any) -> flo
 
 @compiled
 def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float, float, float]:
-    """Return the electric state with zero coil current, and other components as in `electric`."""
+    """Return a copy of the electric state with zero coil current; the other components are unchanged."""
     if hammer[TURN_RESISTANCE] > 0.0:
         return electric[1], electric[1], electric[2]
     return linkage_at(x, 0.0, hammer), electric[1], electric[2]
@@ -247,7 +251,7 @@ def without_current(x: float, electric: Electric, hammer: Hammer) -> tuple[float
 
 @inlined
 def path_may_change(live: Any) -> bool:
-    """Whether the path of the current can change other than at an edge."""
+    """Whether the path of the coil current can change between two edges of the drive."""
     kind = kind_of(live)
     if kind == SWITCHED_PIECE:
         return path_of(live) != SOURCE or not math.isinf(live[6])
@@ -256,7 +260,7 @@ def path_may_change(live: Any) -> bool:
 
 @compiled
 def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return a gap of order one that is positive as long as the path of the current is kept."""
+    """Return the event function of the current path: of order one, positive until the path changes."""
     kind, path = kind_of(live), path_of(live)
     scale = hammer[CURRENT_SCALE]
     if kind == SWITCHED_PIECE:
@@ -280,7 +284,7 @@ def path_gap(x: float, v: float, electric: Electric, hammer: Hammer, live: Any) 
 
 @compiled
 def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Select the path that follows once the gap has closed; return the electric state there."""
+    """Select the next current path once `path_gap` has reached zero; return the electric state there."""
     path = path_of(live)
     if kind_of(live) == DECAY_PIECE:
         if path == BLOCKED:
@@ -302,7 +306,7 @@ def next_path(t: float, x: float, electric: Electric, hammer: Hammer, live: Any)
 
 @compiled
 def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: Any) -> Electric:
-    """Select the path at the start of a piece, or at the end of an off-time; return the electric state."""
+    """Select the current path when a piece begins or an off-time ends; return the electric state."""
     current = coil_current(x, electric, hammer, live)
     kind = kind_of(live)
     if kind == SWITCHED_PIECE and current >= live[6]:
@@ -319,7 +323,7 @@ def enter_piece(t: float, x: float, electric: Electric, hammer: Hammer, live: An
 
 @compiled
 def is_quiet(t: float, x: float, time_scale: float, electric: Electric, hammer: Hammer, live: Any) -> bool:
-    """Whether the circuit of an armature at rest remains unchanged until the next edge."""
+    """Whether the electric state of an armature at rest stays constant until the next edge of the drive."""
     kind = kind_of(live)
     if kind != -1.0 and kind < SWITCHED_PIECE:
         return False
@@ -331,7 +335,7 @@ def is_quiet(t: float, x: float, time_scale: float, electric: Electric, hammer: 
 
 @compiled
 def fastest_rate(x: float, electric: Electric, hammer: Hammer, live: Any) -> float:
-    """Return the largest decay rate of the circuit [1/s], linearised about the present state."""
+    """Return the largest decay rate of the coil circuit [1/s], linearised about the present state."""
     if path_of(live) == BLOCKED and hammer[TURN_RESISTANCE] == 0.0:
         return 0.0
     current = magnetising_current(x, electric, hammer, live)

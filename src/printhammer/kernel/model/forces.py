@@ -1,6 +1,7 @@
-"""Force sum, equation (2), in each mode: plain scalar functions of the bound laws.
+"""Total force on the armature, equation (2) of the paper, in each mode, composed of the force laws.
 
-The constants of the hammer are in one array, see :mod:`printhammer.kernel.model.layout`.
+Equation numbers refer to F. Hendriks, IBM J. Res. Develop. 27 (1983). `hammer` is the parameter array of
+:mod:`printhammer.kernel.model.layout`.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 
 @inlined
 def value_at(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the value of the drive, or the current [A] of a coil circuit."""
+    """Return the drive in amperes or newtons at time `t`; with a coil circuit, the magnetising current."""
     if HAS_CIRCUIT:
         return magnetising_current(x, drive[1], hammer, drive[0])
     return drive_value(t, drive)
@@ -49,7 +50,7 @@ def value_at(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
 
 @inlined
 def undamped_force(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the sum of magnet, spring and drive force [N]."""
+    """Return the sum of magnet, spring and drive force [N], without damping and contact forces."""
     value = value_at(t, x, hammer, drive)
     if FORCE_DRIVE:
         return magnet_force(hammer[MAGNET:], x, 0.0) + spring_force(hammer[SPRING:PACK], x) + value
@@ -58,7 +59,7 @@ def undamped_force(t: float, x: float, hammer: Hammer, drive: Drive) -> float:
 
 @inlined
 def field_force(t: float, x: float, v: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the sum of magnet, spring, damping and drive force [N]: equations (3) and (4)."""
+    """Return the sum of magnet, spring, damping and drive force [N]; equations (3) and (4) of the paper."""
     if HAS_DAMPING:
         return undamped_force(t, x, hammer, drive) + damping_force(hammer[DAMPING:SPRING], v)
     return undamped_force(t, x, hammer, drive)
@@ -66,7 +67,7 @@ def field_force(t: float, x: float, v: float, hammer: Hammer, drive: Drive) -> f
 
 @inlined
 def pack_force(x: float, v: float, mode: int, memory: float, hammer: Hammer) -> float:
-    """Return the force of the pack [N] on the branch of `mode`: equation (5)."""
+    """Return the pack force [N], equation (5) of the paper, on the loading or unloading branch of `mode`."""
     if mode == LOADING:
         return pack_loading(hammer[PACK:BACKSTOP_PART], x, v)
     if mode in (UNLOADING, RELOADING):
@@ -78,7 +79,7 @@ def pack_force(x: float, v: float, mode: int, memory: float, hammer: Hammer) -> 
 def acceleration(
     t: float, x: float, v: float, mode: int, memory: float, hammer: Hammer, drive: Drive
 ) -> float:
-    """Return the acceleration [m/s^2] off the backstop: equation (1)."""
+    """Return the acceleration of the armature off the backstop [m/s^2], from equation (1) of the paper."""
     force = field_force(t, x, v, hammer, drive)
     if HAS_PACK:
         force += pack_force(x, v, mode, memory, hammer)
@@ -87,7 +88,7 @@ def acceleration(
 
 @inlined
 def backstop_acceleration(t: float, w: float, v: float, hammer: Hammer, drive: Drive) -> float:
-    """Return the acceleration [m/s^2] at compression ``w**2`` [m] of the backstop: (1), (6) and (7)."""
+    """Return the acceleration [m/s^2] at backstop compression ``w**2`` [m]; equations (1), (6) and (7)."""
     force = field_force(t, hammer[POSITION] - w * w, v, hammer, drive)
     force += backstop_elastic(hammer[BACKSTOP_PART:MAGNET], w) + backstop_viscous(
         hammer[BACKSTOP_PART:MAGNET], w, v

@@ -1,9 +1,9 @@
-"""Laws to which a kernel is bound, and choices fixed before it is optimised.
+"""Declarations of the force laws and of the choices that a compiled kernel is specialised for.
 
-The functions and flags below are declarations. The modules listed in
-:data:`printhammer.kernel.compile.templates.TEMPLATES` import them for the type checker only. They stay
-open when these modules are lowered, and are linked for each combination of laws before LLVM optimises the
-whole, so that a replaced part costs nothing at run time.
+The functions and flags below are declarations without values. The modules listed in
+:data:`printhammer.kernel.compile.templates.TEMPLATES` import the declarations for the type checker
+only. The declared names stay undefined when these modules are lowered. They are linked for each combination
+of laws before LLVM optimises the result, so that a replaced part costs nothing at run time.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Laws:
-    """Modules with the laws of one hammer, and the choices fixed at compile time.
+    """Modules that define the force laws of a hammer, and options fixed at compile time.
 
     Attributes
     ----------
     magnet, spring, pack, backstop, damping : str
-        Dotted names of modules with the law functions declared in this file; the empty string for an absent
-        part.
+        Dotted names of the modules that define the law functions of each part; the empty string for an
+        absent part.
     absent : str
-        Dotted name of the module from which every function that a part's module lacks is taken.
+        Dotted name of the module that supplies every law function that the module of a part does not define.
     force_drive : bool
-        The drive is a force in newtons instead of a coil current in amperes.
+        Whether the drive is a force in newtons instead of a coil current in amperes.
     circuit : bool
-        The drive is a voltage that acts on the circuit of the coil.
+        Whether the drive is a voltage applied to the coil circuit.
     pack_pulls, backstop_pulls : bool
         Whether the contact force may become tensile, as the printed law allows.
     reload_along_unloading : bool
-        Reloading inside one pack contact follows the unloading branch instead of jumping to the loading
-        branch.
+        Whether reloading during a pack contact follows the unloading branch instead of jumping to the
+        loading branch.
     """
 
     magnet: str
@@ -78,11 +78,11 @@ LAW_FUNCTIONS = {
     ),
     "damping": ("damping_force",),
 }
-"""Names of the law functions of each part."""
+"""Names of the law functions that each part may define."""
 
 
 def floats_of(law: str) -> int:
-    """Return the number of arguments of a law function after its constants."""
+    """Return the number of float arguments of a law function, not counting the array of constants."""
     return int(__annotations__[law].removeprefix("Law"))
 
 
@@ -96,50 +96,60 @@ FORCE_DRIVE: bool
 PACK_PULLS: bool
 BACKSTOP_PULLS: bool
 RELOAD_ALONG_UNLOADING: bool
-# For variational equations only: whether constants force them, the number of rows that change between
-# switches, and the first row of a circuit.
+# Used by the variational equations only: whether derivatives with respect to constants are computed, the
+# number of rows that change between switching events, and the first row of the electric state.
 FORCED: bool
 CHANGING: int
 ELECTRIC_ROW: int
-# For lanes only: the pieces of which the drive consists.
+# Used by lanes only: number of exponentials in the drive, and whether the drive has cubic or sine pieces.
 EXPONENTIALS: int
 CUBIC: bool
 SINE: bool
 
-# The packed constants of the part are the first argument of each function.
+# The first argument of each law function is the array of the constants of the part.
 magnet_force: Law2
-"""Net force of permanent magnet and coil [N] at a displacement [m] and a current [A]."""
+"""Net force of permanent magnet and coil [N]; arguments: displacement [m], current [A]."""
 magnet_energy: Law1
-"""Potential energy [J] at a displacement [m]: minus its slope is the magnet force at zero current."""
+"""Potential energy of the magnet at zero current [J], whose negative slope is the force; argument:
+displacement [m]."""
 magnet_linkage: Law2
-"""Flux linkage [Wb] at a displacement [m] and a current [A], of the same coenergy as the force."""
+"""Flux linkage of the coil [Wb], from the same coenergy as the force; arguments: displacement [m], current
+[A]."""
 magnet_emf: Law2
-"""Slope of the flux linkage with displacement [Wb/m], equal to that of the force with current [N/A]."""
+"""Derivative of the flux linkage with respect to displacement [Wb/m]; equals the derivative of the magnet
+force with respect to current [N/A]."""
 magnet_inductance: Law2
-"""Slope of the flux linkage with current [H]."""
+"""Differential inductance: derivative of the flux linkage with respect to current [H]."""
 magnet_current: Law3
-"""Current [A] at a displacement [m] at which magnet and an inductance [H] produce a flux linkage [Wb]."""
+"""Current [A] for a given total flux linkage of magnet and constant inductance; arguments: displacement [m],
+flux linkage [Wb], inductance [H]."""
 spring_force: Law1
-"""Force of the spring [N] at a displacement [m]."""
+"""Force of the spring [N]; argument: displacement [m]."""
 spring_energy: Law1
-"""Potential energy [J] at a displacement [m]: minus its slope is the spring force."""
+"""Potential energy of the spring [J], whose negative slope is the force; argument: displacement [m]."""
 damping_force: Law1
-"""Force of the damping of the armature [N] at a velocity [m/s]; differentiable."""
+"""Damping force on the armature [N], a differentiable function; argument: velocity [m/s]."""
 pack_loading: Law2
-"""Force of the pack [N] on the loading branch, negative where it pushes; of displacement and velocity."""
+"""Force of the pack on the loading branch [N], negative where the pack pushes back; arguments: displacement
+[m], velocity [m/s]."""
 pack_memory: Law1
-"""Memory of the latest local maximum [m], passed to `pack_unloading`."""
+"""Memory value passed to `pack_unloading`; argument: displacement at the latest local maximum [m]."""
 pack_unloading: Law3
-"""Force of the pack [N] on the unloading branch; of displacement, velocity and memory."""
+"""Force of the pack on the unloading branch [N]; arguments: displacement [m], velocity [m/s], memory
+value."""
 pack_switch: Law2
-"""Positive while the pack pushes, negative where its law would pull; of displacement and velocity."""
+"""Sign function of the pack force: positive while the pack pushes, negative where the law would pull;
+arguments: displacement [m], velocity [m/s]."""
 backstop_elastic: Law1
-"""Elastic force of the backstop [N] at w, compression ``w**2`` [m]."""
+"""Elastic force of the backstop [N]; argument: w, the square root of the compression [m^0.5]."""
 backstop_viscous: Law2
-"""Dissipative force of the backstop [N]; of w and velocity."""
+"""Dissipative force of the backstop [N]; arguments: w, the square root of the compression [m^0.5], velocity
+[m/s]."""
 backstop_energy: Law1
-"""Energy [J] stored elastically in the backstop at w."""
+"""Elastic energy of the backstop [J]; argument: w, the square root of the compression [m^0.5]."""
 backstop_switch: Law2
-"""Positive while the backstop pushes, negative where its law would pull; of w and velocity."""
+"""Sign function of the backstop force: positive while the backstop pushes, negative where the law would pull;
+arguments: w, the square root of the compression [m^0.5], velocity [m/s]."""
 backstop_rebound: Law1
-"""Velocity [m/s] after an impact on a rigid backstop with a velocity below zero."""
+"""Velocity after an impact on a rigid backstop [m/s]; argument: velocity before the impact [m/s],
+negative."""

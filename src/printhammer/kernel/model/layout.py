@@ -1,8 +1,8 @@
-"""Layout of the hammer's constants in the single array of the kernel.
+"""Layout of a hammer's constants in the parameter array of the kernel.
 
-Inverse mass, position of the backstop and front of the pack come first. The packed constants of damping,
-spring, pack, backstop, coil with its supply, and magnet follow, each part at a fixed index: thirteen places
-for the damping, sixteen for each of the others, and any number for the magnet, which is last.
+Inverse mass [1/kg], backstop position [m] and pack front [m] come first. The packed constants of damping,
+spring, pack, backstop, coil with supply, and magnet follow, each part at a fixed index: thirteen elements
+are reserved for the damping, sixteen for each of the others, and any number for the magnet, which is last.
 """
 
 from typing import Any, NamedTuple
@@ -26,34 +26,36 @@ PLACES = {
     "magnet": MAGNET,
 }
 ROOM = {"damping": SPRING - DAMPING, "spring": 16, "pack": 16, "backstop": 16, "coil": SUPPLY - COIL}
-"""Number of constants available to a part; unlimited for a magnet."""
+"""Maximum number of constants of each part; a magnet may have any number."""
 
-# Coil, from COIL on.
+# Indices of the coil constants.
 RESISTANCE, INDUCTANCE, TURN_RESISTANCE, LEAKAGE, COUPLED = range(COIL, COIL + 5)
-"""Resistance [ohm], constant inductance [H], resistance [ohm] and leakage [H] of a shorted turn, or 0, and
-whether the magnet's flux is linked: 1 or 0."""
-# Supply of the coil, from SUPPLY on.
+"""Indices of the coil constants: coil resistance [ohm], constant inductance [H], resistance [ohm] and leakage
+inductance [H] of the shorted turn (0 without one), and 1 if the coil links the flux of the magnet, else 0."""
+# Indices of the supply constants.
 DIODE, SERIES, CAPACITANCE, CHARGING, CHARGED, COILS, CURRENT_SCALE, LINKAGE_SCALE = range(SUPPLY, SUPPLY + 8)
-"""Voltage of the diode in which a chopped current circulates [V], resistance of an ideal source [ohm],
-capacitance of a reservoir [F] or 0, the resistance [ohm] and the voltage [V] from which it is charged, number
-of coils on it; typical current [A] and flux linkage [Wb], by which errors are measured."""
+"""Indices of the supply constants: voltage of the freewheeling diode [V], series resistance of an ideal
+source [ohm], capacitance of the reservoir [F] (0 without one), resistance [ohm] and voltage [V] that charge
+it, number of coils that share it; typical current [A] and flux linkage [Wb], the scales of the error
+estimates."""
 
 CUBIC_PIECE, EXPONENTIAL_PIECE, SINE_PIECE, END = 0.0, 1.0, 2.0, 3.0
-"""Kinds of rows in a table of pieces, see `printhammer.kernel.model.pulses`; END marks the end of a waveform.
-"""
+"""Kinds of waveform pieces, see `printhammer.kernel.model.pulses`; END marks the end of a waveform."""
+
 SWITCHED_PIECE, DECAY_PIECE, RESERVOIR_PIECE = 4.0, 5.0, 6.0
-"""Kinds of rows of a driver, see `printhammer.kernel.model.circuit`."""
+"""Kinds of pieces of a driver waveform, see `printhammer.kernel.model.circuit`."""
 
 
 NODE_WIDTH = 5
-"""Columns of a node of a record, see `printhammer.kernel.single.record`."""
+"""Number of columns of a node in the record of a run, see `printhammer.kernel.single.record`."""
 ELECTRIC = NODE_WIDTH
-"""First of the four additional columns of a node with a coil circuit: electric state and path."""
+"""Index of the first of four additional columns of a node with a coil circuit: electric state, current
+path."""
 CIRCUIT_NODE_WIDTH = NODE_WIDTH + 4
 
 
 class Train(NamedTuple):
-    """Drive of n firings, see `printhammer.kernel.model.pulses`, with working space for a pass over it.
+    """Pulse train of n firings as arrays, see `printhammer.kernel.model.pulses`, and working space for a run.
 
     Attributes
     ----------
@@ -62,12 +64,12 @@ class Train(NamedTuple):
     begins : int64 array, shape (n,)
         Row of `pieces` at which the table of each firing's waveform begins.
     pieces : float64 array, shape (m, 6)
-        The tables of all waveforms.
+        Concatenated tables of waveform pieces of all waveforms.
     replace : bool
-        Whether a firing cuts off the pulses before it.
+        Whether a firing ends all earlier pulses.
     under_way : int64 array, shape (n,)
     live : float64 array, shape (3 + 7 n,)
-        Working space.
+        Working space: the active piece of each pulse, and the parameters of all active pieces.
     """
 
     firings: Any
@@ -79,7 +81,7 @@ class Train(NamedTuple):
 
 
 class ForceLaw(NamedTuple):
-    """Arguments of the force off the backstop besides time, displacement and velocity."""
+    """Arguments of the acceleration off the backstop other than time, displacement and velocity."""
 
     mode: int
     memory: float
@@ -88,4 +90,5 @@ class ForceLaw(NamedTuple):
 
 
 Control = tuple[float, float, float, float]
-"""Scales of displacement and velocity, allowances of the error estimates of order 6 and 7."""
+"""Step-size control: scales of displacement [m] and velocity [m/s], and the tolerances, relative to the
+scales, of the order 6 and order 7 error estimates."""

@@ -1,32 +1,33 @@
-"""Codes of the modes, switches and statuses of the compiled kernel.
+"""Integer codes of the modes, switching events and run statuses of the compiled kernel.
 
-A mode is a stretch of the motion under one smooth force law; a switch is the instant at which a mode ends.
+A mode is a time interval of the motion under one smooth force law. A switching event, called `switch` in the
+code, ends a step: the mode changes, or a piece of the drive begins or ends.
 """
 
-# Modes.
+# Modes of the motion.
 FREE = 0
-"""Neither the pack nor the backstop acts."""
+"""Mode: free flight; neither the pack nor the backstop acts on the armature."""
 LOADING = 1
-"""In the pack on the loading branch (packs without memory have only this branch)."""
+"""Mode: in the pack, on the loading branch of the law; the only branch of a pack law without memory."""
 UNLOADING = 2
-"""In the pack on the unloading branch of the latest local maximum."""
+"""Mode: in the pack, on the unloading branch that starts at the latest displacement maximum."""
 RELOADING = 3
-"""In the pack, loading again along the unloading branch."""
+"""Mode: in the pack, moving inward again along the unloading branch."""
 PACK_RELEASED = 4
-"""Beyond the pack front, but released by the pack, which does not pull."""
+"""Mode: beyond the pack front, but without pack force, because the law would pull there."""
 BACKSTOP = 5
-"""In the backstop, integrated in the regularised variables."""
+"""Mode: in contact with the elastic backstop, integrated in the regularised variables."""
 BACKSTOP_RELEASED = 6
-"""Behind the backstop position, but released by the backstop, which does not pull."""
+"""Mode: behind the backstop position, but without backstop force, because the law would pull there."""
 RESTING = 7
-"""At rest on a rigid backstop."""
+"""Mode: at rest on a rigid backstop."""
 HELD = 8
-"""At rest in the backstop, not integrated until the drive changes."""
+"""Mode: at rest on an elastic backstop; the motion is not integrated until the drive changes."""
 
 HELD_LOADING = 9
-"""At rest inside the pack on the loading branch, not integrated until the drive changes."""
+"""Mode: at rest in the pack on the loading branch; the motion is not integrated until the drive changes."""
 HELD_UNLOADING = 10
-"""At rest inside the pack on the unloading branch, not integrated until the drive changes."""
+"""Mode: at rest in the pack on an unloading branch; the motion is not integrated until the drive changes."""
 
 MODE_NAMES = (
     "free",
@@ -41,9 +42,9 @@ MODE_NAMES = (
     "held on the loading branch",
     "held on the unloading branch",
 )
-"""Public names of the modes, by code."""
+"""Public names of the modes, indexed by mode code."""
 
-# Switches that end a step.
+# Switching events, which end a step, and special codes in place of an event.
 NO_SWITCH = 0
 EDGE = 1
 REACHED_BACKSTOP = 2
@@ -55,15 +56,15 @@ LEFT_BACKSTOP = 7
 PUSH_ENDED = 8
 PUSH_BEGAN = 9
 UNRESOLVED = 10
-"""Not a switch: the step is too long to decide, and is repeated with half its length."""
+"""Not an event: the step is too long to detect events reliably, and is repeated with half the length."""
 NEAR_TOUCH = 11
-"""Not a switch: an extremum near a boundary has to be located before deciding."""
+"""Not an event: the displacement has an extremum near a boundary; locate the extremum before deciding."""
 CIRCUIT = 12
-"""The current of the coil takes another path."""
+"""Switching event: the coil current changes to another path through the driver."""
 REST_ENDED = 13
-"""The current of the coil moves an armature at rest."""
+"""Switching event: the coil current sets an armature at rest in motion."""
 HOLDS = 14
-"""Not a switch: the armature stays at rest, and the node at which the rest began remains valid."""
+"""Not an event: the armature stays at rest, so the latest node of the record remains valid."""
 
 # Statuses of a run.
 OK = 0
@@ -72,16 +73,16 @@ RUNAWAY = 2
 STEP_LIMIT = 3
 STEP_UNDERFLOW = 4
 PAUSED = 5
-"""Not the end of a run: it continues with the next call."""
+"""Run status: paused after the requested number of nodes; the next call continues the run."""
 LOST = 6
-"""Not the end of a run: its worker did not return."""
+"""Run status: the worker process of the run did not return."""
 
 STATUS_NAMES = ("ok", "range left", "runaway", "step limit", "step underflow", "paused", "worker lost")
-"""Public names of the statuses, by code."""
+"""Public names of the run statuses, indexed by status code."""
 
-# Surfaces of a contact.
+# Surfaces that the armature can contact.
 PACK_SURFACE = 0
 BACKSTOP_SURFACE = 1
 
 ANY_SCALES = (1.0, 1.0, 1.0)
-"""Scales of an error estimate that is ignored."""
+"""Unit error scales, passed where the error estimate of a step is ignored."""

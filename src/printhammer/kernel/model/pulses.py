@@ -1,12 +1,12 @@
-"""Drive at an instant, and the instants at which one of its pieces begins or ends.
+"""Value of the drive at a time, and the times of the edges at which its waveform pieces begin or end.
 
 A drive consists of n firing times and the waveform of each: a table of pieces ``[start, kind, p0, p1, p2,
-p3]``, of which the last, of kind `END`, holds the end of support; `piece_value` defines the other kinds. The
-tables of different waveforms are concatenated, the one with the longest support last; a firing refers to the
-row at which its table begins. Active pieces are identified by their rows, not by comparing times, so that an
-instant exactly on an edge belongs to the piece that begins there.
+p3]``. The last piece, of kind `END`, holds the end of the waveform; `piece_value` defines the other kinds.
+The tables of all waveforms are concatenated, the longest waveform last; a firing refers to the row at which
+its table begins. Active pieces are identified by their rows, not by comparing times, so that an instant
+exactly on an edge belongs to the piece that begins at the edge.
 
-During a run, the active pieces are kept in one array ``live``: their number, then seven values each,
+During a run, the array ``live`` holds the active pieces: their number, then seven values for each piece,
 ``[firing, start, kind, p0, p1, p2, p3]``. It is rewritten at every edge, and is the only data on the drive
 that the force sum needs.
 """
@@ -22,16 +22,17 @@ from printhammer.kernel.compile.compiling import compiled, inlined
 from printhammer.kernel.model.layout import CUBIC_PIECE, END, EXPONENTIAL_PIECE, Train
 
 Drive = Any
-"""The array ``live``."""
+"""Array ``live`` of the active pieces; with a coil circuit, the tuple of ``live`` and the electric state."""
 
 LIVE_WIDTH = 7
 
 
 @inlined
 def piece_value(row: Any, i: int, s: float) -> float:
-    """Return the value of a piece [kind, p0, p1, p2, p3] at place `i` of a row, at time `s` [s] in it.
+    """Evaluate the waveform piece [kind, p0, p1, p2, p3] at index `i` of a row, `s` seconds after its start.
 
-    A cubic p0 + s (p1 + s (p2 + s p3)), an exponential p0 + p1 exp(-p2 s), a sine p0 + p1 sin(p2 s + p3).
+    The kinds are a cubic p0 + s (p1 + s (p2 + s p3)), an exponential p0 + p1 exp(-p2 s) and a sine
+    p0 + p1 sin(p2 s + p3).
     """
     kind = row[i]
     if kind == EXPONENTIAL_PIECE:
@@ -43,7 +44,7 @@ def piece_value(row: Any, i: int, s: float) -> float:
 
 @compiled
 def piece_rate(row: Any, i: int, s: float) -> float:
-    """Return the time derivative of a piece; see `piece_value`."""
+    """Return the time derivative of a waveform piece; arguments as in `piece_value`."""
     kind, p1, p2, p3 = row[i], row[i + 2], row[i + 3], row[i + 4]
     if kind == EXPONENTIAL_PIECE:
         return float(-p1 * p2 * math.exp(-p2 * s))
@@ -54,7 +55,10 @@ def piece_rate(row: Any, i: int, s: float) -> float:
 
 @compiled
 def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
-    """Return the derivative of a piece, see `piece_value`, along `changes` of p0 to p3 from place `j` on."""
+    """Return the change of a waveform piece's value for changes of p0 to p3, stored in `changes` from `j` on.
+
+    The other arguments are as in `piece_value`.
+    """
     kind, p1, p2, p3 = row[i], row[i + 2], row[i + 3], row[i + 4]
     d0, d1, d2, d3 = changes[j], changes[j + 1], changes[j + 2], changes[j + 3]
     if kind == EXPONENTIAL_PIECE:
@@ -67,7 +71,7 @@ def piece_change(row: Any, i: int, s: float, changes: Any, j: int) -> float:
 
 @inlined
 def sum_of_pulses(t: float, drive: Drive) -> float:
-    """Return the sum of the active pulses, of which there is at least one."""
+    """Return the sum of the active pulses, at least one, at time `t` [s], in amperes or newtons."""
     total = 0.0
     i = 1
     for _ in range(int(drive[0])):
@@ -78,7 +82,7 @@ def sum_of_pulses(t: float, drive: Drive) -> float:
 
 @inlined
 def drive_value(t: float, drive: Drive) -> float:
-    """Return the sum of all active pulses at time `t` [s]: amperes or newtons."""
+    """Return the sum of all active pulses at time `t` [s], in amperes or newtons; 0 if none is active."""
     if drive[0] == 0.0:
         return 0.0
     return sum_of_pulses(t, drive)
@@ -91,17 +95,17 @@ def pass_edges(
     first: int,
     last: int,
 ) -> tuple[int, int, float]:
-    """Start and end all pieces whose edge is not after time `t` [s], and rewrite `live`.
+    """Start and end all waveform pieces whose edges lie at or before time `t` [s], and rewrite `train.live`.
 
-    Pulses before `first` have ended, those from `last` on have not been fired; pulse p in between is in the
-    piece ``under_way[p]``, which is the end of its table if it ended before an older pulse. With `replace`, a
-    firing cuts off earlier pulses.
+    Pulses before index `first` have ended; pulses from `last` on have not been fired. For a pulse p in
+    between, ``under_way[p]`` is the row of its active piece, or the `END` row if it ended before an older
+    pulse. With `replace`, a firing ends all earlier pulses.
 
     Returns
     -------
     tuple
-        The new `first` and `last`, equal if no pulse is under way, and the time of the next edge [s],
-        infinity if there is none.
+        The new `first` and `last`, equal if no pulse is active, and the time of the next edge [s], infinity
+        after the last edge.
     """
     firings, begins, pieces, replace, under_way, live = train
     while last < firings.size and firings[last] <= t:
@@ -133,9 +137,9 @@ def pass_edges(
 
 @compiled
 def edges_at(t: float, train: Train) -> tuple[int, int, float]:
-    """Like `pass_edges` from the start, but without the pulses that ended before time `t` [s]."""
+    """Pass all edges up to time `t` [s], as `pass_edges` does, skipping pulses that have already ended."""
     firings, pieces = train.firings, train.pieces
-    # The last table has the longest support.
+    # The last table holds the longest waveform.
     oldest = t - pieces[pieces.shape[0] - 1, 0]
     low, high = 0, firings.size
     while low < high:
@@ -144,6 +148,6 @@ def edges_at(t: float, train: Train) -> tuple[int, int, float]:
             low = middle + 1
         else:
             high = middle
-    # One more than necessary: by rounding a pulse may end at `t`.
+    # Include one more pulse than necessary: due to rounding, a pulse may end exactly at `t`.
     low = max(low - 1, 0)
     return pass_edges(t, train, low, low)

@@ -1,4 +1,4 @@
-"""Table of transitions: the mode that follows each switch, and the jump of a variation there."""
+"""Table of mode transitions: the mode after each switching event, and the jump of a variation there."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import numpy as np
 from printhammer.kernel.model import modes as M
 
 NO_JUMP = 0
-"""The force is zero where a contact releases or takes hold."""
+"""Kind of jump: none, because the contact force is zero where a contact starts or ceases to push."""
 AT_FRONT = 1
 AT_POSITION = 2
 AT_PEAK = 3
-"""The displacement passes a level at which the law changes: a surface, or the latest local maximum."""
+"""Kind of jump: the displacement crosses the level at which the force law changes, i.e. the pack front
+(AT_FRONT), the backstop position (AT_POSITION) or the latest local maximum in the pack (AT_PEAK)."""
 TURN = 4
-"""The velocity passes zero, where a law with memory changes."""
+"""Kind of jump: the velocity changes sign inside the pack, where a law with memory changes its branch."""
 
 TRANSITIONS: Final = (
     (M.FREE, M.REACHED_BACKSTOP, M.BACKSTOP, AT_POSITION),
@@ -38,12 +39,13 @@ TRANSITIONS: Final = (
     (M.BACKSTOP, M.PUSH_ENDED, M.BACKSTOP_RELEASED, NO_JUMP),
     (M.BACKSTOP_RELEASED, M.PUSH_BEGAN, M.BACKSTOP, NO_JUMP),
 )
-"""Mode, switch that ends it, mode that follows, and jump of a variation."""
+"""Rows of the table: mode, switching event that ends the mode, next mode, and kind of jump of a variation."""
 
 FOLLOWING = np.full((len(M.MODE_NAMES), M.PUSH_BEGAN + 1), -1)
-"""Mode after a switch, by mode and switch; after a reversal, the mode of an armature that leaves."""
+"""Next mode, indexed by mode and switching event; for a reversal in the pack, the mode of outward motion."""
 JUMPS = np.full((len(M.MODE_NAMES), len(M.MODE_NAMES)), NO_JUMP)
-"""Jump between two modes; from unloading to unloading only if the local maximum is a new one."""
+"""Kind of jump of a variation, indexed by the modes before and after an event; from unloading to unloading it
+applies only if the reversal is a new local maximum."""
 
 for _mode, _switch, _following, _jump in reversed(TRANSITIONS):
     FOLLOWING[_mode, _switch] = _following
