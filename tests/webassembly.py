@@ -99,7 +99,7 @@ for await (const line of createInterface({ input: process.stdin })) {
     return arrays.at(-1);
   };
   const answer = () => kernel.temporarily(() => {
-    const begun = performance.now(), results = kernel.call(name, ...values.map(unpacked));
+    const given = values.map(unpacked), begun = performance.now(), results = kernel.call(name, ...given);
     const milliseconds = performance.now() - begun, { buffer } = kernel.memory;
     return { results, milliseconds, arrays: arrays.map(({ at, values }) =>
       Buffer.from(buffer, at, values.byteLength).toString("base64")) };
