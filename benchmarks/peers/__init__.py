@@ -36,11 +36,12 @@ ENSEMBLES: Final[dict[str, EnsembleMaker]] = {"heyoka": heyoka.ensembles, "diffr
 """Peers with ensembles of their own, by name."""
 
 USED: Final = """\
-How the peers are used (`benchmarks/peers`): everyone has a compiled right-hand side, one for each mode, is
-stopped at every switch and edge of the drive, and starts anew there; "one right-hand side" is the same
-problem as one would first write it. heyoka gets the equations in variables in which they are analytic,
-since a Taylor method needs that; all its switches happen in event callbacks, which are Python, and a lane
-that is done takes the next member. diffrax is one compiled loop under `jax.vmap`. Boost.Odeint and SUNDIALS
-are C++, compiled with `-O3 -march=native`; Odeint has no events, so a switch is located by repeating the
-step with a length found by Newton's method."""
-"""What the page of the documentation says about them."""
+Use of the other solvers (`benchmarks/peers`): every solver has a compiled right-hand side for each mode,
+stops at every switch and edge of the drive, and restarts there; "one right-hand side" means that all
+modes are in a single function, the straightforward formulation. For heyoka, the equations are written in
+variables in which they are analytic, as a Taylor method requires; its switches are handled in event
+callbacks in Python, and a lane that is done continues with the next member. diffrax is a single compiled
+loop under `jax.vmap`. Boost.Odeint and SUNDIALS are C++ libraries, compiled with `-O3 -march=native`;
+Odeint has no events, so a switch is located by repeating the step with a length computed by Newton's
+method."""
+"""Text of the documentation page about the use of the other solvers."""

@@ -79,9 +79,9 @@ class Report(Declared):
             if (line.members > 1) == ensembles and not math.isnan(line.ratio)
         }
         if not ratios:
-            return "There is no peer to compare with."
+            return "There is no other solver to compare with."
         nearest = min(ratios, key=ratios.__getitem__)
-        return f"The nearest: {nearest}, ours / theirs = {ratios[nearest]:.3g}."
+        return f"The closest other solver is {nearest}: ours / theirs = {ratios[nearest]:.3g}."
 
     def frames(self) -> Rows:
         """Return the rows of Figure 9."""
