@@ -41,7 +41,7 @@ DIMENSIONS: dict[str, str] = {
     "N/m^1.5": "a Hertz stiffness",
     "N s/m^2.5": "a contact damping",
     "N^0.5 m^0.25": "a root of force times the fourth root of length",
-    "N^0.5 m^0.25/A": "that root per current",
+    "N^0.5 m^0.25/A": "a root of force times the fourth root of length, per current",
     "Pa": "a pressure",
     "J": "an energy",
     "W": "a power",

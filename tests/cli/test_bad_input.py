@@ -170,7 +170,7 @@ def test_input_is_never_written_over(cli, hammer: "ph.Hammer", tmp_path: Path) -
         before = path.read_bytes()
         outcome = cli("run", mine, "--drive", drive, "--out", path)
         assert outcome.status == 2
-        assert_one_sentence(outcome.err, path.name, "this one is read")
+        assert_one_sentence(outcome.err, path.name, "that is not an input file")
         assert path.read_bytes() == before
 
 
@@ -183,7 +183,7 @@ def test_a_table_is_never_written_over(cli, hammer: "ph.Hammer", tmp_path: Path)
     for arguments in ([mine], ["hendriks-1983", "--drive", drive]):
         outcome = cli("run", *arguments, "--out", tmp_path / "pulse.csv", "--force")
         assert outcome.status == 2
-        assert_one_sentence(outcome.err, "pulse.csv", "this one is read")
+        assert_one_sentence(outcome.err, "pulse.csv", "that is not an input file")
     assert (tmp_path / "pulse.csv").read_bytes() == before
 
 
@@ -193,7 +193,7 @@ def test_a_folder_that_cannot_be_written_to(cli, verb: list[str], tmp_path: Path
     for out in (tmp_path / "file", tmp_path / "file" / "below"):
         outcome = cli(*verb, "--out", out)
         assert outcome.status == 2
-        assert_one_sentence(outcome.err, str(out), "folder that can be written to")
+        assert_one_sentence(outcome.err, str(out), "writable folder")
     assert (tmp_path / "file").read_text() == "kept"
 
 

@@ -181,7 +181,7 @@ def test_a_hammer_is_never_written_over(refused: Callable[..., None], verb: Verb
         words = words_of(verb, *hammer_words(verb, path))
         # An output without a flag is one of those words.
         written = [path if word == "new.json" else word for word in words]
-        refused(*written, *([] if files.argument else [f"--{name}", path]), said="this one is read")
+        refused(*written, *([] if files.argument else [f"--{name}", path]), said="that is not an input file")
 
 
 FIRED = [verb for verb in HAMMERED if any(option.hammer == "fired" for option in verb.options.values())]
@@ -212,7 +212,7 @@ def test_a_file_that_is_there_is_not_written_over(
     flagged = [] if files.argument else [f"--{name}", path]
     refused(
         *words_of(verb, *flagged),
-        said=f"{path}: expected a new file, this one is there; --force writes over it",
+        said=f"{path}: expected a new file, but the file exists; --force overwrites",
     )
 
 

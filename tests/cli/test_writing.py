@@ -9,7 +9,7 @@ from tests.errors import refused
 
 from printhammer.report.build import check_place
 
-THERE = "expected a new file, this one is there; --force writes over it"
+THERE = "expected a new file, but the file exists; --force overwrites"
 
 
 def test_force_writes_over(cli: Callable[..., Any], refused: Callable[..., None], tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_forces_in_a_wrong_unit_are_named_by_their_factor(tmp_path: Path) -> Non
         (
             "gap [mm],force [N],inductance [H]\n1,2,1\n",
             {},
-            "the column 'current' is missing: expected it or one",
+            "the column 'current' is missing: expected this column, or one",
         ),
         (
             "gap [mm],force [N],inductance [H]\n1,-2,1\n",

@@ -292,7 +292,7 @@ def overlapping(panel: str = _TRAIN) -> Any:
     """Return the option `--overlap`, the rule for pulses that overlap."""
     return choice(
         "add|replace",
-        "Rule for overlapping pulses: add their currents, or let the latest replace the others.",
+        "Rule for overlapping pulses: add the currents, or use the current of the latest pulse only.",
         panel=panel,
     )
 

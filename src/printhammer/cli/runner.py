@@ -47,7 +47,7 @@ class Content:
     """Content of an output file: a picture for the file endings of pictures, else the output of `save`."""
 
     save: Callable[[Path], Any] | None = None
-    """Function that writes any other file than a picture; None if the computation has written the file."""
+    """Writer of a file other than a picture; None if the computation has already written the file."""
     plot: Callable[[], Any] | None = None
     """Function that returns a matplotlib figure."""
 
@@ -150,7 +150,7 @@ class Job:
         for path in paths:
             if not self.force and (path.exists() or path.is_symlink()):
                 raise InputError(
-                    f"{path}: expected a new file, this one is there; --force writes over it", file=path
+                    f"{path}: expected a new file, but the file exists; --force overwrites", file=path
                 )
 
     def progress_bar(self, name: str, *, remaining: bool = True) -> AbstractContextManager[terminal.Counted]:
@@ -182,7 +182,7 @@ class Job:
             self.screen.print(part, soft_wrap=isinstance(part, str))
 
     def worded(self, said: Shown) -> Shown:
-        """Name what a pulse of the hammer makes, a dot or a closing, in a text, texts or a summary."""
+        """Replace the noun "dot" in texts or a summary by the hammer's noun, such as "closing"."""
         from printhammer.results.summary import worded
 
         named: Shown = said if self.hammer is None else worded(said, self.hammer.strike)
@@ -367,14 +367,14 @@ def ended_early(statuses: Iterable[object], total: int | None = None) -> list[st
 
 
 def period_text(hammer: Hammer, period: float) -> str:
-    """Scale a firing period of the paper's hammer, s, to the pulse width of a device; return it as text."""
+    """Scale a firing period of the paper's hammer, s, to the time scale of a device; return it as text."""
     from printhammer.run.window import time_scale
 
     return f"{1e3 * period * time_scale(hammer):.4g} ms"
 
 
 def rate_text(hammer: Hammer, rate: float) -> str:
-    """Scale a firing rate of the paper's hammer, Hz, to the pulse width of a device; return it as text."""
+    """Scale a firing rate of the paper's hammer, Hz, to the time scale of a device; return it as text."""
     from printhammer.run.window import scaled_rate
 
     return f"{scaled_rate(hammer, rate):.4g} Hz"
@@ -412,14 +412,14 @@ def firing_of(
     from printhammer.drive.file import load_drive
     from printhammer.drive.trains import PulseTrain
 
-    opt.refuse(train, f"none beside --drive {file}")
+    opt.refuse(train, f"no such option with --drive {file}")
     drive = load_drive(file, hammer.waveform)
     job.check(*tables_beside(file, drive.waveform))
     if math.isinf(drive.waveform.support) and drive.period is not None:
         return {"drive": drive}
     if not isinstance(drive, PulseTrain) or drive.period is None:
         raise InputError(
-            f"{file}: expected a force without end, [sine], or pulses at a constant rate, [train]",
+            f"{file}: expected a continuous periodic force, [sine], or pulses at a constant rate, [train]",
             file=file,
             key="drive",
         )

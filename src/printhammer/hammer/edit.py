@@ -120,7 +120,7 @@ def _fields(section: str, value: Any) -> dict[str, Any]:
         raise InputError.of(section, value, "a part, a table, or None", written=shown(value))
     if getattr(value, "content", dict)():
         raise InputError(
-            f"{section}: expected a table that names its file, not one read already", key=section
+            f"{section}: expected a table that names its file, not a part already read from it", key=section
         )
     from printhammer.drive.waveforms.base import UNITS
 

@@ -85,7 +85,7 @@ def rest_state(hammer: HammerLike) -> float:
                 raise InputError(
                     f"{_named(hammer)} has no rest state: {because}",
                     key="rest",
-                    expected="it to hold the armature",
+                    expected="a backstop that holds the armature",
                 )
             return rest
         if pressing == 0.0 and hammer.magnet is not None:

@@ -45,9 +45,9 @@ FORMAT: Final = 1
 CONSTANT_KEYS: Final = ("value", "unit", "status", "source")
 TEXTS: Final = {
     "name": "short name of the hammer",
-    "title": "one line that says what it is",
-    "note": "what a reader must know about the constants",
-    "strike": "noun for what a pulse makes, as summaries name it; 'dot' if missing",
+    "title": "one-line description of the hammer",
+    "note": "important remarks on the constants",
+    "strike": "noun for the result of a pulse, as shown in summaries; 'dot' if missing",
 }
 """Text entries of a hammer file and their meanings."""
 

@@ -347,7 +347,7 @@ class Hammer:
             if not there.exists():
                 missing[name] = data
             elif there.read_bytes() != data:
-                raise InputError(f"{there}: the file is another table than that of {self.name}", file=there)
+                raise InputError(f"{there}: the file differs from the table of {self.name}", file=there)
         return missing
 
     @cached_property

@@ -92,7 +92,7 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
     keys, errors, records = (_texts(table, name) for name in ("constants", "standard_errors", "records"))
     for row, key in enumerate(keys):
         if key not in constants or key in keys[:row]:
-            why = "the hammer has no such constant" if key not in constants else "it is there twice"
+            why = "the hammer has no such constant" if key not in constants else "which is listed twice"
             raise InputError(
                 f"{UNCERTAINTY}.constants: {key!r}, {why}",
                 key=f"{UNCERTAINTY}.constants",
@@ -102,7 +102,7 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
         raise InputError(
             f"{UNCERTAINTY}.standard_errors has {len(errors)} entries",
             key=f"{UNCERTAINTY}.standard_errors",
-            expected=f"{len(keys)}, one a constant",
+            expected=f"{len(keys)}, one per constant",
         )
     sizes = np.array([_error(key, text, constants[key]) for key, text in zip(keys, errors, strict=True)])
     return Uncertainty(keys, _correlation(table, len(keys)) * np.outer(sizes, sizes), records)
@@ -111,7 +111,7 @@ def read_uncertainty(table: Any, constants: Mapping[str, Constant]) -> Uncertain
 def _texts(table: Mapping[str, Any], name: str) -> tuple[str, ...]:
     values = table.get(name, [])
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
-        raise InputError.of(f"{UNCERTAINTY}.{name}", values, "a list of texts", written=shown(values))
+        raise InputError.of(f"{UNCERTAINTY}.{name}", values, "a list of strings", written=shown(values))
     return tuple(values)
 
 
@@ -131,7 +131,9 @@ def _correlation(table: Mapping[str, Any], count: int) -> FloatArray:
     """Return the correlation matrix; the identity matrix if the table states no correlations."""
     matrix = np.eye(count)
     rows = table.get("correlation", [])
-    wanted = f"expected {max(count - 1, 0)} rows of 1, 2, ... numbers, those of a covariance"
+    wanted = (
+        f"expected {max(count - 1, 0)} rows of 1, 2, ... numbers, the lower triangle of a correlation matrix"
+    )
     if not isinstance(rows, list) or len(rows) not in (0, max(count - 1, 0)):
         raise InputError(
             f"{UNCERTAINTY}.correlation = {shown(rows)}: {wanted}",
@@ -148,7 +150,8 @@ def _correlation(table: Mapping[str, Any], count: int) -> FloatArray:
         matrix[number, :number] = matrix[:number, number] = row
     if count and not np.linalg.eigvalsh(matrix)[0] > _NEGATIVE:
         raise InputError(
-            f"{UNCERTAINTY}.correlation is that of no covariance: {wanted}", key=f"{UNCERTAINTY}.correlation"
+            f"{UNCERTAINTY}.correlation is not a correlation matrix: {wanted}",
+            key=f"{UNCERTAINTY}.correlation",
         )
     return matrix
 

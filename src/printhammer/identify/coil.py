@@ -128,7 +128,7 @@ def fit_coil(
     """
     names = list(dict.fromkeys([*(default_constants(hammer) if free is None else free), *also]))
     if not names:
-        raise InputError("no constants to find", key="free", expected="one or more, such as coil.inductance")
+        raise InputError("no constants to fit", key="free", expected="one or more, such as coil.inductance")
     place = None if locked is None else read_number(locked, "m", "locked")
     traces = [read_trace(path, hammer, place, offset is not None, columns) for path in paths]
     stated = {"offset": offset, "gain": gain, "delay": delay, "bandwidth": bandwidth}
@@ -160,7 +160,7 @@ def fit_coil(
     if solution.residual_scale > _EXACT * float(np.abs(data.values).max()):
         p_value, why = judge(solution, terms, data.abscissa, data.series)
     if SIGNS["gain"] in terms and math.isnan(need(solution, terms[SIGNS["gain"]])):
-        notes.append("an error in the gain of the probe is not seen: the constants scale with it")
+        notes.append("a gain error of the probe cannot be detected: the constants scale with the gain")
     held = sorted({trace.locked for trace in traces if trace.locked is not None})
     known = {"armature locked at": ", ".join(f"{place!r} m" for place in held)} if held else {}
     fitted = [error for error in errors if error.is_fitted]
@@ -369,10 +369,10 @@ def _start(hammer: Hammer, names: list[str], trace: Trace) -> tuple[Hammer, Floa
         _unit(hammer, name)
         if not _stated(hammer, name):
             raise InputError(
-                f"{hammer.path}: {name} is not more than 0",
+                f"{hammer.path}: {name} is missing or not above 0",
                 file=hammer.path,
                 key=name,
-                expected="a value with which the fit begins",
+                expected="a positive initial guess",
             )
     return hammer, np.array([hammer.constants[name].si for name in names])
 

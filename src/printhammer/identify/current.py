@@ -80,7 +80,9 @@ def probe_current(
     count = each * (len(knots) - 1)
     if count > _MOST:
         raise InputError(
-            f"a record of {after[-1]:.6g} s is too long for the probe", key="record", expected="a shorter one"
+            f"a record of {after[-1]:.6g} s is too long for the probe",
+            key="record",
+            expected="a shorter record",
         )
     fine = np.interp(np.arange(count + 1) / each, np.arange(len(knots)), knots)
     state = None
@@ -141,7 +143,7 @@ def read_trace(
             f"{table.path}: no time after 0 s",
             file=table.path,
             key="time",
-            expected="a record from switching on",
+            expected="a record that begins at switch-on",
         )
     if locked is None and "locked" in table.comments:
         text = table.comments["locked"]
@@ -172,11 +174,11 @@ def _check_begin(table: Readings, recorded: bool) -> None:
     if before.size and float(np.median(before)) > _FLOWS * float(current.max()):
         when = "when the record begins" if recorded else "at time 0"
         raise InputError(
-            f"{table.path}: {float(before[-1]):.3g} A flow {when}",
+            f"{table.path}: a current of {float(before[-1]):.3g} A flows {when}",
             file=table.path,
             key="time",
             expected=(
-                "times from the switching on, the column 'voltage' from before it, or an offset of the probe"
+                "times counted from switch-on, a column 'voltage' that begins earlier, or a probe offset"
             ),
         )
 

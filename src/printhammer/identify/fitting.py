@@ -67,7 +67,7 @@ def fit(
 
         if hammer is None:
             raise InputError(
-                "the hammer is missing", key="hammer", expected="one with the constants known already"
+                "the hammer is missing", key="hammer", expected="a hammer that supplies the known constants"
             )
         if kind == "coil":
             return fit_coil(many, hammer, **options)
@@ -75,7 +75,7 @@ def fit(
     if kind == "magnet" and len(many) == 2 and options.get("spring") is None:
         many, options["spring"] = _magnet_and_spring(many)
     if len(many) != 1:
-        raise InputError(f"{len(many)} tables", key="tables", expected=f"one of the kind {kind!r}")
+        raise InputError(f"{len(many)} tables", key="tables", expected=f"a single table of the kind {kind!r}")
     if kind == "solenoid":
         from printhammer.identify.static.solenoid import fit_solenoid
 
@@ -152,7 +152,7 @@ def _fitted(kind: str, table: Any, options: dict[str, Any]) -> Fit:
             raise InputError(
                 "the position of the backstop is missing",
                 key="position",
-                expected="it, or a hammer that has one",
+                expected="this value, or a hammer that states the constant",
             )
         return fit_spring(table, **options)
     if kind == "pack":
@@ -162,7 +162,7 @@ def _fitted(kind: str, table: Any, options: dict[str, Any]) -> Fit:
             raise InputError(
                 "the thickness of the pack is missing",
                 key="thickness",
-                expected="it, or a hammer that has one",
+                expected="this value, or a hammer that states the constant",
             )
         return fit_pack(table, **options)
     from printhammer.identify.static.backstop import fit_backstop

@@ -35,7 +35,7 @@ _ALONE: Final = 0.9
 """Leverage above which a row alone determines a parameter."""
 
 _HOLDING: Final = 4.0
-"""Factor on the variance of a parameter, from omitting rows, above which the rows determine it; arbitrary."""
+"""Variance ratio without and with a set of rows above which the rows determine a parameter; arbitrary."""
 
 _AT_BOUND: Final = 1e-6
 """Distance from a bound, as a fraction of the parameter, below which the parameter counts as at the bound."""
@@ -227,7 +227,7 @@ def _undetermined(solution: Solution, data: FloatArray) -> int | None:
 
 
 def _held_at(law: Law, data: FloatArray, solution: Solution, free: BoolArray, held: int) -> FloatArray:
-    """Fix a parameter at its rest value if the data allow that, else at its value; return all parameters."""
+    """Fix a parameter at its rest value if the data allow that, else at its fit; return all parameters."""
     p, space = solution.p.copy(), solution.parameters
     if _at_bound(solution)[held]:
         return p

@@ -50,7 +50,7 @@ def spikes_of(values: FloatArray, noise: float) -> BoolArray:
 
 
 def outliers_of(residuals: FloatArray, floor: float) -> BoolArray:
-    """Mask of the outliers: residuals above the threshold times the robust standard deviation or `floor`."""
+    """Mask of the outliers: residuals above the threshold times the robust scale (at least `floor`)."""
     return np.abs(residuals) > _FAR * max(robust_scale(residuals), floor)
 
 

@@ -28,10 +28,10 @@ NOMINAL: Final = {"offset": 0.0, "gain": 1.0, "delay": 0.0, "time constant": 0.0
 UNITS: Final = {"offset": "A", "gain": "1", "delay": "s", "time constant": "s"}
 
 SIGNS: Final = {
-    "offset": "the current is off by a constant, as by an offset of the probe: state it, or fit it",
-    "gain": "the current is off by a factor, as by a gain of the probe: state it, or fit it",
-    "delay": "the current comes late or early, as by a delay of the probe: state it, or fit it",
-    "time constant": "the current is smoother, as by the bandwidth of the probe: state it, or fit it",
+    "offset": "the current has a constant error, like that of a probe offset: state or fit the offset",
+    "gain": "the current has a scale error, like that of a probe gain: state or fit the gain",
+    "delay": "the current is shifted in time, as by a probe delay: state or fit the delay",
+    "time constant": "the current is too smooth, as by a limited probe bandwidth: state or fit the bandwidth",
 }
 """Advice for each undeclared probe error that a record reveals, by name of the error."""
 

@@ -45,7 +45,7 @@ REPLACED: Final = {
     "backstop.stiffness": [f"backstop.{name}" for name in _BODIES],
     "backstop.damping": ["backstop.restitution", "backstop.restitution_speed"],
 }
-"""Keys removed when a fitted constant, the key of the mapping, is set, because both determine one value."""
+"""Constants to remove from a hammer when the constant used as key is set, since both state one value."""
 
 
 HELD: Final = "held, the data do not determine it"
@@ -98,7 +98,7 @@ class FittedConstant(Declared):
 
     @property
     def texts(self) -> tuple[str, str, str, str]:
-        """Value, standard error, interval and unit, with as many digits as are significant."""
+        """Format value, standard error, interval and unit, with as many digits as are significant."""
         unit = _SHOWN_IN.get(self.unit, self.unit)
         value, error, low, high = (
             from_si(number, self.unit, unit) if math.isfinite(number) else number
@@ -423,7 +423,7 @@ class Fit(Result):
             where = f" ({self.series_names[series[first]]})" if len(self.source) > 1 else ""
             listed.append(f"{line}{where}")
         more = ", …" if len(listed) > most else ""
-        stretches = f", {together} of them in stretches" if together else ""
+        stretches = f", {together} of them consecutive" if together else ""
         return f"{count}{stretches}: line{'s' if len(rows) > 1 else ''} {', '.join(listed[:most])}{more}"
 
 

@@ -280,7 +280,7 @@ def _flat(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 def _save_zarr(dataset: xr.Dataset, target: Path) -> None:
     if target.exists() and not (target / "zarr.json").is_file():
-        raise InputError(f"{target}: expected a new store, this is no Zarr store", file=target)
+        raise InputError(f"{target}: expected a new store; the existing folder is no Zarr store", file=target)
     draft: Path | None = None
     try:
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
@@ -376,7 +376,7 @@ def _read_csv(source: Path) -> pd.DataFrame:
     lengths = {len(cells) for _line, cells in sheet.rows}
     if len(lengths) != 1:
         raise InputError(
-            f"{source}: expected a heading, and rows with as many cells", file=source, key="rows"
+            f"{source}: expected a heading, and rows with the same number of cells", file=source, key="rows"
         )
     (_line, heads), *rows = sheet.rows
     table = pd.DataFrame({head: _typed([cells[k] for _line, cells in rows]) for k, head in enumerate(heads)})

@@ -98,7 +98,7 @@ class Result:
 
     @property
     def strike(self) -> str:
-        """Noun for what a pulse of the hammer makes, "dot" unless its file has another one."""
+        """Noun for the result of a pulse, such as "closing"; "dot" unless the hammer file states a noun."""
         hammer = getattr(self, "hammer", None) or getattr(getattr(self, "regime", None), "hammer", None)
         return str(getattr(hammer, "strike", "dot"))
 
@@ -241,7 +241,7 @@ class Result:
 
 
 def _worded(summary: Callable[..., Summary]) -> Callable[..., Summary]:
-    """Let a summary name the strike of the hammer."""
+    """Decorate `summary` so that the text uses the hammer's noun for the result of a pulse."""
 
     @wraps(summary)
     def said(self: Result, *args: Any, **options: Any) -> Summary:

@@ -38,23 +38,23 @@ class Variable(Declared):
     """Array of a store: dimensions, type, chunks and attributes."""
 
     name: str = part("its name")
-    dims: tuple[str, ...] = part("names of its dimensions; those of the members come first")
+    dims: tuple[str, ...] = part("names of the dimensions, member dimensions first")
     shape: tuple[int, ...] = part("their lengths")
     dtype: str = part("type of the numbers, as numpy names it")
-    fill: Any = part("what stands where nothing is written yet")
-    attrs: Mapping[str, Any] = part("unit, meaning and the like", default_factory=dict)
+    fill: Any = part("fill value where nothing is written yet")
+    attrs: Mapping[str, Any] = part("attributes such as unit and meaning", default_factory=dict)
     values: npt.NDArray[Any] | None = part(
-        "of a coordinate, which is written with the layout; None for a result", default=None
+        "values of a coordinate, written with the layout; None for a result", default=None
     )
 
 
 class Layout(Declared):
     """Layout of a store: its arrays, attributes and identity."""
 
-    chunks: tuple[int, ...] = part("members of a block along each of their dimensions")
+    chunks: tuple[int, ...] = part("number of members in a block, along each member dimension")
     variables: tuple[Variable, ...] = part("results and coordinates, `MARK` among the results")
     attrs: Mapping[str, Any] = part("attributes of the group")
-    identity: Mapping[str, str] = part("what must be the same where a sweep goes on")
+    identity: Mapping[str, str] = part("settings that must be equal for a sweep to be resumed")
 
 
 class Store:
@@ -157,7 +157,7 @@ class Store:
                     f"{self.path}: the store was made with {name.replace('_', ' ')} {there.get(name)}",
                     file=self.path,
                     key=name,
-                    expected=f"{asked}, or another place for the results",
+                    expected=f"{asked}, or another folder for the results",
                 )
         self._handle = _locked(self.path, self.path)
 
@@ -264,7 +264,7 @@ def _encoder(layout: Layout) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def _root(path: Path) -> dict[str, Any]:
     """Return the metadata of the Zarr group of a store."""
-    other = f"{path}: the folder is no store of printhammer: expected one, or a name that is not taken"
+    other = f"{path}: the folder is no store of printhammer: expected such a store, or a new name"
     try:
         root: dict[str, Any] = json.loads((path / _ROOT).read_bytes())
         _ = root["attributes"][_ARRAYS]
@@ -299,7 +299,7 @@ def _locked(folder: Path, named: Path) -> int:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(handle)
-        raise InputError(f"{named}: another process is at work on this store", file=named) from None
+        raise InputError(f"{named}: another process is writing this store", file=named) from None
     except OSError:
         os.close(handle)
         raise

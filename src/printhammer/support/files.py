@@ -47,7 +47,7 @@ def make_folder(path: str | Path) -> Path:
             pass
     except OSError as error:
         raise InputError(
-            f"{folder}: expected a folder that can be written to ({error.strerror or error})", file=folder
+            f"{folder}: expected a writable folder ({error.strerror or error})", file=folder
         ) from None
     return folder
 
@@ -65,19 +65,23 @@ def check_outputs(outputs: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
     for path in outputs:
         place = path.resolve()
         if place in read:
-            raise InputError(f"{path}: expected another file to write, this one is read", file=path)
+            raise InputError(f"{path}: expected an output file that is not an input file", file=path)
         if place in named:
-            raise InputError(f"{path}: expected a file of its own, this one is written twice", file=path)
+            raise InputError(f"{path}: expected distinct output files, this name occurs twice", file=path)
         named.add(place)
         store = place.suffix.lower() == ".zarr"
         # A Zarr store is a folder, and is overwritten as a whole.
         if place.is_dir() and not (store and (place / "zarr.json").is_file()):
-            wanted = "a new store, this is no Zarr store" if store else "a file to write, this is a folder"
+            wanted = (
+                "a new store; the existing folder is no Zarr store"
+                if store
+                else "a file to write, not a folder"
+            )
             raise InputError(f"{path}: expected {wanted}", file=path)
         if not place.parent.is_dir():
             raise InputError(f"{path}: expected a file in a folder that exists", file=path)
         if not os.access(place.parent, os.W_OK):
-            raise InputError(f"{path}: expected a file in a folder that can be written to", file=path)
+            raise InputError(f"{path}: expected a file in a writable folder", file=path)
 
 
 def read_text(path: Path, what: str, *, wanted: str = "", encoding: str = "utf-8") -> str:

@@ -120,7 +120,7 @@ def test_a_hammer_without_a_waveform_or_an_input_is_never_written_over(
 
     path = tmp_path / "hammer.json"
     ph.load("hendriks-1983").save(path)
-    refused("schemes", path, "--hammer", path, said="this one is read")
+    refused("schemes", path, "--hammer", path, said="that is not an input file")
 
 
 @pytest.mark.parametrize("name", ["base-rates", "schemes", "predictions"])
@@ -129,7 +129,7 @@ def test_a_file_that_is_there_is_not_written_over(
 ) -> None:
     (tmp_path / "new.json").write_text("mine", "utf-8")
     refused(
-        name, *NEEDED[name], said="new.json: expected a new file, this one is there; --force writes over it"
+        name, *NEEDED[name], said="new.json: expected a new file, but the file exists; --force overwrites"
     )
 
 

@@ -210,7 +210,7 @@ def files(here: Path) -> Path:
     ("words", "said"),
     [
         ("search no/a.jsonl", "no/a.jsonl: expected a file in a folder that exists"),
-        ("search .", ".: expected a file to write, this is a folder"),
+        ("search .", ".: expected a file to write, not a folder"),
         ("search a.jsonl --aim shape", "--aim = 'shape': expected stated or all"),
         ("search a.jsonl --from none.jsonl", "none.jsonl: the log cannot be read"),
         ("search a.jsonl --from notes.txt", "notes.txt, line 1: expected the heading of the log of a search"),
@@ -219,7 +219,10 @@ def files(here: Path) -> Path:
         ("search a.jsonl --minutes -1", "'--minutes'"),
         ("search a.jsonl --workers 0", "'--workers'"),
         ("judge none.jsonl a.jsonl", "none.jsonl: the log cannot be read"),
-        ("judge search.jsonl search.jsonl", "search.jsonl: expected another file to write, this one is read"),
+        (
+            "judge search.jsonl search.jsonl",
+            "search.jsonl: expected an output file that is not an input file",
+        ),
         ("judge search.jsonl a.jsonl", "search.jsonl: expected candidates that print, and there are none"),
         ("judge search.jsonl no/a.jsonl", "no/a.jsonl: expected a file in a folder that exists"),
         ("judge search.jsonl a.jsonl --best 0", "'--best'"),
@@ -228,7 +231,10 @@ def files(here: Path) -> Path:
         ("predictions search.jsonl judged.jsonl a.json", "aim = 'all', expected the log of a search on stat"),
         ("predictions stated.jsonl none.jsonl a.json", "none.jsonl: expected judged candidates, and there"),
         ("predictions stated.jsonl notes.txt a.json", "notes.txt, line 1: expected a judged candidate"),
-        ("predictions stated.jsonl judged.jsonl judged.jsonl", "expected another file to write, this one is"),
+        (
+            "predictions stated.jsonl judged.jsonl judged.jsonl",
+            "expected an output file that is not an input",
+        ),
         ("predictions stated.jsonl judged.jsonl no/a.json", "expected a file in a folder that exists"),
         ("ship search.jsonl search.jsonl", "search.jsonl, line 1: constants = None, expected the constants"),
         ("ship none.jsonl search.jsonl", "none.jsonl: expected judged candidates, and there are none"),

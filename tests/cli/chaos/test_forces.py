@@ -121,7 +121,7 @@ def test_bad_drives(refused: Callable, table: Path, tmp_path: Path) -> None:
     burst = tmp_path / "burst.toml"
     save_drive(NEVER, burst)
     refused("strobe", "bouncing-ball", said="no [waveform] to fire")
-    refused("strobe", "--drive", burst, said="expected a force without end")
+    refused("strobe", "--drive", burst, said="expected a continuous periodic force")
     refused("strobe", "bouncing-ball", "--drive", table, "--period", "1 ms", said="--period")
     refused("lyapunov", "bouncing-ball", "--drive", table, "--rate", "1 Hz", said="--rate")
     refused("basins", "--quench", "--drive", table, said="--drive")

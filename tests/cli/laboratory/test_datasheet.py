@@ -23,15 +23,15 @@ def test_a_force_that_is_not_met_is_told(cli: Callable, tmp_path: Path) -> None:
     sheet.write_text(text.replace('"95 N"', '"9.5 N"'))
     done = cli("hammer", "from-datasheet", sheet)
     assert done.status == 0
-    assert "a force is met to" in done.err
+    assert "the fit misses a force by" in done.err
 
 
 def test_nothing_is_written_over(refused: Callable, cli: Callable, tmp_path: Path) -> None:
     sheet, made = tmp_path / "sheet.toml", tmp_path / "made.toml"
     sheet.write_text(cli("hammer", "from-datasheet", "--example", "dot-peen").out)
     made.write_text("mine")
-    refused("hammer", "from-datasheet", sheet, "--out", made, said="expected a new file, this one is there")
-    refused("hammer", "from-datasheet", sheet, "--out", sheet, "--force", said="this one is read")
+    refused("hammer", "from-datasheet", sheet, "--out", made, said="expected a new file, but the file exists")
+    refused("hammer", "from-datasheet", sheet, "--out", sheet, "--force", said="that is not an input file")
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def test_a_law_that_is_rejected(cli: Callable, tmp_path: Path) -> None:
         ("magnet {magnet} --zero here", ("--zero", "'here'")),
         ("magnet {magnet} --hammer nobody", ("nobody", "no such file")),
         ("magnet {magnet} --out picture.txt", ("picture.txt", ".svg")),
-        ("magnet {magnet} --covariance {magnet}", ("magnet.csv", "this one is read")),
+        ("magnet {magnet} --covariance {magnet}", ("magnet.csv", "that is not an input file")),
         ("backstop", ("expected a table of rebounds, or the geometry",)),
         ("backstop --radius '2 mm'", ("Young's modulus: 0 given",)),
         ("backstop {backstop} --poisson x", ("--poisson", "'x'")),

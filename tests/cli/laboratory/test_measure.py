@@ -40,8 +40,8 @@ def test_what_the_hammer_lacks_is_left_out_and_said(cli: Callable, here: Path) -
     ph.load("hendriks-1983").replace({"waveform": None, "pack": None}).save("still.toml")
     done = cli("measure", "all", "still.toml", "--out", "lab", "--currents", "0 A, 1 A")
     assert done.status == 0
-    assert "still.toml: the hammer has no pack, pack is left out" in done.err
-    assert "still.toml: the hammer has no waveform, motion is left out" in done.err
+    assert "still.toml: the hammer has no pack; pack is omitted" in done.err
+    assert "still.toml: the hammer has no waveform; motion is omitted" in done.err
     assert sorted(path.stem for path in (here / "lab").iterdir()) == ["backstop", "magnet", "spring"]
 
 
@@ -50,7 +50,7 @@ def test_nothing_is_written_over_unless_asked(cli: Callable, here: Path) -> None
     path.write_text("mine", "utf-8")
     done = cli("measure", "spring", "--out", path)
     assert done.status == 2
-    assert "--force writes over it" in done.err
+    assert "--force overwrites" in done.err
     assert path.read_text("utf-8") == "mine"
     assert cli("measure", "spring", "--out", path, "--force").status == 0
     assert path.read_text("utf-8").startswith("# measurement: spring")
@@ -77,9 +77,12 @@ def test_places_and_currents_of_ones_own(cli: Callable, here: Path) -> None:
         (("magnet", "--out", "a.csv", "--noise", "mass=3 g"), "the quantity 'mass'"),
         (("magnet", "--out", "a.csv", "--noise", "force=3 g"), "the unit 'g' is a mass"),
         (("magnet", "--out", "a.csv", "--noise", "3 N", "--noise", "force=2 N"), "force is given twice"),
-        (("magnet", "--out", "a.csv", "--bandwidth", "1 kHz"), "expected it with motion or current"),
-        (("magnet", "--out", "a.csv", "--peaks", "30 um"), "expected it with pack only"),
-        (("backstop", "--out", "a.csv", "--displacements", "30 um"), "expected it with magnet, spring only"),
+        (("magnet", "--out", "a.csv", "--bandwidth", "1 kHz"), "expected this option with motion or current"),
+        (("magnet", "--out", "a.csv", "--peaks", "30 um"), "expected this option with pack only"),
+        (
+            ("backstop", "--out", "a.csv", "--displacements", "30 um"),
+            "expected this option with magnet, spring only",
+        ),
         (("magnet", "--out", "a.csv", "--displacements", "30"), "--displacements: '30' has no unit"),
         (("magnet", "--out", "a.csv", "--seed", "-1"), "seed = -1"),
         (("motion", "--out", "a.csv", "--outliers", "2"), "outliers = '2'"),

@@ -72,8 +72,8 @@ def test_what_is_gained_and_lost(cli: Callable, quick: Path, tmp_path: Path) -> 
         ("--rate 1kHz --along 'gap 0 um, 10 um, 1'", "expected two values or more"),
         ("--rate 1kHz --along 'rail 9 V, 10 V, 2'", "expected a hammer whose [waveform] is a driver"),
         ("--rate 1kHz --along 'gap 0 um, 10 um, 2' --out table.png", "expected a name that ends in one of"),
-        ("--rate 1kHz --along 'gap 0 um, 10 um, 2' --report r.nc", "expected none beside --along"),
-        ("--rate 1kHz --report report.nc --no-judge", "expected none beside --no-judge"),
+        ("--rate 1kHz --along 'gap 0 um, 10 um, 2' --report r.nc", "expected no report with --along"),
+        ("--rate 1kHz --report report.nc --no-judge", "expected no report with --no-judge"),
     ],
 )
 def test_bad_input_is_one_sentence(refused: Callable, words: str, sentence: str) -> None:

@@ -35,7 +35,7 @@ def test_a_sweep_tells_how_its_members_ended(cli, spec: Path, tmp_path: Path) ->
     assert str(out) in first.out
     assert open_store(out).struck.values.tolist() == [[True], [False]]
     second = cli("sweep", spec, "--out", out, "--threads", "1")
-    assert "all of them done before" in second.out
+    assert "all of them computed before" in second.out
 
 
 def test_a_check_does_nothing(cli, spec: Path, tmp_path: Path) -> None:

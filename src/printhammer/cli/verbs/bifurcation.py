@@ -28,7 +28,7 @@ _of = partial(opt.text, panel=_PARAMETER)
     " --direction both --out bifurcation.png",
     {
         "transient": opt.whole(
-            "Number of firings to discard (default: all but the last 200, but at least a third)."
+            "Number of firings to discard at each value (default: all but the last 200; at least a third)."
         ),
         "refine": opt.whole(
             "Number of times to halve the step where the classification of neighbouring motions differs.",
@@ -56,7 +56,7 @@ def bifurcation(
     rate: str | None = _of("RATE", "Firings per second, if the parameter is neither period nor rate."),
     direction: str = opt.choice(
         "from-rest|up|down|both",
-        "Initial state of each train: rest, or the final state at the value below (up) or above (down).",
+        "Initial state of a train: rest, or the final state at the next lower (up) or higher (down) value.",
         default="from-rest",
     ),
     firings: int = opt.whole("Number of firings at each value.", default=1000),
@@ -77,7 +77,8 @@ def bifurcation(
     timed = parameter in ("period", "rate")
     if timed and (period is not None or rate is not None):
         raise InputError(
-            f"--period and --rate: expected none of them where the {parameter} is changed", key="--period"
+            f"--period and --rate: expected neither option where the {parameter} is varied",
+            key="--period",
         )
     passed |= {"period": period, "rate": rate}
     firing = firing_of(job, hammer, passed, 1.05e-3, timed=not timed)
@@ -129,8 +130,8 @@ def _axis(
     low, high = (read_number(end, unit, name) for end, name in ((first, "--from"), (last, "--to")))
     if count < 2 or not low < high:
         raise InputError(
-            f"--from {first}, --to {last} and --values {count}: expected the second to be the higher"
-            " one, and at least 2 values",
+            f"--from {first}, --to {last} and --values {count}: expected --to above --from,"
+            " and at least 2 values",
             key="--from",
         )
     grid = np.linspace(low, high, count)
@@ -161,11 +162,12 @@ _count = partial(opt.whole, panel=_BASINS)
         "firings": _count("Number of firings per round of simulation (default: 200)."),
         "rounds": _count("Maximum number of rounds per grid cell (default: 20)."),
         "gaps": opt.span(
-            "Times between the two firings (default: '0.5 ms, 0.9 ms, 128'; longer for a slow device).",
+            "Range of times between the firings (default: '0.5 ms, 0.9 ms, 128'; longer for a slow device).",
             panel=_QUENCH,
         ),
         "widths": opt.span(
-            "Widths of the second pulse (default: 128 from 0.5 to 1.5 times the first).", panel=_QUENCH
+            "Range of the width of the second pulse (default: 128 values, 0.5 to 1.5 times the first width).",
+            panel=_QUENCH,
         ),
         "tail": opt.text(
             "TIME",

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     {
         "blow": opt.text(
             "SPEED",
-            "Impact speed for which the pulse width is solved (default: that at the nominal voltage).",
+            "Impact speed that the tabulated pulse widths produce (default: the speed at nominal voltage).",
         ),
         "tolerance": opt.TOLERANCE,
     },
@@ -61,13 +61,15 @@ def dead_time(
     "printhammer impact-time impact-wire --noise '2 mA, 20 mA, 4' --sampling-rate '200 kHz, 1 MHz, 2'"
     " --bits 12 --out impact.svg",
     {
-        "signal": opt.choice("current|voltage", "Sampled signal of the coil.", default="current"),
+        "signal": opt.choice("current|voltage", "Signal of the coil to sample.", default="current"),
         "full_scale": opt.text(
             "VALUE", "Full scale of the A/D converter (default: 1.5 times the largest nominal sample)."
         ),
         "delay": opt.text("TIME", "Delay of the probe, e.g. '2 us' (default: none)."),
         "bandwidth": opt.text("FREQUENCY", "Bandwidth of the probe, e.g. '50 kHz' (default: unlimited)."),
-        "known": opt.switch("Use the delay and bandwidth of the probe in the estimator.", default=True),
+        "known": opt.switch(
+            "Let the estimator correct for the delay and bandwidth of the probe.", default=True
+        ),
         "dots": opt.whole(
             "Number of dots for each combination of noise, sampling rate and resolution.", default=50
         ),
@@ -79,7 +81,7 @@ def impact_time(
     job: Job,
     hammer: Hammer = opt.FIRED,
     noise: tuple[str, str, int] | None = opt.span(
-        "Standard deviations of a sample (default: 0.1, 0.3 and 1 % of the peak current, or of 10 V)."
+        "Standard deviations of sample noise (default: 0.1, 0.3 and 1 % of the peak current, or of 10 V)."
     ),
     sampling_rate: tuple[str, str, int] | None = opt.span(
         "Sampling rates of the A/D converter (default: 1 MHz)."
@@ -105,11 +107,13 @@ def impact_time(
     from printhammer.control.impact_time import impact_time as studied
 
     if columns is not None and not record:
-        raise InputError.of("--columns", columns, "it beside --record only", written=columns)
+        raise InputError.of("--columns", columns, "--columns together with --record only", written=columns)
     if record:
         from printhammer.control.recorded_impacts import recorded_impacts
 
-        opt.refuse({"noise": noise, "sampling-rate": sampling_rate, "bits": bits}, "none beside --record")
+        opt.refuse(
+            {"noise": noise, "sampling-rate": sampling_rate, "bits": bits}, "no such option with --record"
+        )
         probe = {name: passed[name] for name in ("signal", "delay", "bandwidth") if name in passed}
         impacts = recorded_impacts(hammer, record, columns=columns, **probe)
         return Answer(render(impacts.summary(), units), files={"out": Content.of(impacts)})
@@ -157,7 +161,9 @@ def _coil(si: str, metavar: str, what: str) -> Any:
             "TEMPERATURE", "Temperature of the ambient air (default: 25 degC); repeatable.", many=True
         ),
         "burst": opt.text(
-            "RATE", "Rate whose allowed burst length and duty cycle are computed; repeatable.", many=True
+            "RATE",
+            "Firing rate for which to compute the allowed burst length and duty cycle; repeatable.",
+            many=True,
         ),
         "feed": opt.choice(
             "voltage|current|energy",
@@ -188,11 +194,11 @@ def duty(
 
         opt.refuse(
             {"heat": heat, **{name.replace("_", "-"): passed.get(name) for name in passed}},
-            "none beside --rates",
+            "no such option with --rates",
         )
         if hammer is not None:
             raise InputError(
-                f"{hammer} is given", key="HAMMER", value=hammer, expected="no hammer beside --rates"
+                f"{hammer} is given", key="HAMMER", value=hammer, expected="no hammer with --rates"
             )
         with located(str(rates)):
             behind = thermal_limit(**read_rates(rates))
@@ -204,7 +210,9 @@ def duty(
     for name in _NEEDED:
         if name not in passed:
             raise InputError(
-                f"--{name.replace('_', '-')} is missing", key=name, expected="it beside the heat of a dot"
+                f"--{name.replace('_', '-')} is missing",
+                key=name,
+                expected="this option together with the heat of a dot",
             )
     fired = None if hammer is None else load_hammer(hammer, fired=True)
     source: Any = heat if fired is None else _heat(fired, passed)
@@ -220,6 +228,6 @@ def _heat(hammer: Hammer, passed: dict[str, Any]) -> Any:
         raise InputError(
             "--feed is given",
             key="--feed",
-            expected="it beside --heat only: a hammer has a driver of its own",
+            expected="--feed with --heat only, since a hammer has its own driver",
         )
     return heat_of(hammer)

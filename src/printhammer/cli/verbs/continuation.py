@@ -111,7 +111,7 @@ def continue_(
     bounds = both(lowest, highest, "--from", "--to", parameter)
     if regimes and (period, rate, firings, state, second) != (None,) * 5:
         raise InputError(
-            "--regimes: expected no --period, --rate, --firings, --state or --second beside it",
+            "--regimes: expected no --period, --rate, --firings, --state or --second",
             key="--regimes",
         )
     if regimes and parameter != "rate":
@@ -255,7 +255,7 @@ def curve(
     if start is not None:
         if (firings, state) != (None, None):
             raise InputError(
-                f"--start {start}: expected no --firings and no --state beside it", key="--start"
+                f"--start {start}: expected neither --firings nor --state with --start", key="--start"
             )
         own = (
             None if lowest is None and highest is None else both(lowest, highest, "--from", "--to", parameter)

@@ -55,7 +55,7 @@ def energy(
     ),
     heat: bool = opt.switch("Minimise the coil heat instead of the positive work."),
     pulses: bool = opt.switch(
-        "Restrict the current to the hammer's own pulses, and optimise their times and widths."
+        "Use only pulses of the hammer's waveform, and optimise their firing times and widths."
     ),
     supply: bool = opt.switch("Show the dots of the burst if the current deviates by up to 3 %."),
     units: Units = opt.UNITS,
@@ -71,11 +71,15 @@ def energy(
     passed |= {"least": "heat" if heat else "positive work", "shape": "pulses" if pulses else "free"}
     current = any(path.suffix.lower() == ".csv" for path in job.outputs)
     if pulses and current:
-        raise InputError("--pulses is given", key="--pulses", expected="no current (.csv) beside it")
+        raise InputError(
+            "--pulses is given", key="--pulses", expected="no output of the current (.csv) with --pulses"
+        )
     if rates is not None:
         if supply or current:
             raise InputError(
-                "--rates is given", key="--rates", expected="neither --supply nor a current (.csv) beside it"
+                "--rates is given",
+                key="--rates",
+                expected="neither --supply nor a current (.csv) with --rates",
             )
         from printhammer.control.least_work.rates import FOUND, least_work_rates
 

@@ -72,7 +72,9 @@ def magnet(
         default=...,
     ),
     zero: str = opt.text(
-        "LENGTH|fit", "Reading of the displacement sensor at x = 0; 'fit' estimates it.", default="0 m"
+        "LENGTH|fit",
+        "Reading of the displacement sensor at x = 0, or 'fit' to estimate the reading.",
+        default="0 m",
     ),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
@@ -106,7 +108,7 @@ def solenoid(
     ),
     turns: float = opt.number("Number of turns of the coil.", metavar="N", default=...),
     current: float | None = opt.quantity(
-        "A", "CURRENT", "Current of all rows, if the table has no such column."
+        "A", "CURRENT", "Current of all rows, if the table has no column of currents."
     ),
     hammer: str | None = _HAMMER,
     strict: bool = _STRICT,
@@ -257,7 +259,9 @@ def motion(
 
         if known is None:
             raise InputError(
-                "the hammer is missing", key="hammer", expected="--hammer with the constants known already"
+                "the hammer is missing",
+                key="hammer",
+                expected="--hammer, whose file supplies the known constants",
             )
         keys = [key.strip() for key in free.split(",")] if free is not None else None
         tables = opt.given(magnet=magnet, spring=spring, pack=pack, backstop=backstop)
@@ -314,7 +318,9 @@ def coil(
 
         if known is None:
             raise InputError(
-                "the hammer is missing", key="hammer", expected="--hammer with the constants known already"
+                "the hammer is missing",
+                key="hammer",
+                expected="--hammer, whose file supplies the known constants",
             )
         keys = None if free is None else _keys(free)
         return fit_coil(files, known, free=keys, also=_keys(also or ""), **passed)
@@ -336,7 +342,7 @@ def _earlier_fits(tables: dict[str, Path], known: Hammer, robust: bool) -> list[
     if "magnet" in rest:
         if "spring" not in rest:
             raise InputError(
-                "--magnet: expected --spring too, or F0 and Bs cannot be told apart", key="--magnet"
+                "--magnet: expected --spring as well, otherwise F0 and Bs cannot be separated", key="--magnet"
             )
         fits.append(fit("magnet", rest.pop("magnet"), spring=rest.pop("spring"), **options))
     return [*fits, *(fit(kind, path, **options) for kind, path in rest.items())]
@@ -350,7 +356,7 @@ def _fitted(job: Job, hammer: str | None, strict: bool, fitted: Callable[[Hammer
     for path in job.wanted["into"]:
         if hammer is None:
             raise InputError(
-                f"--into {path}: expected --hammer too, in which constants are replaced", key="--into"
+                f"--into {path}: expected --hammer as well, the hammer to be updated", key="--into"
             )
     announce_compiling()
     known = None if hammer is None else load(hammer)

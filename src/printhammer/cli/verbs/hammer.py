@@ -208,8 +208,8 @@ def from_datasheet(
     made, magnet = hammer_of(read)
     if magnet.misfit > POOR:
         warn(
-            f"{sheet}: a force is met to {100.0 * magnet.misfit:.2g} % only: poles that are not flat, or a"
-            " typing error"
+            f"{sheet}: the fit misses a force by {100.0 * magnet.misfit:.2g} %: the poles are not flat, or"
+            " the sheet has a typing error"
         )
     for sentence in implausible(read, magnet.part):
         warn(f"{sheet}: {sentence}")

@@ -63,9 +63,7 @@ def map_(
         "Column numbers (from 1) of the measured table, with factors, e.g. 'time=1, 500 Hz=2*50 um/V'"
         " (default: from its heading).",
     ),
-    figure: str | None = opt.choice(
-        "8|9", "Figure of the paper whose style the picture follows (default: 9)."
-    ),
+    figure: str | None = opt.choice("8|9", "Figure of the paper whose style the plot follows (default: 9)."),
     **passed: Any,
 ) -> Answer:
     """Map the displacement against time and firing rate, as in Figs. 8 and 9 of the paper.
@@ -78,7 +76,9 @@ def map_(
 
     drawn = _number_of(figure, job.outputs, measured)
     if columns is not None and measured is None:
-        raise InputError(f"--columns {columns} is given", key="--columns", expected="it with --measured only")
+        raise InputError(
+            f"--columns {columns} is given", key="--columns", expected="--columns with --measured only"
+        )
     beside = None if measured is None else load_measured_map(measured, columns=columns)
     grid, moments = _axes(hammer, beside, lowest, highest, rates, times)
     with job.progress_bar("rates") as tell:
@@ -101,7 +101,7 @@ def _number_of(figure: str | None, outputs: list[Path], measured: Path | None) -
         raise InputError(
             f"--figure {figure} is given beside --measured {measured}",
             key="--figure",
-            expected="one or the other",
+            expected="only one of these options",
         )
     return int(figure)
 
@@ -139,7 +139,7 @@ def _axes(
         raise InputError(f"--rates {count}: expected a whole number from 1 to {MOST_CELLS}", key="--rates")
     if high < low or (high == low and count > 1):
         raise InputError(
-            f"--from {low:.9g} Hz and --to {high:.9g} Hz: expected the second to be the higher one",
+            f"--from {low:.9g} Hz and --to {high:.9g} Hz: expected --to above --from",
             key="--from",
         )
     return np.linspace(low, high, count), moments

@@ -90,7 +90,7 @@ def measure(
     for each, table in tables.items():
         table.write(paths[each])
         rows = len(next(iter(table.values.values())))
-        wrong = f", {len(table.outliers)} of them wrong" if len(table.outliers) else ""
+        wrong = f", {len(table.outliers)} of them with gross errors" if len(table.outliers) else ""
         text = f"[bold]{table.kind}[/bold]  {escape(table.comments['measured'])}: {rows} rows{wrong}"
         job.screen.print(text, soft_wrap=True)
         job.wrote(paths[each])
@@ -114,7 +114,7 @@ def _places(kind: str, out: Path | None, job: Job) -> tuple[list[str], dict[str,
         check_outputs(paths.values(), job.inputs)
     else:
         if out.exists() and not out.is_dir():
-            raise InputError(f"--out {out}: expected a folder, this is a file", key="--out")
+            raise InputError(f"--out {out}: expected a folder, not a file", key="--out")
         paths = {each: out / f"{each}.csv" for each in KINDS}
         if out.is_dir():
             check_outputs(paths.values(), job.inputs)
@@ -138,7 +138,7 @@ def _settings(kinds: list[str], settings: dict[str, Any]) -> dict[str, dict[str,
             raise InputError(
                 f"--{flag} {settings[name]} is given with {kinds[0]}",
                 key=f"--{flag}",
-                expected="it with motion or current only",
+                expected="this option with motion or current only",
             )
     return {kind: applicable(SENSORS[kind], settings) for kind in kinds}
 
@@ -157,7 +157,9 @@ def _options(kinds: list[str], bench: dict[str, str]) -> dict[str, dict[str, Any
         if not owners:
             right = ", ".join(kind for kind, make in BENCHES.items() if name in signature(make).parameters)
             raise InputError(
-                f"--{name} {text} is given with {kinds[0]}", key=f"--{name}", expected=f"it with {right} only"
+                f"--{name} {text} is given with {kinds[0]}",
+                key=f"--{name}",
+                expected=f"this option with {right} only",
             )
         value: Any = (
             text
@@ -179,5 +181,5 @@ def _possible(kinds: list[str], hammer: Hammer) -> list[str]:
     for kind, part in needed.items():
         if part is None:
             what = "waveform" if kind in shots else kind
-            say(f"{hammer.path}: the hammer has no {what}, {kind} is left out")
+            say(f"{hammer.path}: the hammer has no {what}; {kind} is omitted")
     return [kind for kind, part in needed.items() if part is not None]

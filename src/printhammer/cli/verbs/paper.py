@@ -25,12 +25,12 @@ def figure(
     out: Path = opt.folder("Output folder for the figure files.", default=Path("build/figures")),
     scheme: str = opt.choice(
         "exact|runge-kutta-4|trapezoid",
-        "Integrator of Fig. 11: exact, or a scheme of 1983.",
+        "Integrator for Fig. 11: exact, or one of the two schemes of 1983.",
         default="exact",
     ),
     reading: str = opt.choice(
         "firings|look-ahead|inside|grid|no-late-step",
-        "Rule by which a scheme of 1983 takes short steps at the backstop (only with --scheme).",
+        "Rule for the short steps of a 1983 scheme at the backstop (only with --scheme).",
         default="firings",
     ),
 ) -> Answer:
@@ -44,11 +44,17 @@ def figure(
         raise InputError.of("figure", number, f"one of {', '.join(map(str, FIGURES))}", written=str(number))
     if scheme == "exact" and reading != "firings":
         raise InputError.of(
-            "--reading", reading, "it with --scheme, since the exact motion has no step", written=str(reading)
+            "--reading",
+            reading,
+            "--scheme as well, since the exact motion has no step size",
+            written=str(reading),
         )
     if scheme != "exact" and entry.number != _POINCARE:
         raise InputError.of(
-            "--scheme", scheme, f"it with figure {_POINCARE}, not {entry.number}", written=str(scheme)
+            "--scheme",
+            scheme,
+            f"this option with figure {_POINCARE}, not {entry.number}",
+            written=str(scheme),
         )
     options: dict[str, Any] = {}
     name = f"figure{entry.number:02d}"

@@ -38,9 +38,7 @@ def chosen_strategy(
         hammer.
     """
     if serial is not None and table is None:
-        raise InputError(
-            f"--serial {serial}: expected a table that was learned, --table, beside it", key="--serial"
-        )
+        raise InputError(f"--serial {serial}: expected a learned table, --table, as well", key="--serial")
     if feedback and table is not None:
         raise InputError(f"--table {table} and --feedback: expected one of them", key="--table")
     if table is not None:
@@ -224,9 +222,7 @@ def _only(task: str, options: set[str]) -> None:
     if odd:
         where = " or ".join(named(name) for name, takes in _TAKES.items() if odd[0] in takes)
         flag = odd[0].replace("_", "-")
-        raise InputError(
-            f"--{flag} is given, which belongs to {where}, not to {named(task)}", key=f"--{flag}"
-        )
+        raise InputError(f"--{flag} is given, but belongs to {where}, not to {named(task)}", key=f"--{flag}")
 
 
 def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
@@ -238,7 +234,7 @@ def _spreads(hammer: Hammer, texts: list[str]) -> dict[str, Any]:
     common = [written for written in texts if "=" not in written]
     if len(common) > 1:
         raise InputError(
-            f"--spread {common[1]}: expected one spread of all constants, {common[0]} is given",
+            f"--spread {common[1]}: expected one spread for all constants, but {common[0]} is given as well",
             key="--spread",
         )
     spreads = spreads_of(hammer, opt.read_share(common[0], "--spread")) if common else {}
@@ -387,10 +383,10 @@ def _pattern(
         for name, value in (("--font", font), ("--columns", columns)):
             if value is not None:
                 raise InputError(
-                    f"{name} {value} is given beside --pattern {path}",
+                    f"{name} {value} is given with --pattern {path}",
                     key=name,
                     value=value,
-                    expected="with a text only",
+                    expected="this option with a text only",
                 )
         return Pattern.load(path, wires)
     if text is None:

@@ -87,7 +87,9 @@ def _fired(hammer: Hammer, file: Path | None, train: dict[str, Any]) -> Drive:
     if file is not None:
         for name in beside:
             raise InputError(
-                f"--{name} is given beside --drive {file}", key=f"--{name}", expected="one or the other"
+                f"--{name} is given with --drive {file}",
+                key=f"--{name}",
+                expected="only one of these options",
             )
         return load_drive(file, hammer.waveform)
     if hammer.waveform is None:

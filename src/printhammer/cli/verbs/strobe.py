@@ -133,7 +133,7 @@ def lyapunov(
         periods = _periods(period, rate, lowest, highest, steps)
     else:
         more = {"period": period, "rate": rate, "from": lowest, "to": highest, "steps": steps}
-        opt.refuse(more, "none beside --drive")
+        opt.refuse(more, "no such option with --drive")
         firing, periods = firing_of(job, hammer, passed), None
     if periods is None or len(periods) == 1:
         if periods is not None:
@@ -173,7 +173,7 @@ def _periods(
         )
     if not ranged:
         if steps is not None:
-            raise InputError(f"--steps {steps}: expected --from and --to beside it", key="--steps")
+            raise InputError(f"--steps {steps}: expected --from and --to as well", key="--steps")
         name, unit = ("--period", "s") if period is not None else ("--rate", "Hz")
         values = np.array(
             [read_positive(each.strip(), unit, name) for each in (period or rate or "").split(",")]
@@ -186,7 +186,7 @@ def _periods(
     count = _STEPS if steps is None else steps
     if not high > low:
         raise InputError(
-            f"--from {low:.9g} s and --to {high:.9g} s: expected the second to be the longer one",
+            f"--from {low:.9g} s and --to {high:.9g} s: expected --to above --from",
             key="--from",
         )
     if count < 2:

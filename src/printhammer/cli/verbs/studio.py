@@ -26,7 +26,7 @@ def studio(
     port: int | None = opt.whole(
         "Port on 127.0.0.1 (default: 19830, or a free port if that is taken; 0: a free port)."
     ),
-    state: Path | None = opt.source("File of the state to open, saved by the studio's export."),
+    state: Path | None = opt.source("Saved state to open: a file exported by the studio."),
     browser: bool = opt.switch(
         "Open the page in the default browser.", flag="--open/--no-open", default=True
     ),

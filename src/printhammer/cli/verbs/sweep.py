@@ -56,7 +56,9 @@ def sweep(
     if spec is None:
         raise InputError("SPEC is missing", key="SPEC", expected="a spec file; --example prints one")
     if threads is not None and dask is not None:
-        raise InputError("--threads is given beside --dask", key="--threads", expected="one or the other")
+        raise InputError(
+            "--threads is given with --dask", key="--threads", expected="only one of these options"
+        )
     if check:
         return Answer(render(make_plan(read_spec(spec)).summary()))
     if out is None:
@@ -83,7 +85,7 @@ def ended(result: xr.Dataset, new: float, seconds: float) -> str:
         f"[{'yellow' if code else 'green'}]{count} {STATUSES[code]}[/]"
         for code, count in sorted(counts.items())
     )
-    how = f"{new:.0f} of them now, in {duration_text(seconds)}" if new else "all of them done before"
+    how = f"{new:.0f} of them now, in {duration_text(seconds)}" if new else "all of them computed before"
     return f"{result['status'].size} members: {each}; {how}"
 
 

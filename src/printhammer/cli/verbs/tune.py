@@ -126,7 +126,9 @@ def tune(
 
     if job.wanted["report"] and not judge:
         raise InputError(
-            f"--report {job.wanted['report'][0]} is given", key="--report", expected="none beside --no-judge"
+            f"--report {job.wanted['report'][0]} is given",
+            key="--report",
+            expected="no report with --no-judge",
         )
     if "rate" in passed and "rates" in passed:
         raise InputError("--rate and --rates are given", key="--rate", expected="one of them")
@@ -138,7 +140,9 @@ def tune(
     if along is not None:
         if job.wanted["report"]:
             raise InputError(
-                f"--report {job.wanted['report'][0]} is given", key="--report", expected="none beside --along"
+                f"--report {job.wanted['report'][0]} is given",
+                key="--report",
+                expected="no report with --along",
             )
         return tuned_along(job, hammer, along, opt.given(tick=tick), budget, {**passed, **options}, units)
     with job.progress_bar("tuning") as tell:
@@ -153,11 +157,11 @@ def tune(
             report = judge_table(hammer, made, progress=tell, **options)
     except PrinthammerError as error:
         # Hours of tuning are in the table: it is written whatever the judge says.
-        return Answer(files=files, complaints=[f"the table is not judged: {error}"])
+        return Answer(files=files, complaints=[f"the table is not validated: {error}"])
     files["report"] = Content.of(report)
     good = report.passed[1, 0]
     off = ", ".join(f"{each:g} Hz" for each in report.rates[~good].tolist())
-    complaint = f"with the table not all dots are within the limits at {off}"
+    complaint = f"with the table some dots are beyond the limits at {off}"
     return Answer(
         ["", *render(report.summary(), units)], files=files, complaints=[] if good.all() else [complaint]
     )
@@ -285,10 +289,10 @@ def learn(
     )
     if signal is not None:
         own = {"noise": noise, "offset-spread": offset_spread}
-        opt.refuse(own, "none beside --signal, which has --signal-noise")
+        opt.refuse(own, "--signal-noise instead, with --signal")
         readings |= _from_coil(job, hammer, signal, signal_noise)
     else:
-        opt.refuse({"signal-noise": signal_noise}, "none without --signal")
+        opt.refuse({"signal-noise": signal_noise}, "--signal as well")
     driven = None if unit is None else load(unit)
     passed.setdefault("rate", rate_text(hammer, 1275.0))
     passed.setdefault("largest_current", current_bound(hammer))
@@ -297,9 +301,9 @@ def learn(
         result = learned(hammer, driven, sensor=ImpactSensor(**readings), progress=tell, **passed)
     likely = 100.0 * result.certainty[-1]
     if np.isnan(likely):
-        complaint = f"no hammer of the production explains the readings: misfit {result.misfit[-1]:.2f}"
+        complaint = f"no simulated hammer explains the readings: misfit {result.misfit[-1]:.2f}"
     else:
-        complaint = f"{likely:.0f} % of the likely units print every dot within limits in the end"
+        complaint = f"{likely:.0f} % of the likely units print every dot within the limits after learning"
 
     def believed(path: Path) -> None:
         result.believed_hammer.save(path)

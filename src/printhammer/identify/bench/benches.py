@@ -101,7 +101,7 @@ def magnet(
             f"{hammer.path}: the hammer has no [magnet]",
             file=hammer.path,
             key="magnet",
-            expected="one to measure its force",
+            expected="a hammer with this part, whose force is measured",
         )
     places = _places(hammer, displacements)
     levels = _currents(hammer) if currents is None else _array(currents, "currents")
@@ -115,7 +115,7 @@ def magnet(
             f"{hammer.path}: the magnet has no force at {bad:.6g} m",
             file=hammer.path,
             key="magnet",
-            expected="its range to be kept",
+            expected="displacements and currents within the range of the magnet's law",
         )
     return Bench(
         "static force of magnet and spring, armature held, pack absent; positive toward the paper",
@@ -136,12 +136,12 @@ def spring(
             f"{hammer.path}: the hammer has no [spring]",
             file=hammer.path,
             key="spring",
-            expected="one to measure its force",
+            expected="a hammer with this part, whose force is measured",
         )
     x = _places(hammer, displacements)
     force = StaticForce(hammer)
     return Bench(
-        "static force of the spring alone, magnet taken out; positive toward the paper",
+        "static force of the spring alone, magnet removed; positive toward the paper",
         {"displacement": x, "force": np.array([force.spring(place) for place in x.tolist()])},
         "force",
     )
@@ -157,7 +157,10 @@ def pack(
     """Measure load cycles of the pack to peak indentations, m, each on fresh paper."""
     if hammer.pack is None:
         raise InputError(
-            f"{hammer.path}: the hammer has no [pack]", file=hammer.path, key="pack", expected="one to press"
+            f"{hammer.path}: the hammer has no [pack]",
+            file=hammer.path,
+            key="pack",
+            expected="a hammer with a pack",
         )
     deepest = _peaks(hammer) if peaks is None else _array(peaks, "peaks")
     if points < 2 or not (deepest > 0.0).all():
@@ -199,7 +202,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
             f"{hammer.path}: the hammer has no [backstop]",
             file=hammer.path,
             key="backstop",
-            expected="one to rebound from",
+            expected="a hammer with a backstop",
         )
     impacts = np.linspace(SPEEDS[0], SPEEDS[1], SPEEDS[2]) if speeds is None else _array(speeds, "speeds")
     if not (impacts > 0.0).all():
@@ -208,7 +211,7 @@ def backstop(hammer: Hammer, sensor: Sensor, *, speeds: npt.ArrayLike | None = N
     different, which = np.unique(impacts, return_inverse=True)
     rebound = np.array([_rebound(bare, speed) for speed in different.tolist()])[which]
     return Bench(
-        "speeds of the armature alone just before and just after it meets the backstop",
+        "speeds of the armature alone just before and just after the backstop contact",
         {"impact speed": impacts, "rebound speed": rebound},
         "rebound speed",
     )
@@ -234,7 +237,9 @@ def motion(
     shot = simulate(hammer, PulseTrain(hammer.waveform), duration=max(float(fine[-1]), length), times=fine)
     if not shot.ok:
         raise InputError(
-            f"{hammer.path}: the shot did not reach its end: {shot.message}", file=hammer.path, key="waveform"
+            f"{hammer.path}: the simulation of the shot stopped early: {shot.message}",
+            file=hammer.path,
+            key="waveform",
         )
     tau = time_constant(sensor.bandwidth)
     shown = lowpass_motion(shot.t, shot.x[:, np.newaxis], shot.v[:, np.newaxis], tau)[::each, 0]
@@ -291,7 +296,9 @@ def _record(
 
     rate = sensor.sampling_rate
     if rate is None:
-        raise InputError("the sensor has no sampling rate", key="sensor", expected="one for a record")
+        raise InputError(
+            "the sensor has no sampling rate", key="sensor", expected="a sampling rate, to make a record"
+        )
     length = least if duration is None else read_positive(duration, "s", "duration")
     early = read_number(before, "s", "before")
     if early < 0.0:
@@ -304,7 +311,9 @@ def _record(
     each = max(1, math.ceil(1.0 / (rate * _FINEST)))
     if last * each - first > _MOST:
         raise InputError(
-            f"a record of {length:.6g} s at {rate:.6g} Hz is too long", key="length", expected="a shorter one"
+            f"a record of {length:.6g} s at {rate:.6g} Hz is too long",
+            key="length",
+            expected="a shorter record",
         )
     return first, last, rate, length
 
@@ -328,7 +337,7 @@ def _places(hammer: Hammer, displacements: npt.ArrayLike | None) -> FloatArray:
             f"{hammer.path}: the hammer has no platen or pack",
             file=hammer.path,
             key="platen",
-            expected="displacements to be given",
+            expected="explicit displacements",
         )
     return np.linspace(low, high, DISPLACEMENTS)
 
@@ -340,10 +349,10 @@ def _currents(hammer: Hammer) -> FloatArray:
         return np.linspace(0.0, typical_current(hammer, PulseTrain(hammer.waveform)), CURRENTS)
     if hammer.waveform is None or hammer.waveform.unit != "A":
         raise InputError(
-            f"{hammer.path}: the hammer has no current to fire",
+            f"{hammer.path}: the hammer has no current waveform",
             file=hammer.path,
             key="current",
-            expected="currents to be given",
+            expected="explicit currents",
         )
     return np.linspace(0.0, HIGHEST_CURRENT * hammer.waveform.peak, CURRENTS)
 
@@ -360,7 +369,7 @@ def _peaks(hammer: Hammer) -> FloatArray:
                 f"{hammer.path}: the pack has no thickness, and no pulse of the hammer presses it",
                 file=hammer.path,
                 key="pack",
-                expected="the largest indentations to be given (--peaks)",
+                expected="explicit peak indentations (--peaks)",
             )
         return float(deepest) * np.array(PEAKS) / PEAKS[-1]
     return float(thickness) * np.array(PEAKS)

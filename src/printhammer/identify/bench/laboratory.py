@@ -115,7 +115,7 @@ class Measurement(Result):
         return "\n".join(lines) + "\n"
 
     def write(self, path: str | Path) -> None:
-        """Write the table as CSV."""
+        """Write the table to a CSV file."""
         from printhammer.support.files import write_file
 
         write_file(path, self.to_csv())

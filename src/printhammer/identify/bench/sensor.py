@@ -73,7 +73,9 @@ class Channel(Declared):
     def __post_init__(self) -> None:
         if self.resolution.of == READING:
             raise InputError(
-                f"a resolution {READING} is given", key="resolution", expected="one in steps of the same size"
+                f"a resolution {READING} is given",
+                key="resolution",
+                expected="a resolution with a constant step",
             )
 
     def readings(self, true: FloatArray, normal: FloatArray) -> FloatArray:
@@ -137,7 +139,7 @@ class Sensor:
             if frequency is not None and not (frequency > 0.0 and math.isfinite(frequency)):
                 raise InputError.of(name, frequency, "more than 0 Hz")
         if not 0.0 <= self.outliers <= 0.5:
-            raise InputError.of("outliers", self.outliers, "a share from 0 to 0.5")
+            raise InputError.of("outliers", self.outliers, "a fraction from 0 to 0.5")
 
     def exact(self) -> Sensor:
         """Return a copy without errors: no noise, resolution, offset, bandwidth limit or outliers."""
@@ -207,7 +209,7 @@ def adjusted(sensor: Sensor, settings: Mapping[str, Any], units: Mapping[str, st
             changes[name] = read(settings[name], name)
     if sensor.sampling_rate is None and any(changes.get(name) for name in ("sampling_rate", "bandwidth")):
         raise InputError(
-            "a sampling rate or bandwidth is given", key="rate", expected="it with a record of a motion only"
+            "a sampling rate or bandwidth is given", key="rate", expected="this setting for records only"
         )
     return replace(sensor, **changes)
 
@@ -250,7 +252,10 @@ def by_quantity(texts: list[str], part: str, quantities: Mapping[str, str]) -> d
                 )
             if quantity in amounts:
                 raise InputError(
-                    f"{part} {text!r}: {quantity} is given twice", key=part, value=text, expected="it once"
+                    f"{part} {text!r}: {quantity} is given twice",
+                    key=part,
+                    value=text,
+                    expected="each quantity once",
                 )
             amounts[quantity] = amount.strip() if equals else text.strip()
     return amounts
@@ -292,7 +297,7 @@ def _frequency(value: Any, name: str) -> float | None:
 def _share(value: Any, name: str) -> float:
     share = read_number(value, "1", name)
     if not (0.0 <= share <= 0.5 and math.isfinite(share)):
-        raise InputError.of(name, value, "a share from 0 to 50 %")
+        raise InputError.of(name, value, "a fraction from 0 to 50 %")
     return share
 
 

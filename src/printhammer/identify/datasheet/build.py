@@ -76,8 +76,9 @@ class Sheet:
     inductance: tuple[float, float] | None
     """Inductance at small currents, H, and the gap where it was measured, m."""
     turns: float | None
+    """Number of turns of the coil; None if not stated."""
     area: float | None
-    """Area of the pole face, m^2; None if not stated, as for the turns."""
+    """Area of the pole face, m^2; None if not stated."""
     residual_gap: float | None
     """Air gap in series with the working gap, m; None if not stated."""
     closed_at: float
@@ -333,7 +334,10 @@ def _magnet(sheet: DataSheet, magnet: SheetMagnet) -> dict[str, Any]:
             table[name] = _made(value, note.si, fitted, f"{what}, within {error:.2g} %")
         elif name in magnet.assumed:
             table[name] = _made(
-                value, note.si, "assumed", f"{magnet.assumed[name]}, and {what}, which hardly tell"
+                value,
+                note.si,
+                "assumed",
+                f"{magnet.assumed[name]}, and {what}, which hardly tell",
             )
     return table
 
@@ -408,7 +412,7 @@ def _work(sheet: DataSheet, magnet: SheetMagnet, front: float, current: float) -
         raise InputError.of(
             "spring.stiffness",
             sheet.si("spring.stiffness", 0.0),
-            f"a spring that the magnet overcomes on the way at {current:.3g} A",
+            f"a spring that the magnet overcomes over the whole stroke at {current:.3g} A",
             written=f"{sheet.si('spring.stiffness', 0.0):g}",
             unit="N/m",
         )

@@ -1,25 +1,27 @@
 """Read and validate data sheets of actuators: TOML with the values that a manufacturer prints.
 
-    name = "pull-12v" source = "manufacturer's data sheet, page 3" rail = "12 V" resistance = "10 ohm"
-    # at 20 degC force = [["0.25 mm", "85.9 N"], ["5 mm", "3.59 N"]] stroke = "4.75 mm" mass = "26 g"
+    name = "pull-12v"
+    source = "manufacturer's data sheet, page 3"
+    rail = "12 V"
+    resistance = "10 ohm"                    # at 20 degC
+    force = [["0.25 mm", "85.9 N"], ["5 mm", "3.59 N"]]
+    stroke = "4.75 mm"
+    mass = "26 g"
 
 These are required. Optional are
 
 - `current`, the current of the forces (default: rail over resistance), and `end_gap`, the remaining gap at
-the end of
-  the stroke (0 mm);
+  the end of the stroke (0 mm);
 - `inductance`, with the gap at which it was measured, as ``["45 mH", "4 mm"]``; `turns`; `pole_diameter`;
   `residual_gap`, an air gap in series with the working gap;
 - `spring`, with `preload` at rest and `stiffness`; `target`, the distance to the struck object, if it is not
-at the
-  end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of the
-  struck object;
+  at the end of the stroke; `stop`, with the `restitution` of both ends, or with `stiffness` and `damping` of
+  the struck object;
 - `on_time`; `driver`, a waveform table without its voltage; `title`, `note` and `strike`, the noun for the
-result of a
-  pulse.
+  result of a pulse.
 
-`assumed` lists the keys whose values the reader of the sheet has guessed, and ``[why]`` states a source for
-single keys.
+`assumed` lists the keys whose values were guessed rather than read from the sheet, and ``[why]`` states a
+source for single keys.
 """
 
 from __future__ import annotations
@@ -191,7 +193,7 @@ def _sheet(document: Mapping[str, Any], where: str) -> DataSheet:
 
 _WANTED: Final = {
     "name": "a short name of the device",
-    "source": "where the sheet comes from",
+    "source": "the origin of the data sheet",
     "force": 'gaps and forces such as [["0.5 mm", "40 N"], ["5 mm", "3.6 N"]]',
 }
 
@@ -269,7 +271,7 @@ def _check(sheet: DataSheet) -> None:
     """Raise `InputError` if the entries of a data sheet contradict each other."""
     gaps = [gap.si for gap, _force in sheet.force]
     if len(set(gaps)) < len(gaps):
-        raise InputError("force: a gap is given twice", key="force", expected="one force at each")
+        raise InputError("force: a gap is given twice", key="force", expected="one force per gap")
     restitution = sheet.si("stop.restitution", 0.0)
     if restitution > 1.0:
         raise InputError.of("stop.restitution", restitution, "1 or less", written=f"{restitution:g}")

@@ -48,8 +48,8 @@ class Priors:
                 factor = np.linalg.cholesky(prior.covariance / np.outer(size, size))
             except np.linalg.LinAlgError:
                 raise InputError(
-                    "what current and earlier fits tell has no positive definite covariance",
-                    expected="currents without stray values, and tables that tell the constants apart",
+                    "the priors from currents and earlier fits have no positive definite covariance",
+                    expected="currents without outliers, and tables that separate the constants",
                 ) from None
             self._white.append((prior, np.linalg.inv(factor)))
 

@@ -64,7 +64,7 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
             f"{where}: nothing in the records depends on {blind[0]}",
             file=where,
             key="free",
-            expected="it not to be free",
+            expected="this constant not to be free",
         )
     values, vectors = singular(design / sizes)
     if values[0] * _DEGENERATE > values[-1]:
@@ -73,10 +73,7 @@ def refuse_degenerate(where: str, design: FloatArray, names: Sequence[str]) -> N
     tied = [name for name, part in zip(names, direction, strict=True) if part > _SHARE * direction.max()]
     listed = tied[0] if len(tied) == 1 else f"{', '.join(tied[:-1])} and {tied[-1]}"
     raise InputError(
-        (
-            f"{where}: a motion cannot tell apart {listed}: changed together they leave the"
-            " records as they are"
-        ),
+        (f"{where}: a motion cannot separate {listed}: a joint change leaves the records unchanged"),
         file=where,
         key="free",
         expected="at least one of them to be held",
@@ -91,12 +88,10 @@ def tied_constants(names: Sequence[str], values: FloatArray, covariance: FloatAr
         for j in range(i):
             correlation = covariance[i, j] / (errors[i] * errors[j])
             if abs(correlation) > _TIED:
-                sentences.append(
-                    f"{names[j]} and {name} are hardly told apart: their correlation is {correlation:.4f}"
-                )
+                sentences.append(f"{names[j]} and {name} are hardly separable: correlation {correlation:.4f}")
     for name, value, error in zip(names, values, errors, strict=True):
         if error > _WEAK * abs(value):
-            sentences.append(f"{name} is known to {100.0 * error / abs(value):.2g} % only")
+            sentences.append(f"{name} is determined to only {100.0 * error / abs(value):.2g} %")
     return sentences
 
 
@@ -144,7 +139,7 @@ _POINTS: Final = 7
 """Half-width of a profile, in standard errors, and number of its points."""
 _LOST: Final = 1e-7
 """Relative singular value below which rounding dominates."""
-_NO_MOTION: Final = "the hammer does not move so that the records could be compared with it"
+_NO_MOTION: Final = "the simulated hammer does not move, so that the records cannot be compared"
 
 
 class Solution(Declared, eq=False):
@@ -243,7 +238,7 @@ class GaussNewton:
                     raise InputError(
                         "the fit does not converge",
                         key="fit",
-                        expected="constants nearer to the truth to begin with",
+                        expected="initial guesses nearer to the true constants",
                     )
             values, states, chains = new, moved, trial
         raise InputError(f"the fit has not converged after {_MOST_STEPS} steps", key="fit")

@@ -72,7 +72,7 @@ def tested(shots: Sequence[Shot], solution: Solution, count: int) -> tuple[float
             left = np.where(out, 0.0, np.abs(shot.x - shown))
             place = shot.t[int(np.argmax(left))]
             worst = (
-                f"the residuals of {shot.name} are {scale:.3g} m, its noise is {noise:.3g} m, and they"
+                f"the residuals of {shot.name} are {scale:.3g} m, the noise is {noise:.3g} m; the residuals"
                 f" are largest at {place:.4g} s (p = {tail:.2g} if the noise is {_LARGER:g} times that)"
             )
     # Bonferroni correction for the number of records.
@@ -91,8 +91,8 @@ def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
         off = float(np.median(shot.x[before]) - shown[0])
         if abs(off) > max(_OFF * 1.25 * float(scale) / np.sqrt(count), 0.1 * float(scale)):
             sentences.append(
-                f"{shot.name} rests {off:+.2g} m from where the hammer does: an offset of the sensor, or a"
-                " backstop of another stiffness or position"
+                f"{shot.name} rests {off:+.2g} m off the rest position of the hammer: an offset of the"
+                " sensor, or a backstop of different stiffness or position"
             )
     return sentences
 
@@ -100,7 +100,7 @@ def rests(shots: Sequence[Shot], solution: Solution) -> list[str]:
 def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
     """Return remarks on records with autocorrelated residuals."""
     return [
-        f"the residuals of {shot.name} depend on each other: {len(shot.t)} samples count as"
+        f"the residuals of {shot.name} are autocorrelated: {len(shot.t)} samples count as"
         f" {len(shot.t) / memory:.0f}"
         for shot, memory in zip(shots, solution.memories, strict=True)
         if memory > 2.0
@@ -109,9 +109,7 @@ def remembered(shots: Sequence[Shot], solution: Solution) -> list[str]:
 
 def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str) -> list[str]:
     """Return remarks on held constants that the records could determine, or that the records contradict."""
-    sentences = [
-        "a motion shows forces divided by the mass only: the mass is as sure as the forces taken as known"
-    ]
+    sentences = ["a motion depends on forces over mass only: the mass is as accurate as the known forces"]
     shooting = fit.shooting
     parameters = shooting.parameters
     recorded = None not in shooting.pulses
@@ -154,8 +152,8 @@ def further(fit: GaussNewton, solution: Solution, hammer: Hammer, rejected: str)
         name, error, change = max(candidates, key=lambda entry: abs(entry[2]) / entry[1])
         if abs(change) > _OFF * error:
             sentences.append(
-                f"the records ask most for another {name}, by {100.0 * change:+.2g} %: free it, or give its"
-                " fit"
+                f"the records most strongly suggest a change of {name}, by {100.0 * change:+.2g} %: fit it,"
+                " too, or apply a fit of it"
             )
     return sentences
 
@@ -240,7 +238,9 @@ def fit_motion(
     with located(where):
         solution = fit.solve(start, states)
     if not touched and hammer.backstop is not None:
-        notes.append("no record touches the backstop after the shot: its damping cannot be found from them")
+        notes.append(
+            "no record shows a backstop contact after the shot, so the backstop damping cannot be fitted"
+        )
     return replace(_result(hammer, shots, fit, solution, keys, notes), records=records)
 
 
@@ -257,13 +257,13 @@ def _free_keys(
     where = " and ".join(shot.name for shot in shots)
     for number, key in enumerate(keys):
         if key in keys[:number]:
-            raise InputError(f"free: {key} is given twice", key="free", expected="it once")
+            raise InputError(f"free: {key} is given twice", key="free", expected="each constant once")
         given_otherwise = hertz and key in (_DAMPING, "backstop.stiffness")
         if (key not in hammer.constants and not given_otherwise) or key == "platen":
             known = [name for name in hammer.constants if name != "platen"]
             moving = nearest(key, known, "one such as 'mass'")
             raise InputError(
-                f"free: {key!r} is no constant of {hammer.path} that moves the armature",
+                f"free: {key!r} is no constant of {hammer.path} that affects the motion",
                 key="free",
                 expected=moving,
             )
@@ -272,7 +272,7 @@ def _free_keys(
                 f"{where}: the record does not touch the backstop after the shot",
                 file=where,
                 key=key,
-                expected=f"one that does for {key}",
+                expected=f"a record with a backstop contact, to fit {key}",
             )
         fewest = max((touch.count for shot in shots for touch in shot.touching("backstop")), default=0)
         if key.startswith("backstop.") and touched and fewest < FEWEST:
@@ -302,7 +302,7 @@ def _plain(hammer: Hammer, keys: Sequence[str]) -> Hammer:
                 f"{hammer.path}: {key} is 0",
                 file=hammer.path,
                 key=key,
-                expected="a value from which a fit can begin",
+                expected="a nonzero initial guess",
             )
     return hammer
 
@@ -342,7 +342,7 @@ def _pulses(hammer: Hammer, shots: Sequence[Shot]) -> tuple[list[Pulse | None], 
                     ),
                     file=shot.name,
                     key="current",
-                    expected="one of them",
+                    expected="a current or a waveform",
                 )
             pulses.append(None)
         else:

@@ -99,7 +99,7 @@ def read_shot(
             f"{name}: {len(t)} samples",
             file=name,
             key="samples",
-            expected=f"the record of a whole shot, {4 * FEWEST} at least",
+            expected=f"the record of a whole shot, at least {4 * FEWEST} samples",
         )
     noise = noise_of_record(x)
     touches, smooth, clear = find_touches(t, x, noise, hammer)
@@ -175,7 +175,7 @@ def _check(
             (f"{name}: the record begins at {_us(t[0])} with the armature {_um(start)} off the backstop"),
             file=name,
             key="start",
-            expected="a record from the firing at rest on",
+            expected="a record that begins at rest, before the firing",
         )
     if hammer.front is None:
         return

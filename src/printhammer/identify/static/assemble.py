@@ -32,13 +32,11 @@ from printhammer.support.arrays import FloatArray, IntArray
 LEVEL: Final = 0.01
 """Significance level below which a law is rejected."""
 
-_RUNS: Final = (
-    "residuals of neighbours go together: the data bend another way than the law, or the sensor is slow"
-)
+_RUNS: Final = "residuals of neighbours are correlated: the data deviate from the law, or the sensor is slow"
 _COPY: Final = 1e-6
 """Singular value of the normalised Jacobian below which a term counts as collinear with the others."""
 
-_TOGETHER: Final = "the rows left out follow one another: there the data leave the law"
+_TOGETHER: Final = "the excluded rows are consecutive: there the data deviate from the law"
 
 _HARD_TO_TELL: Final = 30.0
 """Condition number above which the result names the constants that the data cannot separate."""
@@ -161,8 +159,8 @@ def inseparable(solution: Solution, names: Sequence[str]) -> list[str]:
     if len(parts) < 2:
         return []
     listed = f"{', '.join(parts[:-1])} and {parts[-1]}"
-    tied = f"{listed} go together (condition number {solution.condition_number:.3g})"
-    return [f"{tied}: the data fix a combination of them better than each alone"]
+    tied = f"{listed} are correlated (condition number {solution.condition_number:.3g})"
+    return [f"{tied}: the data determine a combination better than each constant alone"]
 
 
 _WEAK: Final = 0.1
@@ -265,13 +263,13 @@ def assemble(
                 expected=remedies[key],
             )
     held = [
-        f"the data do not determine {key}: it is held at {each.value:.4g} {each.unit}"
+        f"the data do not determine {key}, which is held at {each.value:.4g} {each.unit}"
         for key, each in constants.items()
         if each.held
     ]
     held += [f"{key} {_unseen(constants[key])}" for key in unseen]
     weak = [
-        f"{key} is weakly determined: its profile puts it between {shape.interval[0]:.4g} and"
+        f"{key} is weakly determined: the profile confines the constant to {shape.interval[0]:.4g} and"
         f" {shape.interval[1]:.4g} {constants[key].unit}"
         for key, shape in profiles.items()
     ]

@@ -34,7 +34,7 @@ _SERIES: Final = (1.0, -2 / 3, 4 / 9, -44 / 135, 104 / 405, -40 / 189, 7648 / 42
 """Coefficients of the power series of y / z in z, derived from the restitution law."""
 
 _SMALL: Final = 0.02
-"""Largest |z| at which the series is used: it is exact to rounding, whereas the logarithms cancel."""
+"""Largest |z| for the power series, which is exact there, whereas the logarithms suffer cancellation."""
 
 
 def rebound(z: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -205,7 +205,7 @@ def fit_backstop(
             f"{table.path}: impact speeds from {speed.min():.4g} to {speed.max():.4g} m/s",
             file=table.path,
             key="impact speed",
-            expected=f"a span of {_SPAN:g} times or more, or the restitution law cannot be tested",
+            expected=f"a span of {_SPAN:g} times or more, to test the restitution law",
         )
     middle = float(np.median(back / speed))
     if middle >= 1.0:
@@ -213,7 +213,7 @@ def fit_backstop(
             f"{table.path}: rebounds are {middle:.3g} times as fast as impacts",
             file=table.path,
             key="rebound speed",
-            expected="them slower",
+            expected="rebounds slower than impacts",
         )
     law = RestitutionLaw(speed)
     start = np.array([damping_from_restitution(1.0, middle, float(np.median(speed)))])

@@ -114,10 +114,10 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
     c, k, square, twice = _least_absolute(np.column_stack(columns), force)[:4]
     if square <= 0.0:
         raise InputError(
-            f"{table.path}: at 0 A the force falls toward the magnet by no inverse root",
+            f"{table.path}: at 0 A the force does not follow an inverse root of the displacement",
             file=table.path,
             key="force",
-            expected="a pull, negative forces near the magnet and less of it farther away",
+            expected="a pull: negative forces near the magnet, weaker ones farther away",
         )
     am = math.sqrt(square)
     strongest = float(current[np.argmax(np.abs(current))])
@@ -129,7 +129,7 @@ def start_of(table: Readings, levels: int, zero: float) -> FloatArray:
             f"{table.path}: the pull grows with the current",
             file=table.path,
             key="current",
-            expected="currents counted positive where they weaken it",
+            expected="currents that are positive if they weaken the pull",
         )
     return np.array([c, am, bm, k])
 
@@ -188,7 +188,7 @@ def fit_magnet(
             f"{alone.path}: the position of the backstop is missing",
             file=alone.path,
             key="position",
-            expected="it with a spring",
+            expected="this position, if a table of the spring is given",
         )
     data = _data(table, alone)
     x = data.abscissa
@@ -265,7 +265,7 @@ def _check(table: Readings, alone: Readings | None, zero: float, position: float
             f"{table.path}: all forces are at {current[0]:.4g} A",
             file=table.path,
             key="current",
-            expected="2 or more currents, or magnet.Bm cannot be found",
+            expected="2 or more currents, to fit magnet.Bm",
         )
     places, needed = clusters(x), 3 if alone is not None else 4
     if 0 < places < needed:
@@ -273,7 +273,7 @@ def _check(table: Readings, alone: Readings | None, zero: float, position: float
             f"{table.path}: {places} different displacements",
             file=table.path,
             key="displacement",
-            expected=f"{needed} or more, or the pull cannot be told from the spring",
+            expected=f"{needed} or more, to separate the pull from the spring force",
         )
     near = x <= max(x.min(), position or 0.0) + 0.02 * np.ptp(x)
     if force[near].max() <= 0.0:

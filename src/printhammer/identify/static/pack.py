@@ -101,7 +101,7 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 ),
                 file=table.path,
                 key="indentation",
-                expected="one that grows",
+                expected="growing values",
             )
         order = rows[np.argsort(depth[rows], kind="stable")]
         # Running medians, as wide as the number of rows allows, suppress single outliers.
@@ -122,7 +122,7 @@ def check_loading(table: Readings, cycles: Cycles) -> None:
                 f"{table.path}: the force of the loading branch falls from {high} to {low}",
                 file=table.path,
                 key="force",
-                expected="one that grows",
+                expected="growing values",
             )
 
 
@@ -239,7 +239,7 @@ def fit_pack(
             f"{table.path}: no rows of unloading",
             file=table.path,
             key="rows",
-            expected="some, or their exponent cannot be found",
+            expected="unloading rows, to fit the exponent of unloading",
         )
     solution = solved(data, law, _start(law, table), robust=robust)
     _check_turns(law, table, solution)
@@ -268,7 +268,7 @@ def _start(law: PackLaw, table: Readings) -> FloatArray:
             f"{table.path}: {len(rows)} rows of loading inside the pack",
             file=table.path,
             key="rows",
-            expected=f"{_LOADING_ROWS} or more, or the stiffness cannot be found",
+            expected=f"{_LOADING_ROWS} or more, to fit the stiffness",
         )
     deep = rows[np.argsort(law.log_r[rows], kind="stable")[len(rows) // 2 :]]
     stiffness = float(np.median(force[deep] * np.exp(-LOADING * law.log_r[deep])))
@@ -277,7 +277,7 @@ def _start(law: PackLaw, table: Readings) -> FloatArray:
             f"{table.path}: the forces of loading are not positive",
             file=table.path,
             key="force",
-            expected="magnitudes, whatever their direction",
+            expected="positive magnitudes of the force",
         )
     turns = [law.log_r[law.inside & (cycles.cycle == turn)].max() for turn in law.turns]
     return np.array([stiffness, *turns, *([LOADING, UNLOADING] if law.free else [])])
@@ -291,7 +291,7 @@ def _check_turns(law: PackLaw, table: Readings, solution: Solution) -> None:
             raise InputError(
                 (
                     f"{table.path}: lines {table.lines[rows[0]]} to {table.lines[rows[-1]]} are a load"
-                    " cycle whose loading and unloading do not meet"
+                    " cycle whose branches do not meet"
                 ),
                 file=table.path,
                 key="rows",

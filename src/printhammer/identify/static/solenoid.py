@@ -41,7 +41,7 @@ _ABSENT_HIGH: Final = ("saturation_flux", "leakage_reach")
 """Constants whose effect vanishes when they are large; the effect of all others vanishes at zero."""
 
 _FACTOR: Final = 4.0
-"""Ratio of force to i^2/2 dL/dg above which a unit must be wrong (lbf for N: 4.4), not the saturation."""
+"""Ratio of force to i^2/2 dL/dg that saturation cannot explain; a force in lbf instead of N gives 4.4."""
 
 _SPARE: Final = 4
 """Smallest number of rows in excess of parameters, for the errors; arbitrary."""
@@ -78,14 +78,14 @@ def fit_solenoid(
             f"{table.path}: the column 'current' is missing",
             file=table.path,
             key="current",
-            expected="it or one current for all rows",
+            expected="this column, or one current for all rows",
         )
     if "inductance" not in table.values and "linkage" not in table.values:
         raise InputError(
             f"{table.path}: neither 'inductance' nor 'linkage'",
             file=table.path,
             key="inductance",
-            expected="one of these columns beside the force, or the saturation cannot be told",
+            expected="one of these columns besides the force, to determine the saturation",
         )
     gap, force = table.values["gap"], table.values["force"]
     currents = table.values.get("current", np.full(len(gap), current))
@@ -159,7 +159,7 @@ def _check_factor(
     factor = float(np.median(factors))
     if not 1.0 / _FACTOR < factor < _FACTOR:
         raise InputError(
-            f"{path}: the force is {factor:.3g} of what the slope of the inductance asks for (i^2/2 dL/dg)",
+            f"{path}: the force is {factor:.3g} times the value from the inductance (i^2/2 dL/dg)",
             file=path,
             key="force",
             value=factor,

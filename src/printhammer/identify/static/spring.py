@@ -68,14 +68,14 @@ def fit_spring(path: str | Path, *, position: float, robust: bool = True, column
             f"{table.path}: {len(np.unique(x))} different displacements",
             file=table.path,
             key="displacement",
-            expected="3 or more for a line",
+            expected="3 or more, to fit a line",
         )
     law = SpringLaw(x - position)
     solution = solved(data, law, start_of(table.path, x - position, force), robust=robust)
     middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min())
     u = (x - middle) / half
-    bent = "the force is no straight line over the displacement"
-    p_value, why = judge(solution, {bent: u * u, f"{bent}, it swings about one": u**3}, x, data.series)
+    bent = "the force is not a linear function of the displacement"
+    p_value, why = judge(solution, {bent: u * u, f"{bent} but oscillates about a line": u**3}, x, data.series)
     return assemble(
         data,
         law,
@@ -98,7 +98,7 @@ def start_of(path: Path, travel: FloatArray, force: FloatArray) -> FloatArray:
             f"{path}: the spring force rises by {slope:.3g} N/m with the displacement",
             file=path,
             key="force",
-            expected="a force toward the paper that falls",
+            expected="a force toward the paper that decreases",
         )
     if not height > 0.0:
         raise InputError(

@@ -156,7 +156,7 @@ def columns_beside(path: Path) -> Columns | None:
         return None
     where = str(beside)
     try:
-        content = tomllib.loads(read_text(beside, "the file of columns"))
+        content = tomllib.loads(read_text(beside, "the file that declares the columns"))
     except ValueError as error:
         if isinstance(error, InputError):
             raise

@@ -104,7 +104,7 @@ def layout_of(text: str, where: str, words: Collection[str] = ()) -> Table:
             f"{where}: the file has no heading",
             file=where,
             key="heading",
-            expected="one such as 'time [us],current [A]' above the numbers",
+            expected="a line such as 'time [us],current [A]' above the numbers",
         )
     rows, beside = _without_facts_beside(rows)
     facts = {_key(key): [value] for key, value in split.comments.items()} | beside

@@ -65,7 +65,7 @@ def with_points(
             dropped |= {ord("."): None, ord(","): "."}
         elif (first := next((each for each in marked if "," in each[1]), None)) is not None:
             if point is None:
-                raise _unclear(where, *first, "a number elsewhere that shows which")
+                raise _unclear(where, *first, "another number that shows the meaning of the mark")
             dropped[ord(",")] = None
     elif separator != ",":
         _check_groups(where, lines, rows)
@@ -87,12 +87,12 @@ def _check_groups(where: str, lines: Sequence[int], rows: list[list[str]]) -> No
             and any(cell.endswith("0") for _line, cell in points)
             and all(_GROUPED["."].fullmatch(cell) for _line, cell in points)
         ):
-            raise _unclear(where, *points[0], "a number elsewhere that shows which")
+            raise _unclear(where, *points[0], "another number that shows the meaning of the mark")
 
 
 def _unclear(where: str, line: int, cell: str, expected: str) -> InputError:
     return InputError(
-        f"{where}: line {line}: the mark in {cell!r} may divide decimals or thousands",
+        f"{where}: line {line}: the mark in {cell!r} may be a decimal mark or a thousands separator",
         file=where,
         key=f"line {line}",
         value=cell,

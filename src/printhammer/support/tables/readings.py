@@ -55,7 +55,7 @@ class Readings:
     comments: dict[str, str]
     """Comments of the form ``# key: value``; for a repeated key, the last."""
     levels: frozenset[str] = frozenset()
-    """Columns of 0 and 1 where a line of a logic analyser changes; a level holds until the next row."""
+    """Names of columns of logic levels, 0 or 1, from a logic analyser; a level holds until the next row."""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -175,7 +175,7 @@ def readings_of(
             f"{table.where}: the table has no rows",
             file=table.where,
             key="rows",
-            expected="them below the heading",
+            expected="rows below the heading",
         )
     values = {
         name: _values(table, name, source, numbers[name], name in gaps) for name, source in sources.items()
@@ -215,7 +215,7 @@ def assigned(
                 f"{columns.where}: delay({name})",
                 file=columns.where,
                 key=f"delay({name})",
-                expected="a column of it",
+                expected="an existing column",
             )
     sources = dict(columns.sources)
     if "time" in numbers and "time" not in sources and columns.clock is None:
@@ -243,9 +243,9 @@ def quantities_of(table: Table, numbers: Collection[str]) -> list[str]:
 
 
 def _levels(table: Table) -> set[int]:
-    """Return the indices of columns of levels, some of which change in every row.
+    """Return the indices of the columns of logic levels; empty unless some level changes in every row.
 
-    A column of levels has cells 0 and 1, and neither a unit nor the name of a quantity.
+    A column of logic levels has cells 0 and 1, and neither a unit nor the name of a quantity.
     """
     columns = {
         place: table.cells(place)
@@ -268,12 +268,15 @@ def _by_heading(
     for place, (heading, name) in enumerate(zip(table.columns, known, strict=True)):
         if name in sources or name in words:
             raise InputError(
-                f"{where}: the column {name!r} is given twice", file=where, key=name, expected="it once"
+                f"{where}: the column {name!r} is given twice",
+                file=where,
+                key=name,
+                expected="each column once",
             )
         if name in text:
             if heading.unit:
                 raise InputError(
-                    f"{where}: heading {heading.shown!r}: expected {name!r}, words have no unit",
+                    f"{where}: heading {heading.shown!r}: expected {name!r}, since words have no unit",
                     file=where,
                     key=heading.shown,
                 )
